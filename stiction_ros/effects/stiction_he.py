@@ -1,0 +1,90 @@
+"""He's data-driven stiction model, equations (3) and (4)."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.errors import InputError
+
+
+@dataclasses.dataclass(frozen=True)
+class HeStiction(Behaviour):
+    r"""Static and dynamic friction of a sliding-stem valve.
+
+    .. math::
+        \chi_k = \begin{cases}
+            u_k - f_D & u_k - \chi_{k-1} > f_S \\
+            u_k + f_D & u_k - \chi_{k-1} < -f_S \\
+            \chi_{k-1} & |u_k - \chi_{k-1}| \le f_S
+        \end{cases} \tag{4}
+
+    The memory is the stem position χ. The smallest move of the stem is the
+    :attr:`jump` J = f_S − f_D.
+
+    Raises:
+        InputError: a negative or non-finite friction, or f_D > f_S.
+    """
+
+    effect: ClassVar[str] = "stiction"
+    law: ClassVar[str | None] = "he"
+
+    static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
+    dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.dynamic_friction > self.static_friction:
+            raise InputError(
+                f"{self.dynamic_friction:g} is larger than f_s = {self.static_friction:g}",
+                where="f_d",
+                fix="dynamic friction cannot exceed static friction, so lower f_d or raise f_s",
+            )
+
+    @property
+    def jump(self) -> float:
+        """Smallest move of the stem, J = f_S − f_D, in %."""
+        return self.static_friction - self.dynamic_friction
+
+    def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
+        """Return the stem position twice, as memory and as output, by (4)."""
+        assert isinstance(memory, float | int)
+        error = value - memory
+        if error > self.static_friction:
+            stem = value - self.dynamic_friction
+        elif error < -self.static_friction:
+            stem = value + self.dynamic_friction
+        else:
+            stem = float(memory)
+        return stem, stem
+
+    @classmethod
+    def simulate_grid(
+        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+    ) -> FloatArray:
+        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
+        static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
+        stem = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
+        out = np.empty((len(values), len(static)))
+        for k, value in enumerate(values.tolist()):
+            error = value - stem
+            slips = np.abs(error) > static
+            np.copyto(stem, value - np.copysign(dynamic, error), where=slips)
+            out[k] = stem
+        return out
+
+    def inverse(self, memory: Memory, wanted: float) -> float:
+        """Return the OP that moves the stem to ``wanted`` if the valve can go there.
+
+        The stem moves by at least J, so for 0 < \\|wanted − χ\\| < J the nearer of staying
+        and the smallest jump is taken; staying returns the stem position itself.
+        """
+        assert isinstance(memory, float | int)
+        move = wanted - memory
+        if abs(move) < max(self.jump / 2.0, 1e-12):
+            return float(memory)
+        size = max(abs(move), self.jump * (1.0 + 1e-9) + 1e-9)
+        return float(memory + np.copysign(size + self.dynamic_friction, move))

@@ -1,0 +1,27 @@
+"""The one error that users see: what is wrong, where, and how to mend it."""
+
+from __future__ import annotations
+
+
+class InputError(ValueError):
+    """Input that cannot be used.
+
+    Args:
+        what: what is wrong, in one sentence without a full stop.
+        where: the file, key, column or option at fault; empty when there is none.
+        fix: how to mend it; empty when the first part says it already.
+
+    ``str(error)`` is one line, ``where: what; fix``, which the command prints before it
+    ends with exit code 2.
+    """
+
+    def __init__(self, what: str, *, where: str = "", fix: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.fix = fix
+        super().__init__((f"{where}: " if where else "") + what + (f"; {fix}" if fix else ""))
+
+    def within(self, place: str) -> InputError:
+        """Return the same error with ``place`` put before where it was found."""
+        where = f"{place}: {self.where}" if self.where else place
+        return InputError(self.what, where=where, fix=self.fix)
