@@ -9,20 +9,34 @@ from collections.abc import Mapping
 from typing import Any
 
 from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Parameter
+from stiction_ros.effects.disturbance import (
+    DriftDisturbance,
+    SineDisturbance,
+    StepDisturbance,
+)
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
 from stiction_ros.errors import InputError
 
-BEHAVIOURS: tuple[type[Behaviour], ...] = (HeStiction, SmoothedHeStiction)
+BEHAVIOURS: tuple[type[Behaviour], ...] = (
+    HeStiction,
+    SmoothedHeStiction,
+    StepDisturbance,
+    DriftDisturbance,
+    SineDisturbance,
+)
 
 __all__ = [
     "BEHAVIOURS",
     "Behaviour",
+    "DriftDisturbance",
     "FloatArray",
     "HeStiction",
     "Memory",
     "Parameter",
+    "SineDisturbance",
     "SmoothedHeStiction",
+    "StepDisturbance",
     "from_mapping",
 ]
 

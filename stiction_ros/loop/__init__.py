@@ -1,1 +1,25 @@
-"""."""
+"""The loop: what is known of it, and how it moves."""
+
+from stiction_ros.loop.closed_loop import (
+    ClosedLoopRun,
+    Controller,
+    PiController,
+    simulate_closed_loop,
+)
+from stiction_ros.loop.model import Disturbance, LoopModel, PiTuning, Valve
+from stiction_ros.loop.plant import Measurement, Plant
+from stiction_ros.loop.set_points import SetPoints
+
+__all__ = [
+    "ClosedLoopRun",
+    "Controller",
+    "Disturbance",
+    "LoopModel",
+    "Measurement",
+    "PiController",
+    "PiTuning",
+    "Plant",
+    "SetPoints",
+    "Valve",
+    "simulate_closed_loop",
+]

@@ -1,0 +1,47 @@
+"""Unmeasured disturbances that add to a signal: a step, a drift, a sine."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+from stiction_ros.effects.behaviour import Behaviour, Memory, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class StepDisturbance(Behaviour):
+    """Adds ``size`` from ``time`` on."""
+
+    effect: ClassVar[str] = "step"
+
+    onset: float = parameter("time", "s", "time of the step since the first sample")
+    size: float = parameter("size", "signal", "height of the step")
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        return memory, value + (self.size if time >= self.onset else 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class DriftDisturbance(Behaviour):
+    """Adds a ramp that starts with the first sample."""
+
+    effect: ClassVar[str] = "drift"
+
+    rate: float = parameter("rate", "signal/s", "slope of the ramp")
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        return memory, value + self.rate * time
+
+
+@dataclasses.dataclass(frozen=True)
+class SineDisturbance(Behaviour):
+    """Adds a sine that starts at zero with the first sample."""
+
+    effect: ClassVar[str] = "sine"
+
+    amplitude: float = parameter("amplitude", "signal", "half the peak-to-peak height", low=0.0)
+    period: float = parameter("period", "s", "length of one cycle", low=1e-9)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        return memory, value + self.amplitude * math.sin(2.0 * math.pi * time / self.period)

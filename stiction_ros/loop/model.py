@@ -1,0 +1,265 @@
+"""LoopModel: all that is known of one loop, as YAML holds it."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from stiction_ros.effects import Behaviour, FloatArray
+from stiction_ros.effects import from_mapping as effect_from_mapping
+from stiction_ros.errors import InputError
+from stiction_ros.loop.process_reading import read_process
+from stiction_ros.loop.reading import Section, load_yaml, parse_yaml
+from stiction_ros.processes import Process
+
+
+@dataclasses.dataclass(frozen=True)
+class Valve:
+    """A control valve: its limits in % (or None) and its effects in signal order."""
+
+    name: str
+    limits: tuple[float, float] | None
+    effects: tuple[Behaviour, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Disturbance:
+    """An unmeasured effect that adds to an output or to a further input of the process."""
+
+    place: str
+    behaviour: Behaviour
+
+
+@dataclasses.dataclass(frozen=True)
+class PiTuning:
+    """A recorded PI tuning: signed gain in % per unit of PV, integral time in seconds."""
+
+    gain: float
+    integral_time: float
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopModel:
+    """One loop: valves, process, sensors, disturbances and where it operates.
+
+    Identification makes it, the controller is built from it, the plant simulates it, the
+    discrepancy workflow extends it. The object is never changed; ``with_…`` returns another.
+
+    Attributes:
+        name: the loop's tag.
+        sample_time: seconds.
+        valves, process: m valves and the process with p outputs behind them.
+        sensors: effects of each sensor, in the order of the outputs.
+        disturbances: unmeasured effects.
+        op0, pv0: operating point, shapes (m,) in % and (p,) in engineering units.
+        stem_start, pv_start: where a simulation starts, same shapes.
+        controller: the recorded PI tuning, or None.
+        provenance: who added which effect, when, with what evidence.
+        document: the validated YAML mapping, which :meth:`to_yaml` writes.
+    """
+
+    name: str
+    sample_time: float
+    valves: tuple[Valve, ...]
+    process: Process
+    sensors: tuple[tuple[Behaviour, ...], ...]
+    disturbances: tuple[Disturbance, ...]
+    op0: FloatArray
+    pv0: FloatArray
+    stem_start: FloatArray
+    pv_start: FloatArray
+    controller: PiTuning | None
+    provenance: tuple[Mapping[str, Any], ...]
+    document: Mapping[str, Any] = dataclasses.field(repr=False)
+
+    @classmethod
+    def load(cls, path: Path | str) -> LoopModel:
+        """Read a ``*.loop.yaml`` file; anything wrong in it raises InputError."""
+        return cls.from_mapping(load_yaml(path), str(path))
+
+    @classmethod
+    def from_yaml(cls, text: str, where: str = "loop model") -> LoopModel:
+        """Read YAML text, as the topic ``loop_model`` carries it."""
+        return cls.from_mapping(parse_yaml(text, where), where)
+
+    @classmethod
+    def from_mapping(cls, document: Any, where: str = "loop model") -> LoopModel:
+        """Check a YAML mapping and build the loop from it.
+
+        Raises:
+            InputError: naming ``where``, the key, and the mend.
+        """
+        top = Section(document, where)
+        name = top.text("loop")
+        sample_time = top.number("sample_time", above=0.0)
+        valves = tuple(_read_valve(entry) for entry in top.sections("valves"))
+        tags = tuple(valve.name for valve in valves)
+        if not tags or len(set(tags)) != len(tags):
+            raise InputError("needs at least one valve, each with a name of its own", where=where)
+        section = top.section("process")
+        point = top.section("operating_point", {})
+        process = read_process(section, point, tags, sample_time)
+        op0 = process.linear(sample_time).stem0
+        pv0 = process.linear(sample_time).pv0
+        point.finish()
+        sensors = _read_sensors(top, process.outputs)
+        disturbances = tuple(_read_disturbance(s, process) for s in top.sections("disturbances", []))
+        initial = top.section("initial", {})
+        stem_start = named_numbers(initial, "stem", tags, op0)
+        pv_start = named_numbers(initial, "pv", process.outputs, pv0)
+        initial.finish()
+        controller = None
+        if "controller" in top:
+            controller = _read_pi(top.section("controller"))
+        provenance = tuple(dict(entry.values) for entry in top.sections("provenance", []))
+        top.raw("valid_from", 0)
+        top.finish()
+        return cls(
+            name,
+            sample_time,
+            valves,
+            process,
+            sensors,
+            disturbances,
+            op0,
+            pv0,
+            stem_start,
+            pv_start,
+            controller,
+            provenance,
+            copy.deepcopy(dict(document)),
+        )
+
+    @property
+    def valve_names(self) -> tuple[str, ...]:
+        """Tags of the m valves."""
+        return tuple(valve.name for valve in self.valves)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Tags of the p outputs."""
+        return self.process.outputs
+
+    @property
+    def limits(self) -> FloatArray:
+        """Lower and upper limits of the valves, shape (m, 2), ±inf where there are none."""
+        return np.array([valve.limits or (-np.inf, np.inf) for valve in self.valves])
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return a copy of the YAML mapping."""
+        return copy.deepcopy(dict(self.document))
+
+    def to_yaml(self, *, valid_from: int | None = None) -> str:
+        """Return YAML text; ``valid_from`` in ns is set when given."""
+        document = self.to_mapping()
+        if valid_from is not None:
+            document["valid_from"] = valid_from
+        return yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+
+    def save(self, path: Path | str) -> None:
+        """Write the YAML file."""
+        Path(path).write_text(self.to_yaml(), encoding="utf-8")
+
+    def with_valve_effects(
+        self, effects: Mapping[str, Sequence[Behaviour]], **provenance: Any
+    ) -> LoopModel:
+        """Return the loop with the effects of the named valves replaced.
+
+        Keyword arguments, if any, become one entry of the provenance.
+        """
+        document = self.to_mapping()
+        for name in effects:
+            if name not in self.valve_names:
+                raise InputError(
+                    f"no valve {name!r}", where=self.name, fix=f"use {', '.join(self.valve_names)}"
+                )
+        for valve in document["valves"]:
+            if valve["name"] in effects:
+                valve["effects"] = [e.to_mapping() for e in effects[valve["name"]]]
+        if provenance:
+            document.setdefault("provenance", []).append(dict(provenance))
+        return LoopModel.from_mapping(document, self.name)
+
+    def with_ideal_valves(self) -> LoopModel:
+        """Return the loop with valves that follow OP exactly."""
+        return self.with_valve_effects({name: () for name in self.valve_names})
+
+
+def named_numbers(
+    section: Section, key: str, names: tuple[str, ...], default: FloatArray
+) -> FloatArray:
+    """Return the numbers of a mapping such as ``op: {V1: 50}`` in the order of ``names``."""
+    if key not in section:
+        return default
+    entry = section.section(key)
+    values = np.array([entry.number(n, float(d)) for n, d in zip(names, default, strict=True)])
+    entry.finish()
+    return values
+
+
+def _read_effects(section: Section) -> tuple[Behaviour, ...]:
+    effects = []
+    for entry in section.sections("effects", []):
+        try:
+            effects.append(effect_from_mapping(entry.values))
+        except InputError as error:
+            raise error.within(entry.where) from None
+    return tuple(effects)
+
+
+def _read_valve(section: Section) -> Valve:
+    name = section.text("name")
+    limits = None
+    if "limits" in section:
+        low, high = section.numbers("limits", count=2)
+        if low >= high:
+            raise InputError(
+                f"lower limit {low:g} is not below {high:g}",
+                where=section.at("limits"),
+                fix="write [low, high]",
+            )
+        limits = (float(low), float(high))
+    effects = _read_effects(section)
+    section.finish()
+    return Valve(name, limits, effects)
+
+
+def _read_sensors(top: Section, outputs: tuple[str, ...]) -> tuple[tuple[Behaviour, ...], ...]:
+    found: dict[str, tuple[Behaviour, ...]] = {}
+    for section in top.sections("sensors", []):
+        name = section.choice("name", outputs)
+        found[name] = _read_effects(section)
+        section.finish()
+    return tuple(found.get(name, ()) for name in outputs)
+
+
+def _read_disturbance(section: Section, process: Process) -> Disturbance:
+    values = dict(section.values)
+    keys = [key for key in ("output", "input") if key in values]
+    if len(keys) != 1:
+        raise InputError(
+            "a disturbance acts on one output or one input",
+            where=section.where,
+            fix=f"add output: {' | '.join(process.outputs)}",
+        )
+    section.choice(keys[0], process.outputs if keys[0] == "output" else process.upsets)
+    place = values.pop(keys[0])
+    try:
+        return Disturbance(place, effect_from_mapping(values))
+    except InputError as error:
+        raise error.within(section.where) from None
+
+
+def _read_pi(section: Section) -> PiTuning:
+    section.choice("kind", ("pi",))
+    tuning = PiTuning(section.number("gain"), section.number("integral_time", above=0.0))
+    section.finish()
+    return tuning
+
+

@@ -1,0 +1,111 @@
+"""The simulated plant: a loop model that moves one sample at a time."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects import Behaviour, FloatArray, Memory
+from stiction_ros.loop.model import LoopModel
+from stiction_ros.processes import NoiseEntry
+
+
+@dataclasses.dataclass(frozen=True)
+class Measurement:
+    """What the plant shows at one sample.
+
+    Attributes:
+        time: seconds since the first sample.
+        pv: measured outputs, shape (p,).
+        pv_clean: outputs without noise and sensor effects, shape (p,).
+        dv: measured disturbances in deviations from nominal, shape (d,).
+    """
+
+    time: float
+    pv: FloatArray
+    pv_clean: FloatArray
+    dv: FloatArray
+
+
+class _Chain:
+    """Effects in signal order with their memories."""
+
+    def __init__(self, effects: tuple[Behaviour, ...], start: float) -> None:
+        self.effects = effects
+        self.memories: list[Memory] = [effect.rest(start) for effect in effects]
+
+    def step(self, value: float, time: float) -> float:
+        for i, effect in enumerate(self.effects):
+            self.memories[i], value = effect.step(self.memories[i], value, time)
+        return value
+
+
+class Plant:
+    """Valves, process, sensors and noise of a :class:`LoopModel`, stepped by its user.
+
+    Each sample is :meth:`measure`, then :meth:`apply` with the controller's OP (equations
+    (1), (2) and (A.2)). The same model and seed give the same numbers, bit for bit, and the
+    noise does not depend on what is applied.
+    """
+
+    def __init__(self, model: LoopModel, seed: int) -> None:
+        """Start at rest at the model's initial stem positions and outputs."""
+        self.model = model
+        process = model.process
+        self._random = np.random.default_rng(seed)
+        self._limits = model.limits.tolist()
+        self._valves = [
+            _Chain(valve.effects, float(start))
+            for valve, start in zip(model.valves, model.stem_start, strict=True)
+        ]
+        self._sensors = [
+            _Chain(effects, float(start))
+            for effects, start in zip(model.sensors, model.pv_start, strict=True)
+        ]
+        self._disturbances = [
+            (d.place, _Chain((d.behaviour,), 0.0)) for d in model.disturbances
+        ]
+        self._measurement_std = process.noise_std(NoiseEntry.MEASUREMENT)
+        self._equation_std = process.noise_std(NoiseEntry.EQUATION)
+        self._state = process.rest(model.stem_start, model.pv_start)
+        self._measured = [process.upsets.index(n) for n in process.measured_disturbances]
+        self.sample = 0
+        self._now = self._look()
+
+    def measure(self) -> Measurement:
+        """Return the measurement of the present sample; calling again changes nothing."""
+        return self._now
+
+    def apply(self, op: FloatArray) -> FloatArray:
+        """Hold ``op`` (m,), %, for one sample and return the stem positions (m,), %.
+
+        OP and stems are kept within the valves' limits.
+        """
+        time = self._now.time
+        stem = np.empty(len(self._valves))
+        for j, (chain, (low, high)) in enumerate(zip(self._valves, self._limits, strict=True)):
+            asked = min(max(float(op[j]), low), high)
+            stem[j] = min(max(chain.step(asked, time), low), high)
+        noise = self._equation_std * self._random.standard_normal(len(self._equation_std))
+        self._state = self.model.process.advance(self._state, stem, self._upset, noise)
+        self.sample += 1
+        self._now = self._look()
+        return stem
+
+    def _look(self) -> Measurement:
+        process = self.model.process
+        time = self.sample * self.model.sample_time
+        clean = process.output(self._state).astype(float, copy=True)
+        self._upset = np.zeros(len(process.upsets))
+        for place, chain in self._disturbances:
+            value = chain.step(0.0, time)
+            if place in process.outputs:
+                clean[process.outputs.index(place)] += value
+            else:
+                self._upset[process.upsets.index(place)] += value
+        pv = clean + self._measurement_std * self._random.standard_normal(len(clean))
+        for i, chain in enumerate(self._sensors):
+            if chain.effects:
+                pv[i] = chain.step(float(pv[i]), time)
+        return Measurement(time, pv, clean, self._upset[self._measured])

@@ -1,0 +1,144 @@
+"""The ``process`` section of a loop model."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop.reading import Section
+from stiction_ros.processes import (
+    ArxOutput,
+    ArxProcess,
+    LinearModel,
+    Noise,
+    NoiseEntry,
+    Process,
+    StateSpaceProcess,
+    StirredTank,
+    TankParameters,
+)
+
+_KINDS = ("arx", "state_space", "stirred_tank")
+
+
+def read_process(
+    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
+) -> Process:
+    """Build the process; ``point`` is the loop's operating point, read for linear kinds."""
+    kind = section.choice("kind", _KINDS)
+    if kind == "arx":
+        process = _read_arx(section, point, valves)
+    elif kind == "state_space":
+        process = _read_state_space(section, point, valves)
+    else:
+        process = _read_tank(section, point, valves, sample_time)
+    section.finish()
+    return process
+
+
+def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
+    if "measured_disturbances" in section and section.raw("measured_disturbances"):
+        raise InputError(
+            "an arx process has no measured disturbances",
+            where=section.at("measured_disturbances"),
+            fix="use kind: state_space with a matrix e",
+        )
+    equations = []
+    for entry in section.sections("outputs"):
+        name = entry.text("name")
+        b_section, delays = entry.section("b"), entry.section("delay", {})
+        b = {v: tuple(b_section.numbers(v).tolist()) for v in valves if v in b_section}
+        b_section.finish()
+        if not b:
+            raise InputError("names no valve", where=b_section.where)
+        delay = {v: delays.integer(v, 0) for v in b}
+        delays.finish()
+        try:
+            equation = ArxOutput(
+                name,
+                tuple(entry.numbers("a").tolist()),
+                b,
+                delay,
+                entry.number("bias", 0.0),
+                _read_noise(entry),
+            )
+        except InputError as error:
+            raise error.within(entry.where) from None
+        entry.finish()
+        equations.append(equation)
+    if not equations:
+        raise InputError("has no output", where=section.at("outputs"))
+    names = tuple(equation.name for equation in equations)
+    op0, pv0 = _read_point(point, valves, names)
+    return ArxProcess(tuple(equations), valves, op0, pv0)
+
+
+def _read_state_space(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
+    names, noise = _read_outputs(section, None)
+    measured = tuple(str(name) for name in section.raw("measured_disturbances", ()) or ())
+    a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
+    e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
+    op0, pv0 = _read_point(point, valves, names)
+    try:
+        model = LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
+        return StateSpaceProcess(model, valves, names, noise, measured)
+    except InputError as error:
+        raise error.within(section.where) from None
+
+
+def _read_tank(
+    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
+) -> Process:
+    names, noise = _read_outputs(section, ("C", "T"))
+    measured = tuple(str(name) for name in section.raw("measured_disturbances", ()) or ())
+    values = {}
+    for field in dataclasses.fields(TankParameters):
+        if field.name in section:
+            values[field.name] = section.number(field.name, above=0.0)
+    if point.values:
+        raise InputError(
+            "a stirred tank works in absolute units about (50, 50) %",
+            where=point.where,
+            fix="leave operating_point out and give initial instead",
+        )
+    try:
+        return StirredTank(valves, names, noise, TankParameters(**values), sample_time, measured)
+    except InputError as error:
+        raise error.within(section.where) from None
+
+
+def _read_outputs(
+    section: Section, default: tuple[str, ...] | None
+) -> tuple[tuple[str, ...], tuple[Noise, ...]]:
+    if default is not None and "outputs" not in section:
+        return default, tuple(Noise() for _ in default)
+    names, noise = [], []
+    for entry in section.sections("outputs"):
+        names.append(entry.text("name"))
+        noise.append(_read_noise(entry))
+        entry.finish()
+    return tuple(names), tuple(noise)
+
+
+def _read_noise(entry: Section) -> Noise:
+    if "noise" not in entry:
+        return Noise()
+    section = entry.section("noise")
+    std = section.number("std", low=0.0)
+    enters = section.choice("enters", tuple(NoiseEntry), NoiseEntry.MEASUREMENT)
+    section.finish()
+    return Noise(std, NoiseEntry(enters))
+
+
+def _read_point(
+    point: Section, valves: tuple[str, ...], outputs: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray]:
+    found = []
+    for key, names in (("op", valves), ("pv", outputs)):
+        entry = point.section(key, {})
+        found.append(np.array([entry.number(name, 0.0) for name in names]))
+        entry.finish()
+    return found[0], found[1]

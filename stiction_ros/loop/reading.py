@@ -1,0 +1,174 @@
+"""Checked reading of YAML: every wrong key, type or number becomes one clear error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+
+_REQUIRED: Any = object()
+
+
+def load_yaml(path: Path | str) -> Any:
+    """Return what the YAML file holds; a missing or broken file raises InputError."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError("no such file", where=str(path), fix="check the path") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read ({error})", where=str(path)) from error
+    return parse_yaml(text, str(path))
+
+
+def parse_yaml(text: str, where: str) -> Any:
+    """Return what the YAML text holds, or raise InputError with the line at fault."""
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f" in line {mark.line + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "cannot be parsed"
+        raise InputError(f"no valid YAML{line} ({problem})", where=where) from None
+
+
+class Section:
+    """One mapping of a file, read key by key; :meth:`finish` refuses what was not asked for."""
+
+    def __init__(self, value: Any, where: str) -> None:
+        """Wrap ``value``, which must be a mapping; ``where`` names it in errors."""
+        if not isinstance(value, Mapping):
+            raise InputError(f"expected keys and values, found {_show(value)}", where=where)
+        self.values = value
+        self.where = where
+        self._asked: dict[str, None] = {}
+
+    def __contains__(self, key: str) -> bool:
+        self._asked[key] = None
+        return self.values.get(key) is not None
+
+    def raw(self, key: str, default: Any = _REQUIRED) -> Any:
+        """Return the value as it stands; ``default`` where the key is absent."""
+        self._asked[key] = None
+        if key in self.values:
+            return self.values[key]
+        if default is _REQUIRED:
+            raise InputError(f"lacks {key!r}", where=self.where, fix=f"add {key}: ...")
+        return default
+
+    def text(self, key: str, default: Any = _REQUIRED) -> str:
+        """Return a non-empty string."""
+        value = self.raw(key, default)
+        if not isinstance(value, str) or not value:
+            raise InputError(f"{_show(value)} is no name", where=self.at(key))
+        return value
+
+    def choice(self, key: str, choices: tuple[str, ...], default: Any = _REQUIRED) -> str:
+        """Return one of ``choices``."""
+        value = self.text(key, default)
+        if value not in choices:
+            raise InputError(
+                f"unknown value {value!r}", where=self.at(key), fix=f"use {' | '.join(choices)}"
+            )
+        return value
+
+    def number(
+        self,
+        key: str,
+        default: Any = _REQUIRED,
+        *,
+        low: float = -math.inf,
+        high: float = math.inf,
+        above: float = -math.inf,
+    ) -> float:
+        """Return a finite number in [low, high] and > above."""
+        value = _number(self.raw(key, default), self.at(key))
+        if not low <= value <= high or value <= above:
+            wanted = f"> {above:g}" if above > -math.inf else f"in [{low:g}, {high:g}]"
+            raise InputError(f"{value:g} is out of range", where=self.at(key), fix=f"use {wanted}")
+        return value
+
+    def integer(self, key: str, default: Any = _REQUIRED, *, low: int = 0) -> int:
+        """Return a whole number ≥ low."""
+        value = self.raw(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < low:
+            raise InputError(
+                f"{_show(value)} is no whole number ≥ {low}", where=self.at(key)
+            )
+        return value
+
+    def flag(self, key: str, default: Any = _REQUIRED) -> bool:
+        """Return true or false."""
+        value = self.raw(key, default)
+        if not isinstance(value, bool):
+            raise InputError(f"{_show(value)} is neither true nor false", where=self.at(key))
+        return value
+
+    def numbers(self, key: str, default: Any = _REQUIRED, *, count: int | None = None) -> FloatArray:
+        """Return a list of finite numbers, shape (count,)."""
+        value = self.raw(key, default)
+        if not isinstance(value, list | tuple):
+            raise InputError(f"{_show(value)} is no list of numbers", where=self.at(key))
+        if count is not None and len(value) != count:
+            raise InputError(
+                f"has {len(value)} values, not {count}", where=self.at(key), fix=f"give {count}"
+            )
+        return np.array([_number(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value)])
+
+    def matrix(self, key: str, default: Any = _REQUIRED) -> FloatArray:
+        """Return a matrix given as a list of rows of equal length."""
+        rows = self.raw(key, default)
+        if not isinstance(rows, list | tuple) or not rows:
+            raise InputError("is no list of rows", where=self.at(key))
+        out = []
+        for i, row in enumerate(rows):
+            if not isinstance(row, list | tuple) or len(row) != len(rows[0]):
+                raise InputError(f"row {i + 1} differs in length", where=self.at(key))
+            out.append([_number(v, f"{self.at(key)}[{i}]") for v in row])
+        return np.array(out)
+
+    def section(self, key: str, default: Any = _REQUIRED) -> Section:
+        """Return the mapping below ``key``."""
+        return Section(self.raw(key, default), self.at(key))
+
+    def sections(self, key: str, default: Any = _REQUIRED) -> Iterator[Section]:
+        """Yield the mappings of the list below ``key``."""
+        value = self.raw(key, default)
+        if not isinstance(value, list | tuple):
+            raise InputError(f"{_show(value)} is no list", where=self.at(key))
+        for i, entry in enumerate(value):
+            yield Section(entry, f"{self.at(key)}[{i}]")
+
+    def at(self, key: str) -> str:
+        """Return the place of ``key`` for errors."""
+        return f"{self.where}: {key}" if ": " not in self.where else f"{self.where}.{key}"
+
+    def finish(self) -> None:
+        """Raise InputError when the mapping holds a key that nobody asked for."""
+        for key in self.values:
+            if key not in self._asked:
+                raise InputError(
+                    f"unknown key {key!r}",
+                    where=self.where,
+                    fix=f"known keys: {', '.join(self._asked)}",
+                )
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{_show(value)} is no number", where=where)
+    if not math.isfinite(value):
+        raise InputError(f"{value} is not finite", where=where, fix="give a finite number")
+    return float(value)
+
+
+def _show(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

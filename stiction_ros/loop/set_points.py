@@ -1,0 +1,69 @@
+"""A schedule of set-points, held between its moves and repeated when asked."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop.reading import Section, load_yaml
+
+
+@dataclasses.dataclass(frozen=True)
+class SetPoints:
+    """Piecewise constant set-points of p outputs.
+
+    Attributes:
+        outputs: tags of the outputs.
+        times: seconds of the moves, increasing, the first 0; shape (M,).
+        values: set-points from each move on, shape (M, p), engineering units.
+        repeat: seconds after which the schedule starts again; inf for never.
+    """
+
+    outputs: tuple[str, ...]
+    times: FloatArray
+    values: FloatArray
+    repeat: float = np.inf
+
+    @classmethod
+    def from_mapping(cls, value: Any, outputs: tuple[str, ...], where: str) -> SetPoints:
+        """Read ``{repeat: s, moves: [{time: s, TAG: value, …}, …]}``; the first sets every tag.
+
+        Raises:
+            InputError: unknown tags, times that do not increase, or no value for a tag.
+        """
+        top = Section(value, where)
+        repeat = top.number("repeat", above=0.0) if "repeat" in top else np.inf
+        times, rows = [], []
+        for section in top.sections("moves"):
+            times.append(section.number("time", low=0.0))
+            before = rows[-1] if rows else [None] * len(outputs)
+            rows.append(
+                [
+                    section.number(tag) if tag in section or last is None else last
+                    for tag, last in zip(outputs, before, strict=True)
+                ]
+            )
+            section.finish()
+        top.finish()
+        if not times or times[0] != 0.0:
+            raise InputError("the first move is not at time 0", where=where, fix="add time: 0")
+        if any(b <= a for a, b in zip(times, times[1:], strict=False)) or times[-1] >= repeat:
+            raise InputError("times must increase and end before repeat", where=where)
+        return cls(outputs, np.array(times), np.array(rows, dtype=float), repeat)
+
+    @classmethod
+    def load(cls, path: Path | str, outputs: tuple[str, ...]) -> SetPoints:
+        """Read the schedule from a YAML file."""
+        return cls.from_mapping(load_yaml(path), outputs, str(path))
+
+    def at(self, time: float) -> FloatArray:
+        """Return the set-points, shape (p,), in force at ``time`` seconds."""
+        if np.isfinite(self.repeat):
+            time = time % self.repeat
+        row = int(np.searchsorted(self.times, time + 1e-9, side="right")) - 1
+        return np.asarray(self.values[max(row, 0)])
