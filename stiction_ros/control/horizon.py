@@ -1,0 +1,235 @@
+"""The finite-horizon problem (19), condensed to the stem moves and solved by daqp."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import daqp
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.processes import LinearModel
+
+SLACK_WEIGHT = 1e4  # on slack², relative to the mean curvature of the inputs
+ITERATION_LIMIT = 2000
+
+
+@dataclasses.dataclass(frozen=True)
+class HorizonWeights:
+    """Penalties of (19a).
+
+    Attributes:
+        horizon: N_H, samples.
+        state: Q, shape (n, n).
+        move: S, shape (m, m), on Δχ (which is Δu for valves without friction).
+        terminal: V_F, shape (n, n).
+    """
+
+    horizon: int
+    state: FloatArray
+    move: FloatArray
+    terminal: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class HorizonLimits:
+    """Bounds of (19e): stems (m, 2) in %, moves (m,) in % per sample, soft outputs (p, 2)."""
+
+    stem: FloatArray
+    move: FloatArray
+    output: FloatArray
+
+
+class HorizonCost:
+    r"""The cost (19a) as a quadratic in the stacked stems v_i = χ_i − χ_ss.
+
+    With z = ξ − ξ_ss the dynamics are z_{i+1} = A z_i + B v_i, so
+
+    .. math:: J(v) = v^T H v / 2 + v^T (F_z z_0 + F_v v_{-1}) + \text{const}.
+
+    The constant is kept (:meth:`constant`), so that costs of different plans compare.
+    """
+
+    def __init__(self, model: LinearModel, weights: HorizonWeights) -> None:
+        """Condense over ``weights.horizon`` samples."""
+        self.model = model
+        self.horizon = weights.horizon
+        n, m, horizon = model.order, model.b.shape[1], weights.horizon
+        free = np.empty((horizon, n, n))
+        forced = np.zeros((horizon, n, horizon * m))
+        power = np.eye(n)
+        for i in range(horizon):
+            if i:
+                forced[i] = model.a @ forced[i - 1]
+            forced[i][:, i * m : (i + 1) * m] = model.b
+            power = model.a @ power
+            free[i] = power
+        penalties = np.repeat(weights.state[None], horizon, axis=0)
+        penalties[-1] = weights.terminal
+        weighted = penalties @ forced
+        hessian = np.tensordot(forced, weighted, axes=([0, 1], [0, 1]))
+        self.from_state = np.tensordot(weighted, free, axes=([0, 1], [0, 1])) * 2.0
+        difference = np.eye(horizon * m) - np.eye(horizon * m, k=-m)
+        moves = np.kron(np.eye(horizon), weights.move)
+        hessian = 2.0 * (hessian + difference.T @ moves @ difference)
+        self.hessian = 0.5 * (hessian + hessian.T)
+        self.from_last = np.zeros((horizon * m, m))
+        self.from_last[:m] = -2.0 * weights.move
+        self._constant_state = weights.state + np.einsum("ija,ijk,ikb->ab", free, penalties, free)
+        self._constant_last = weights.move
+        self.free_output = model.c @ free  # (N, p, n)
+        self.forced_output = model.c @ forced  # (N, p, N m)
+
+    def linear(self, state: FloatArray, last: FloatArray) -> FloatArray:
+        """Return F_z z₀ + F_v v₋₁ for deviations ``state`` (n,) and ``last`` (m,)."""
+        return np.asarray(self.from_state @ state + self.from_last @ last)
+
+    def constant(self, state: FloatArray, last: FloatArray) -> float:
+        """Return the part of the cost that no plan changes."""
+        return float(state @ self._constant_state @ state + last @ self._constant_last @ last)
+
+    def outputs(self, state: FloatArray, plan: FloatArray) -> FloatArray:
+        """Return output deviations from the target, shape (N, p), for samples 1 … N."""
+        return np.asarray(self.free_output @ state + self.forced_output @ plan.reshape(-1))
+
+
+@dataclasses.dataclass(frozen=True)
+class HorizonSolution:
+    """A plan, stems in deviations from the target, shape (N, m); its cost; the largest slack."""
+
+    plan: FloatArray
+    cost: float
+    slack: FloatArray
+    variables: FloatArray
+
+
+class HorizonQp:
+    """(19) over plans v = T r + v₀ with r the decision variables of one pattern of moves.
+
+    The matrices are factorised once; each :meth:`solve` changes vectors only.
+    """
+
+    def __init__(
+        self,
+        cost: HorizonCost,
+        shape: FloatArray,
+        rows: FloatArray,
+        output_bounds: FloatArray,
+    ) -> None:
+        """Set up.
+
+        Args:
+            cost: the condensed cost.
+            shape: T, shape (N m, r).
+            rows: further constraint rows on r, shape (c, r).
+            output_bounds: soft bounds (p, 2); rows are added only where one is finite.
+        """
+        self.cost, self.shape = cost, shape
+        self.size = shape.shape[1]
+        self._bounded = np.flatnonzero(np.isfinite(output_bounds).any(axis=1))
+        self._output_bounds = output_bounds[self._bounded]
+        slacks = len(self._bounded)
+        hessian = np.zeros((self.size + slacks, self.size + slacks))
+        core = shape.T @ cost.hessian @ shape
+        hessian[: self.size, : self.size] = core
+        slack_weight = SLACK_WEIGHT * float(np.trace(core)) / max(self.size, 1)
+        hessian[self.size :, self.size :] = slack_weight * np.eye(slacks)
+        horizon = cost.horizon
+        blocks = [np.hstack([rows, np.zeros((len(rows), slacks))])]
+        self._output_rows = cost.forced_output[:, self._bounded] @ shape  # (N, s, r)
+        for sign in (1.0, -1.0):
+            block = np.zeros((horizon, slacks, self.size + slacks))
+            block[..., : self.size] = self._output_rows
+            block[:, range(slacks), range(self.size, self.size + slacks)] = -sign
+            blocks.append(block.reshape(-1, self.size + slacks))
+        self._matrix = np.ascontiguousarray(np.vstack(blocks))
+        self._slacks = slacks
+        count = self.size + slacks + len(self._matrix)
+        self._upper, self._lower = np.full(count, 1e30), np.full(count, -1e30)
+        self._lower[self.size : self.size + slacks] = 0.0
+        self._model = daqp.Model()
+        self._hessian = np.ascontiguousarray(hessian)
+        self._ready = False
+
+    def solve(
+        self,
+        state: FloatArray,
+        last: FloatArray,
+        offset: FloatArray,
+        lower: FloatArray,
+        upper: FloatArray,
+        target_pv: FloatArray,
+    ) -> HorizonSolution | None:
+        """Return the best plan, or None when there is none.
+
+        Args:
+            state: ξ̂ − ξ_ss, shape (n,).
+            last: χ₋₁ − χ_ss, shape (m,).
+            offset: v₀, shape (N m,).
+            lower, upper: bounds on r and then on the further rows, shape (r + c,).
+            target_pv: outputs at the target, shape (p,), about which soft bounds are written.
+        """
+        gradient = self.cost.linear(state, last)
+        if offset.any():
+            curved = self.cost.hessian @ offset
+            linear = np.zeros(self.size + self._slacks)
+            linear[: self.size] = self.shape.T @ (gradient + curved)
+            base = float(offset @ (0.5 * curved + gradient))
+        else:
+            linear = np.zeros(self.size + self._slacks)
+            linear[: self.size] = self.shape.T @ gradient
+            base = 0.0
+        if np.any(lower > upper):
+            return None
+        self._fill_bounds(state, offset, lower, upper, target_pv)
+        if self.size == 0:
+            variables = np.zeros(0)
+            return HorizonSolution(
+                offset.reshape(self.cost.horizon, -1), base, np.zeros(len(target_pv)), variables
+            )
+        flag = self._load(linear)
+        if flag < 0:
+            return None
+        solution, value, flag, _ = self._model.solve()
+        if flag < 1 or not np.isfinite(value):
+            self._ready = False
+            return None
+        variables = solution[: self.size]
+        slack = np.zeros(len(target_pv))
+        slack[self._bounded] = solution[self.size :]
+        plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
+        return HorizonSolution(plan, float(value) + base, slack, variables)
+
+    def _fill_bounds(
+        self,
+        state: FloatArray,
+        offset: FloatArray,
+        lower: FloatArray,
+        upper: FloatArray,
+        target_pv: FloatArray,
+    ) -> None:
+        r, s = self.size, self._slacks
+        rows = len(lower) - r
+        self._lower[:r], self._upper[:r] = lower[:r], upper[:r]
+        self._lower[r + s : r + s + rows] = lower[r:]
+        self._upper[r + s : r + s + rows] = upper[r:]
+        if s:
+            free = (self.cost.outputs(state, offset) + target_pv)[:, self._bounded]
+            first = r + s + rows
+            count = free.size
+            high = np.minimum(self._output_bounds[:, 1] - free, 1e30)
+            low = np.maximum(self._output_bounds[:, 0] - free, -1e30)
+            self._upper[first : first + count] = high.reshape(-1)
+            self._lower[first + count : first + 2 * count] = low.reshape(-1)
+
+    def _load(self, linear: FloatArray) -> int:
+        if self._ready:
+            return int(self._model.update(f=linear, bupper=self._upper, blower=self._lower))
+        self._model = daqp.Model()
+        sense = np.zeros(len(self._upper), dtype=np.int32)
+        flag, _ = self._model.setup(
+            self._hessian, linear, self._matrix, self._upper, self._lower, sense
+        )
+        self._model.settings = {"iter_limit": ITERATION_LIMIT}
+        self._ready = flag >= 0
+        return int(flag)

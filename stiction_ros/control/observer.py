@@ -1,0 +1,137 @@
+"""State and output-disturbance estimation for offset-free control."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+
+class ObserverKind(enum.StrEnum):
+    """How the observer gain is chosen."""
+
+    KALMAN = "kalman"
+    LUENBERGER = "luenberger"
+
+
+@dataclasses.dataclass(frozen=True)
+class ObserverTuning:
+    """Covariances relative to the measurement noise, or the Luenberger gain.
+
+    Attributes:
+        kind: Kalman filter, or the Luenberger observer with K_x = 0 and K_d = gain · I.
+        state_noise: variance of stem-like noise that enters through B, in %².
+        disturbance_noise: variance of the random walk of d, per output, in (units of PV)².
+        measurement_noise: variance of the measurement noise, per output, in (units of PV)².
+        gain: K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters.
+    """
+
+    kind: ObserverKind
+    state_noise: float
+    disturbance_noise: FloatArray
+    measurement_noise: FloatArray
+    gain: float = 0.2
+
+
+class Observer:
+    r"""Observer of the model with a constant output disturbance.
+
+    .. math::
+        \hat e_k &= y_k - C \hat\xi_k - \hat d_k - y_0 \\
+        \hat\xi_k^+ &= \hat\xi_k + K_x \hat e_k, \quad \hat d_k^+ = \hat d_k + K_d \hat e_k \\
+        \hat\xi_{k+1} &= A \hat\xi_k^+ + B (\hat\chi_k - \chi_0) + E w_k + g
+
+    Feed it the stem positions that the controller believes in, not OP.
+    """
+
+    def __init__(self, model: LinearModel, tuning: ObserverTuning) -> None:
+        """Design the gain.
+
+        Raises:
+            InputError: the augmented model is not detectable, so no offset-free control.
+        """
+        _check_detectable(model)
+        self.model = model
+        n, p = model.order, len(model.pv0)
+        self.gain = _luenberger(model, tuning) if tuning.kind == "luenberger" else _kalman(
+            model, tuning
+        )
+        self._gain_x, self._gain_d = self.gain[:n], self.gain[n:]
+        self.state = np.zeros(n)
+        self.disturbance = np.zeros(p)
+        self.innovation = np.zeros(p)
+
+    def rest(self, stem: FloatArray, pv: FloatArray) -> None:
+        """Start from the steady state at ``stem`` (m,), d̂ chosen so that it shows ``pv``."""
+        model = self.model
+        drive = model.b @ (stem - model.stem0) + model.constant
+        self.state = np.linalg.lstsq(np.eye(model.order) - model.a, drive, rcond=None)[0]
+        self.disturbance = pv - model.pv0 - model.c @ self.state
+
+    def correct(self, pv: FloatArray) -> None:
+        """Take in the measurement ``pv``, shape (p,)."""
+        model = self.model
+        self.innovation = pv - model.pv0 - model.c @ self.state - self.disturbance
+        self.state = self.state + self._gain_x @ self.innovation
+        self.disturbance = self.disturbance + self._gain_d @ self.innovation
+
+    def predict(self, stem: FloatArray, dv: FloatArray) -> None:
+        """Move one sample on with stems ``stem`` (m,), % and disturbances ``dv`` (d,)."""
+        model = self.model
+        self.state = model.a @ self.state + model.b @ (stem - model.stem0) + model.constant
+        if model.e.shape[1]:
+            self.state = self.state + model.e @ dv
+
+
+def _augmented(model: LinearModel) -> tuple[FloatArray, FloatArray]:
+    n, p = model.order, len(model.pv0)
+    a = np.eye(n + p)
+    a[:n, :n] = model.a
+    return a, np.hstack([model.c, np.eye(p)])
+
+
+def _check_detectable(model: LinearModel) -> None:
+    """Hautus test of every eigenvalue on or outside the unit circle."""
+    a, c = _augmented(model)
+    values = np.append(np.linalg.eigvals(model.a), 1.0)
+    for value in values[np.abs(values) >= 1.0 - 1e-9]:
+        pencil = np.vstack([a - value * np.eye(len(a)), c])
+        if np.linalg.matrix_rank(pencil, tol=1e-10) < len(a):
+            raise InputError(
+                f"mode {value:.4g} cannot be told from an output disturbance",
+                where="process model",
+                fix="an integrating or unstable mode needs another disturbance model; "
+                "use a process model whose modes are all stable",
+            )
+
+
+def _kalman(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
+    """Return the stationary gain, shape (n + p, p), for the corrected estimate."""
+    a, c = _augmented(model)
+    n = model.order
+    noise = np.zeros_like(a)
+    noise[:n, :n] = tuning.state_noise * model.b @ model.b.T + 1e-12 * np.eye(n)
+    noise[n:, n:] = np.diag(tuning.disturbance_noise)
+    measurement = np.diag(tuning.measurement_noise)
+    covariance = solve_discrete_are(a.T, c.T, noise, measurement)
+    innovation = c @ covariance @ c.T + measurement
+    return np.asarray(np.linalg.solve(innovation, c @ covariance).T)
+
+
+def _luenberger(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
+    if np.abs(np.linalg.eigvals(model.a)).max(initial=0.0) >= 1.0:
+        raise InputError(
+            "the Luenberger observer needs a stable process model",
+            where="observer",
+            fix="use observer: kalman",
+        )
+    n, p = model.order, len(model.pv0)
+    gain = np.zeros((n + p, p))
+    gain[n:] = tuning.gain * np.eye(p)
+    return gain

@@ -1,0 +1,101 @@
+"""The steady-state target: where outputs and stems should come to rest."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import daqp
+import numpy as np
+from scipy.linalg import null_space
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+
+@dataclasses.dataclass(frozen=True)
+class Target:
+    """A steady state of the model.
+
+    Attributes:
+        state: ξ_ss, shape (n,).
+        stem: χ_ss, shape (m,), %.
+        pv: the outputs there, shape (p,).
+        reachable: whether ``pv`` meets the set-points.
+        miss: SP − pv, shape (p,), zero when reachable.
+    """
+
+    state: FloatArray
+    stem: FloatArray
+    pv: FloatArray
+    reachable: bool
+    miss: FloatArray
+
+
+class TargetSelector:
+    r"""Equation (20) with the disturbance estimate: C ξ_ss + d̂ = y_sp within the stem bounds.
+
+    All steady states are ξ_ss = ξ₀ + N_ξ r, χ_ss = χ₀ + N_χ r with N the null space of
+    (I − A, −B), so the nearest one is a small bounded least-squares problem in r.
+    """
+
+    def __init__(self, model: LinearModel, weights: FloatArray, limits: FloatArray) -> None:
+        """Prepare for ``weights`` (p,) on the outputs and ``limits`` (m, 2) on the stems.
+
+        Raises:
+            InputError: the model has no steady state that its valves can move.
+        """
+        self.model = model
+        self.limits = limits
+        n = model.order
+        balance = np.hstack([np.eye(n) - model.a, -model.b])
+        basis = null_space(balance, rcond=1e-10)
+        self._basis_state, self._basis_stem = basis[:n], basis[n:]
+        self._map = model.c @ self._basis_state
+        self._weights = weights
+        # A trace of weight on the stems makes the choice unique where outputs leave it open.
+        scale = float(np.trace(self._map.T @ (weights[:, None] * self._map)))
+        if not scale > 0.0:
+            raise InputError("no valve moves any output at rest", where="process model")
+        self._curvature = self._map.T @ (weights[:, None] * self._map)
+        self._curvature += 1e-12 * scale * np.eye(basis.shape[1])
+        self._inverse = np.linalg.pinv(balance, rcond=1e-10)
+
+    def select(
+        self, sp: FloatArray, disturbance: FloatArray, dv: FloatArray
+    ) -> Target | None:
+        """Return the target for set-points ``sp`` (p,), or None when no state is feasible."""
+        model = self.model
+        drive = model.constant + (model.e @ dv if model.e.shape[1] else 0.0)
+        origin = self._inverse @ drive
+        n = model.order
+        origin_state, origin_stem = origin[:n], origin[n:]
+        wanted = sp - model.pv0 - disturbance - model.c @ origin_state
+        low = self.limits[:, 0] - model.stem0 - origin_stem
+        high = self.limits[:, 1] - model.stem0 - origin_stem
+        linear = -self._map.T @ (self._weights * wanted)
+        free = np.linalg.solve(self._curvature, -linear)
+        stem = self._basis_stem @ free
+        if np.any(stem < low) or np.any(stem > high):
+            scale = np.sqrt(np.diag(self._curvature).mean())
+            free, _, flag, _ = daqp.solve(
+                self._curvature / scale**2,
+                linear / scale**2,
+                np.ascontiguousarray(self._basis_stem),
+                high,
+                low,
+                np.zeros(len(low), dtype=np.int32),
+            )
+            if flag < 1:
+                return None
+            stem = np.clip(self._basis_stem @ free, low, high)
+        state = origin_state + self._basis_state @ free
+        miss = wanted - self._map @ free
+        reachable = bool(np.all(np.abs(miss) <= 1e-6 * (1.0 + np.abs(sp))))
+        return Target(
+            state,
+            stem + origin_stem + model.stem0,
+            sp - miss,
+            reachable,
+            np.zeros_like(miss) if reachable else miss,
+        )
