@@ -141,7 +141,7 @@ class HorizonQp:
             block = np.zeros((horizon, slacks, self.size + slacks))
             block[..., : self.size] = self._output_rows
             block[:, range(slacks), range(self.size, self.size + slacks)] = -sign
-            blocks.append(block.reshape(-1, self.size + slacks))
+            blocks.append(block.reshape(horizon * slacks, self.size + slacks))
         self._matrix = np.ascontiguousarray(np.vstack(blocks))
         self._slacks = slacks
         count = self.size + slacks + len(self._matrix)
