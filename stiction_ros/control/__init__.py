@@ -1,1 +1,16 @@
-"""."""
+"""Model predictive control of loops whose valves may stick."""
+
+from stiction_ros.control.controller import ControlDesign, History, MpcController
+from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
+from stiction_ros.control.settings import ControlSettings
+
+__all__ = [
+    "ControlDesign",
+    "ControlMode",
+    "ControlSettings",
+    "History",
+    "MpcController",
+    "Plan",
+    "StepResult",
+    "StepStatus",
+]

@@ -75,12 +75,15 @@ class MpcController:
     ) -> None:
         """Build for ``frictions``, one entry per valve, None for a healthy one.
 
+        The modes that do not know of friction take no notice of it.
+
         Raises:
             InputError: the model is not detectable, or embedding cannot be set up.
         """
         m = len(design.model.stem0)
         self.design, self.mode = design, mode
-        self.frictions = tuple(frictions) if frictions is not None else (None,) * m
+        aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION) and frictions is not None
+        self.frictions = tuple(frictions or ()) if aware else (None,) * m
         self.observer = Observer(design.model, design.observer)
         self.stem = np.array(design.model.stem0)
         self._target = TargetSelector(design.model, design.target_weights, design.limits.stem)

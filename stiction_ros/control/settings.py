@@ -1,0 +1,109 @@
+"""The tuning of a controller as its user writes it, and the design made from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.control.controller import ControlDesign
+from stiction_ros.control.embedding import EmbeddingTuning
+from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.observer import ObserverKind, ObserverTuning
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.settings import setting
+
+
+@dataclasses.dataclass(frozen=True)
+class ControlSettings:
+    """Weights, bounds and observer of the MPC.
+
+    Lists have one entry per output or per valve; a single entry stands for all.
+    """
+
+    horizon: int = setting(50, "prediction horizon N_H, samples", low=2, high=1000)
+    output_weights: tuple[float, ...] = setting(
+        (1.0,), "weight of each squared output error in Q", low=0.0
+    )
+    state_weight: float = setting(0.0, "weight added to Q on every state", low=0.0)
+    terminal_weight: float = setting(0.0, "weight added to V_F on every state", low=0.0)
+    move_weights: tuple[float, ...] = setting(
+        (0.1,), "S: weight of each squared OP move, stiction-unaware", low=1e-9
+    )
+    embedding_move_weights: tuple[float, ...] = setting(
+        (0.01,), "weight of each squared stem move, stiction-embedding", low=1e-9
+    )
+    target_weights: tuple[float, ...] = setting(
+        (1.0,), "Q_ss: weight of each output when set-points cannot all be reached", low=1e-9
+    )
+    op_rate_limits: tuple[float, ...] = setting(
+        (math.inf,), "largest OP move, % per sample; jumps of sticky valves excepted", low=1e-6
+    )
+    pv_low: tuple[float, ...] = setting((-math.inf,), "soft lower bound of each output")
+    pv_high: tuple[float, ...] = setting((math.inf,), "soft upper bound of each output")
+    observer: str = setting(
+        "kalman", "observer design", choices=tuple(kind.value for kind in ObserverKind)
+    )
+    state_noise: float = setting(1.0, "variance of stem-like process noise, %²", low=0.0)
+    disturbance_noise: tuple[float, ...] = setting(
+        (1e-5,), "variance per sample of each output disturbance", low=1e-15
+    )
+    measurement_noise: tuple[float, ...] = setting(
+        (1e-4,), "variance of the noise of each measurement", low=1e-15
+    )
+    luenberger_gain: float = setting(0.2, "K_d of the Luenberger observer", low=1e-6, high=1.0)
+    jump_price: float = setting(0.0, "cost added per jump of a sticky valve", low=0.0)
+    jump_margin: float = setting(
+        0.3, "how far a jump exceeds the smallest one, as a share of f_S", low=0.0, high=2.0
+    )
+    hand_over_samples: int = setting(
+        200, "past samples replayed into a new observer", low=1, high=100_000
+    )
+
+    def design(self, model: LoopModel) -> ControlDesign:
+        """Return the controller design for ``model``.
+
+        Raises:
+            InputError: a list that fits neither outputs nor valves, or crossed bounds.
+        """
+        linear = model.process.linear(model.sample_time)
+        p, m, n = len(model.outputs), len(model.valves), linear.order
+        for name in ("move_weights", "embedding_move_weights"):
+            self._list(name, m)
+        state = linear.c.T @ (self._list("output_weights", p)[:, None] * linear.c)
+        stage = state + self.state_weight * np.eye(n)
+        terminal = state + self.terminal_weight * np.eye(n)
+        weights = {
+            name: HorizonWeights(self.horizon, stage, np.diag(self._list(name, m)), terminal)
+            for name in ("move_weights", "embedding_move_weights")
+        }
+        output = np.column_stack([self._list("pv_low", p), self._list("pv_high", p)])
+        if np.any(output[:, 0] >= output[:, 1]):
+            raise InputError("pv_low is not below pv_high", where="pv_low")
+        return ControlDesign(
+            model=linear,
+            limits=HorizonLimits(model.limits, self._list("op_rate_limits", m), output),
+            unaware=weights["move_weights"],
+            embedding=weights["embedding_move_weights"],
+            target_weights=self._list("target_weights", p),
+            observer=ObserverTuning(
+                ObserverKind(self.observer),
+                self.state_noise,
+                self._list("disturbance_noise", p),
+                self._list("measurement_noise", p),
+                self.luenberger_gain,
+            ),
+            jumps=EmbeddingTuning(self.jump_price, self.jump_margin),
+            hand_over_samples=self.hand_over_samples,
+        )
+
+    def _list(self, name: str, count: int) -> FloatArray:
+        values = getattr(self, name)
+        if len(values) not in (1, count):
+            raise InputError(
+                f"has {len(values)} entries", where=name, fix=f"give 1 or {count} entries"
+            )
+        return np.array(np.broadcast_to(np.array(values, dtype=float), count))

@@ -1,0 +1,156 @@
+"""The estimator of a running loop: window in, trusted friction and loop model out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification import (
+    Identification,
+    IdentificationOptions,
+    identify,
+)
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.online.trust import Trust, TrustedFriction, TrustRule
+from stiction_ros.records import Record
+from stiction_ros.settings import setting
+
+
+@dataclasses.dataclass(frozen=True)
+class EstimatorSettings(FitSchedule, TrustRule):
+    """What the estimator looks at, when, and what it needs to be sure."""
+
+    window: int = setting(2500, "samples in the sliding window", low=20)
+    output_order: int = setting(0, "n_a of the ARX model; 0 chooses by BIC", low=0, high=20)
+    input_order: int = setting(0, "n_b of the ARX model; 0 chooses by BIC", low=0, high=20)
+    delay_low: int = setting(0, "smallest delay tried, samples", low=0)
+    delay_high: int = setting(10, "largest delay tried, samples", low=0)
+
+    def options(self) -> IdentificationOptions:
+        """Return what :func:`stiction_ros.identification.identify` is asked."""
+        return IdentificationOptions(
+            output_order=self.output_order or None,
+            input_order=self.input_order or None,
+            delay=(self.delay_low, self.delay_high),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class FitUpdate:
+    """What one fit says and changes.
+
+    Attributes:
+        end: last sample of the window.
+        identification: the fit itself.
+        trusted: trusted friction by valve after this fit.
+        loop_model: the loop with the trusted friction, only when it differs from before.
+    """
+
+    end: int
+    identification: Identification
+    trusted: Mapping[str, TrustedFriction]
+    loop_model: LoopModel | None
+
+
+def fit(record: Record, options: IdentificationOptions) -> Identification:
+    """Run one fit; a plain function, so that a worker process can run it."""
+    return identify(record, options)
+
+
+class LiveEstimator:
+    """Keeps the window and the trust; the fit itself runs wherever its user wants.
+
+    Per sample: :meth:`add`; when it returns a record, run :func:`fit` on it and hand the
+    result to :meth:`conclude`.
+    """
+
+    def __init__(
+        self,
+        settings: EstimatorSettings,
+        loop: str,
+        valves: Sequence[str],
+        outputs: Sequence[str],
+        sample_time: float,
+    ) -> None:
+        """Start with an empty window."""
+        self.settings = settings
+        self._loop = loop
+        self._valves, self._outputs = tuple(valves), tuple(outputs)
+        self._sample_time = sample_time
+        self._trust = Trust(self._valves, settings)
+        self._op: deque[FloatArray] = deque(maxlen=settings.window)
+        self._pv: deque[FloatArray] = deque(maxlen=settings.window)
+        self._published: dict[str, Any] | None = None
+
+    def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
+        """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due."""
+        self._op.append(np.array(op, dtype=float))
+        self._pv.append(np.array(pv, dtype=float))
+        if not self.settings.due(sample):
+            return None
+        return Record(
+            self._loop,
+            self._sample_time,
+            self._valves,
+            self._outputs,
+            np.array(self._op),
+            np.array(self._pv),
+            start=(sample + 1 - len(self._op)) * self._sample_time,
+        )
+
+    def conclude(self, end: int, found: Identification) -> FitUpdate:
+        """Apply the rule of trust to the fit of the window that ends at sample ``end``."""
+        trusted = dict(self._trust.update(found.valves))
+        effects = {name: friction.behaviour().to_mapping() for name, friction in trusted.items()}
+        model = None
+        if effects != (self._published or {}):
+            model = self._describe(end, found, trusted)
+            self._published = effects
+        return FitUpdate(end, found, trusted, model)
+
+    def _describe(
+        self, end: int, found: Identification, trusted: Mapping[str, TrustedFriction]
+    ) -> LoopModel:
+        """Return the identified loop as a :class:`LoopModel`."""
+        valves = []
+        for name in self._valves:
+            friction = trusted.get(name)
+            effects = [] if friction is None else [friction.behaviour().to_mapping()]
+            valves.append({"name": name, "effects": effects})
+        outputs = [
+            {
+                "name": output.name,
+                "a": [float(v) for v in output.a],
+                "b": {valve: [float(v) for v in b] for valve, b in output.b.items()},
+                "delay": {valve: int(d) for valve, d in output.delay.items()},
+                "bias": float(output.bias),
+                "noise": {"std": float(output.noise_std), "enters": "equation"},
+            }
+            for output in found.outputs
+        ]
+        provenance = [
+            {
+                "valve": name,
+                "effect": "stiction",
+                "from": f"window of {found.samples} samples ending at sample {end}",
+                "f_s_interval": list(friction.static_interval),
+                "f_d_interval": list(friction.dynamic_interval),
+            }
+            for name, friction in trusted.items()
+        ]
+        return LoopModel.from_mapping(
+            {
+                "loop": self._loop,
+                "sample_time": self._sample_time,
+                "valves": valves,
+                "process": {"kind": "arx", "outputs": outputs},
+                "provenance": provenance,
+            },
+            f"model identified for {self._loop}",
+        )

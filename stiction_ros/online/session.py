@@ -1,0 +1,174 @@
+"""A whole live loop without ROS: plant, controller and estimator in lockstep.
+
+The nodes do the same through topics; with the same settings and seed both give the same
+numbers.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiction_ros import settings as settings_module
+from stiction_ros.control import ControlMode
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
+from stiction_ros.loop.reading import Section, load_yaml
+from stiction_ros.online.live_controller import LiveController, LiveControllerSettings, ModeChange
+from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
+
+CONTROLLER_NODE_KEYS = ("model", "pace", "wait_for", "fit_timeout", "autostart")
+ESTIMATOR_NODE_KEYS = ("loop", "wait_for", "autostart", "sample_time")
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """One scenario file: the parameters of all nodes of a loop.
+
+    Attributes:
+        name: stem of the file.
+        nodes: parameters by node name, as written.
+        plant, process: the simulated loop, and the model that the controller is built from.
+        set_points: schedule.
+        seed, samples: of the plant.
+        controller, estimator: settings of the two.
+    """
+
+    name: str
+    nodes: Mapping[str, Mapping[str, Any]]
+    plant: LoopModel
+    process: LoopModel
+    set_points: SetPoints
+    seed: int
+    samples: int
+    controller: LiveControllerSettings
+    estimator: EstimatorSettings
+
+    @classmethod
+    def load(cls, path: Path | str) -> Scenario:
+        """Read a ROS parameter file (``node: {ros__parameters: {…}}``).
+
+        File names in it are relative to the file itself.
+
+        Raises:
+            InputError: anything missing or wrong, in one line.
+        """
+        path = Path(path)
+        top = Section(load_yaml(path), str(path))
+        nodes = {}
+        for name in top.values:
+            nodes[str(name)] = dict(top.section(str(name)).section("ros__parameters").values)
+        for needed in ("plant", "controller", "estimator"):
+            if needed not in nodes:
+                raise InputError(f"lacks the node {needed!r}", where=str(path))
+        plant = Section(nodes["plant"], f"{path}: plant")
+        controlled = Section(nodes["controller"], f"{path}: controller")
+        model = LoopModel.load(path.parent / plant.text("model"))
+        points = SetPoints.load(path.parent / plant.text("set_points"), model.outputs)
+        return cls(
+            path.stem.split(".")[0],
+            nodes,
+            model,
+            LoopModel.load(path.parent / controlled.text("model")),
+            points,
+            plant.integer("seed", 0),
+            plant.integer("samples", low=1),
+            _settings(LiveControllerSettings, nodes["controller"], CONTROLLER_NODE_KEYS, path),
+            _settings(EstimatorSettings, nodes["estimator"], ESTIMATOR_NODE_KEYS, path),
+        )
+
+
+def _settings(cls: type[Any], values: Mapping[str, Any], apart: tuple[str, ...], path: Path) -> Any:
+    own = {key: value for key, value in values.items() if key not in apart}
+    return settings_module.from_mapping(cls, own, str(path))
+
+
+@dataclasses.dataclass(frozen=True)
+class LiveRun:
+    """What happened in a live loop.
+
+    Attributes:
+        run: signals.
+        stem_estimate: χ̂ of the controller in force, shape (N, m), %.
+        changes: modes, the first at sample 0.
+        fits: every fit in order.
+    """
+
+    run: ClosedLoopRun
+    stem_estimate: FloatArray
+    changes: tuple[ModeChange, ...]
+    fits: tuple[FitUpdate, ...]
+
+    @property
+    def swap(self) -> ModeChange | None:
+        """The first change to a controller that knows the friction, or None."""
+        aware = (ControlMode.EMBEDDING, ControlMode.INVERSION)
+        return next((c for c in self.changes if c.mode in aware and c.sample > 0), None)
+
+
+class _Loop:
+    """Controller and estimator behind the plain face that a simulated loop calls."""
+
+    def __init__(self, scenario: Scenario, plant: LoopModel, identify: bool) -> None:
+        self.controller = LiveController(scenario.controller, scenario.process)
+        self.estimator: LiveEstimator | None = None
+        if identify:
+            self.estimator = LiveEstimator(
+                scenario.estimator, plant.name, plant.valve_names, plant.outputs, plant.sample_time
+            )
+        self.fits: list[FitUpdate] = []
+        self.stems: list[FloatArray] = []
+        self._latency = scenario.controller.fit_latency
+        self._sample = 0
+
+    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
+        result = self.controller.step(measurement.pv, sp, measurement.dv)
+        self.stems.append(self.controller.observed.stem)
+        if self.estimator is not None:
+            record = self.estimator.add(self._sample, result.op, measurement.pv)
+            if record is not None:
+                found = fit(record, self.estimator.settings.options())
+                update = self.estimator.conclude(self._sample, found)
+                self.fits.append(update)
+                if update.loop_model is not None:
+                    self.controller.offer(update.loop_model, self._sample + self._latency)
+        self._sample += 1
+        return result.op
+
+
+def run_live(
+    scenario: Scenario,
+    *,
+    seed: int | None = None,
+    samples: int | None = None,
+    ideal_valves: bool = False,
+    identify: bool = True,
+    progress: Callable[[int], None] | None = None,
+) -> LiveRun:
+    """Run the loop of ``scenario`` with its estimator and its swaps.
+
+    Args:
+        scenario: what to run.
+        seed, samples: in place of the scenario's.
+        ideal_valves: run with valves that follow OP exactly.
+        identify: whether the estimator runs; without it the controller stays as it starts.
+        progress: as in :func:`stiction_ros.loop.simulate_closed_loop`.
+    """
+    plant = scenario.plant.with_ideal_valves() if ideal_valves else scenario.plant
+    loop = _Loop(scenario, plant, identify)
+    run = simulate_closed_loop(
+        plant,
+        loop,
+        scenario.set_points,
+        scenario.samples if samples is None else samples,
+        scenario.seed if seed is None else seed,
+        progress,
+    )
+    return LiveRun(
+        run, np.array(loop.stems), tuple(loop.controller.changes), tuple(loop.fits)
+    )

@@ -1,0 +1,129 @@
+"""When an estimate of friction is trusted, and what a later window may change."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from stiction_ros.effects import HeStiction
+from stiction_ros.identification import ValveEstimate, VerdictKind
+from stiction_ros.settings import setting
+
+Interval = tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class TrustRule:
+    """A valve is trusted to be sticky after agreeing verdicts in successive windows.
+
+    1. ``confirmations`` successive windows say *sticky* and their intervals of f_S and of f_D
+       overlap: the friction is trusted, with the intersection of the intervals.
+    2. A later window is intersected with what is trusted. A loop that is compensated no
+       longer excites the friction band, so its window is wide and changes nothing.
+    3. Only ``contradictions`` successive windows whose intervals are disjoint from the trusted
+       ones replace it: by the new estimate if they say *sticky*, by a healthy valve if they
+       say *healthy*.
+    """
+
+    confirmations: int = setting(2, "successive sticky windows before trust", low=1, high=20)
+    contradictions: int = setting(2, "successive disjoint windows before a change", low=1, high=20)
+
+
+@dataclasses.dataclass(frozen=True)
+class TrustedFriction:
+    """Friction of one valve that the controller may rely on; % of travel."""
+
+    static_friction: float
+    static_interval: Interval
+    dynamic_friction: float
+    dynamic_interval: Interval
+
+    def behaviour(self) -> HeStiction:
+        """Return He's law with these values."""
+        return HeStiction(self.static_friction, min(self.dynamic_friction, self.static_friction))
+
+
+class ValveTrust:
+    """The state of the rule for one valve."""
+
+    def __init__(self, rule: TrustRule) -> None:
+        """Start without trust."""
+        self.rule = rule
+        self.trusted: TrustedFriction | None = None
+        self._pending: TrustedFriction | None = None
+        self._sticky_windows = 0
+        self._disjoint_windows = 0
+
+    def update(self, estimate: ValveEstimate) -> TrustedFriction | None:
+        """Take in the estimate of one more window and return what is trusted now."""
+        found = TrustedFriction(
+            estimate.static_friction,
+            estimate.static_interval,
+            estimate.dynamic_friction,
+            estimate.dynamic_interval,
+        )
+        sticky = estimate.verdict is VerdictKind.STICKY
+        if self.trusted is not None:
+            self._revise(found, estimate.verdict)
+        elif sticky:
+            both = _combine(self._pending, found) if self._pending is not None else None
+            self._sticky_windows = self._sticky_windows + 1 if both is not None else 1
+            self._pending = both if both is not None else found
+            if self._sticky_windows >= self.rule.confirmations:
+                self.trusted = self._pending
+        else:
+            self._sticky_windows, self._pending = 0, None
+        return self.trusted
+
+    def _revise(self, found: TrustedFriction, verdict: VerdictKind) -> None:
+        assert self.trusted is not None
+        both = _combine(self.trusted, found)
+        if both is not None:
+            self.trusted, self._disjoint_windows = both, 0
+            return
+        self._disjoint_windows += 1
+        if self._disjoint_windows < self.rule.contradictions:
+            return
+        if verdict is VerdictKind.STICKY:
+            self.trusted, self._disjoint_windows = found, 0
+        elif verdict is VerdictKind.HEALTHY:
+            self.trusted, self._pending = None, None
+            self._sticky_windows = self._disjoint_windows = 0
+
+
+class Trust:
+    """The rule for all valves of a loop."""
+
+    def __init__(self, valves: Sequence[str], rule: TrustRule) -> None:
+        """Start without trust in any of ``valves``."""
+        self._valves = {name: ValveTrust(rule) for name in valves}
+
+    def update(self, estimates: Sequence[ValveEstimate]) -> Mapping[str, TrustedFriction]:
+        """Take in one fit and return the trusted friction by valve."""
+        for estimate in estimates:
+            self._valves[estimate.name].update(estimate)
+        return self.trusted
+
+    @property
+    def trusted(self) -> Mapping[str, TrustedFriction]:
+        """The trusted friction of each valve that has one."""
+        return {n: v.trusted for n, v in self._valves.items() if v.trusted is not None}
+
+
+def _combine(old: TrustedFriction, new: TrustedFriction) -> TrustedFriction | None:
+    """Return the intersection, the old point kept where it still fits; None when disjoint."""
+    static = _intersect(old.static_interval, new.static_interval)
+    dynamic = _intersect(old.dynamic_interval, new.dynamic_interval)
+    if static is None or dynamic is None:
+        return None
+    return TrustedFriction(
+        min(max(old.static_friction, static[0]), static[1]),
+        static,
+        min(max(old.dynamic_friction, dynamic[0]), dynamic[1]),
+        dynamic,
+    )
+
+
+def _intersect(one: Interval, other: Interval) -> Interval | None:
+    low, high = max(one[0], other[0]), min(one[1], other[1])
+    return (low, high) if low <= high else None

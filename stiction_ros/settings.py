@@ -1,0 +1,125 @@
+"""Settings: frozen dataclasses whose fields carry description and range.
+
+The same declaration checks a parameter file, declares the ROS parameters of a node, and
+is printed in the documentation.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from stiction_ros.errors import InputError
+
+T = TypeVar("T")
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    """One setting.
+
+    Attributes:
+        name: key in a parameter file and name of the ROS parameter.
+        kind: ``float``, ``int``, ``bool``, ``str``, ``floats`` or ``strings``.
+        default: value when not given.
+        description: one line for people.
+        low, high: closed range of numbers (of each element of a list).
+        choices: accepted texts; empty for any.
+        fixed: whether it cannot change while the node runs.
+    """
+
+    name: str
+    kind: str
+    default: Any
+    description: str
+    low: float
+    high: float
+    choices: tuple[str, ...]
+    fixed: bool
+
+
+def setting(
+    default: Any,
+    description: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    choices: tuple[str, ...] = (),
+    fixed: bool = False,
+) -> Any:
+    """Declare a field of a settings dataclass."""
+    metadata = {"setting": (description, low, high, choices, fixed)}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+_KINDS = {
+    float: "float",
+    int: "int",
+    bool: "bool",
+    str: "str",
+    tuple[float, ...]: "floats",
+    tuple[str, ...]: "strings",
+}
+
+
+def settings_of(cls: type[Any]) -> tuple[Setting, ...]:
+    """Return the settings that ``cls`` declares, in order."""
+    hints = typing.get_type_hints(cls)
+    return tuple(
+        Setting(field.name, _KINDS[hints[field.name]], field.default, *field.metadata["setting"])
+        for field in dataclasses.fields(cls)
+        if "setting" in field.metadata
+    )
+
+
+def from_mapping(cls: type[T], values: Mapping[str, Any], where: str) -> T:
+    """Build ``cls`` from a mapping; absent keys take their defaults.
+
+    Raises:
+        InputError: an unknown key, a wrong type, or a value out of range.
+    """
+    known = {entry.name: entry for entry in settings_of(cls)}
+    checked = {}
+    for name, value in values.items():
+        if name not in known:
+            raise InputError(
+                f"unknown key {name!r}", where=where, fix=f"known keys: {', '.join(known)}"
+            )
+        checked[name] = check(known[name], value, where)
+    return cls(**checked)
+
+
+def check(entry: Setting, value: Any, where: str) -> Any:
+    """Return ``value`` in the type of ``entry``, or raise InputError."""
+    place = f"{where}: {entry.name}"
+    if entry.kind in ("floats", "strings"):
+        if isinstance(value, str) or not hasattr(value, "__iter__"):
+            raise InputError(f"{value!r} is no list", where=place, fix="write [a, b]")
+        return tuple(_check_one(entry, item, place) for item in value)
+    return _check_one(entry, value, place)
+
+
+def _check_one(entry: Setting, value: Any, place: str) -> Any:
+    if entry.kind in ("str", "strings"):
+        if not isinstance(value, str):
+            raise InputError(f"{value!r} is no text", where=place)
+        if entry.choices and value not in entry.choices:
+            raise InputError(
+                f"unknown value {value!r}", where=place, fix=f"use {' | '.join(entry.choices)}"
+            )
+        return value
+    if entry.kind == "bool":
+        if not isinstance(value, bool):
+            raise InputError(f"{value!r} is neither true nor false", where=place)
+        return value
+    whole = entry.kind == "int"
+    if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
+        raise InputError(f"{value!r} is no {'whole ' if whole else ''}number", where=place)
+    if math.isnan(value) or not entry.low <= value <= entry.high:
+        raise InputError(
+            f"{value} is out of range", where=place, fix=f"use [{entry.low:g}, {entry.high:g}]"
+        )
+    return value if whole else float(value)
