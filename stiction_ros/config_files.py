@@ -1,0 +1,41 @@
+"""Where configuration files are found: as given, else among those that come along."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from stiction_ros.errors import InputError
+
+
+def config_directories() -> list[Path]:
+    """Return the folders with the package's own configuration, nearest first."""
+    package = Path(__file__).resolve().parent
+    prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
+    candidates = [package.parent / "config"]
+    candidates += [
+        prefix / "share" / "stiction_ros" / "config" for prefix in [*prefixes, Path(sys.prefix)]
+    ]
+    return [path for path in candidates if path.is_dir()]
+
+
+def find_config(name: str | Path) -> Path:
+    """Return ``name`` if it exists, else the file of that name that comes with the package.
+
+    Raises:
+        InputError: neither exists.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    if not path.is_absolute():
+        for directory in config_directories():
+            if (directory / path).is_file():
+                return directory / path
+    known = sorted({p.name for d in config_directories() for p in d.glob("*.yaml")})
+    raise InputError(
+        "no such file",
+        where=str(path),
+        fix=f"give a path, or one of those that come along: {', '.join(known)}",
+    )

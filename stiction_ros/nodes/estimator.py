@@ -1,0 +1,193 @@
+"""The estimator: pv and op in, friction and loop model out."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections import deque
+from concurrent.futures import Future
+from typing import Any
+
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.identification import Identification
+from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, values_of
+from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared import NodeSettings
+from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator
+from stiction_ros.online.worker import FitWorker
+from stiction_ros.settings import setting
+
+
+@dataclasses.dataclass(frozen=True)
+class EstimatorNodeSettings(EstimatorSettings, NodeSettings):
+    """The live estimator's settings and what belongs to the node."""
+
+    loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
+    sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
+
+
+class EstimatorNode(ManagedNode):
+    """Thin shell around :class:`stiction_ros.online.live_estimator.LiveEstimator`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Build the node ``estimator``; ``kwargs`` go to the ROS node."""
+        super().__init__("estimator", EstimatorNodeSettings, **kwargs)
+        self._worker: FitWorker | None = None
+
+    def configure(self) -> None:
+        self._step = round(self.settings.sample_time * SECOND)
+        self.live: LiveEstimator | None = None
+        self._valves: tuple[str, ...] = ()
+        self._outputs: tuple[str, ...] = ()
+        self._origin: int | None = None
+        self._sample = 0
+        self._pv: dict[int, JointState] = {}
+        self._op: dict[int, JointState] = {}
+        self._last_op: FloatArray | None = None
+        self._pending: deque[tuple[int, Future[Identification]]] = deque()
+        self._token = ""
+        self._fits = self._failed = 0
+        self._said = "no fit yet"
+        self._worker = FitWorker()
+        self._done = self.create_guard_condition(self._collect)
+        self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
+        self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
+        self.create_subscription(JointState, "pv", self._on_pv, SIGNAL_QOS)
+        self.create_subscription(JointState, "op", self._on_op, SIGNAL_QOS)
+
+    def hardware(self) -> str:
+        return str(self.settings.loop)
+
+    def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        keys = [("sample", self._sample), ("fits", self._fits), ("failed_fits", self._failed)]
+        return "ok", self._said, [*keys, ("running_fits", len(self._pending))]
+
+    def finish(self) -> None:
+        if self._worker is not None:
+            self._worker.close()
+        super().finish()
+
+    # ---- samples in ------------------------------------------------------------------------
+
+    def _on_pv(self, message: JointState) -> None:
+        stamp = to_ns(message.header.stamp)
+        if self._origin is None:
+            self._origin = stamp
+            self._outputs = tuple(message.name)
+        self._pv[stamp] = message
+        self._pair()
+
+    def _on_op(self, message: JointState) -> None:
+        if not self._valves:
+            self._valves = tuple(message.name)
+        self._op[to_ns(message.header.stamp)] = message
+        self._pair()
+
+    def _pair(self) -> None:
+        """Take every sample whose pv and op are both there, oldest first."""
+        while self._pv and self._op:
+            stamp = min(self._pv)
+            op = None
+            if stamp in self._op:
+                op = values_of(self._op.pop(stamp), self._valves)
+            elif min(self._op) < stamp:
+                del self._op[min(self._op)]
+                continue
+            pv = values_of(self._pv.pop(stamp), self._outputs)
+            op = self._last_op if op is None else op  # a sample without op was held
+            if pv is None or op is None:
+                continue
+            self._last_op = op
+            self._add(stamp, op, pv)
+
+    def _add(self, stamp: int, op: FloatArray, pv: FloatArray) -> None:
+        if self.live is None:
+            self.live = LiveEstimator(
+                self.settings,
+                self.settings.loop,
+                self._valves,
+                self._outputs,
+                self.settings.sample_time,
+            )
+        self.stamp = stamp
+        record = self.live.add(self._sample, op, pv)
+        if record is not None and self._worker is not None:
+            future = self._worker.submit(record, self.live.settings.options())
+            self._pending.append((self._sample, future))
+            future.add_done_callback(lambda _future: self._done.trigger())
+        self._sample += 1
+
+    # ---- fits out --------------------------------------------------------------------------
+
+    def _collect(self) -> None:
+        """Publish every fit that is done, in order."""
+        while self._pending and self._pending[0][1].done():
+            end, future = self._pending.popleft()
+            if future.cancelled() or self.live is None or self._origin is None:
+                continue
+            stamp = self._origin + end * self._step
+            try:
+                found = future.result()
+            except InputError as error:
+                self._failed += 1
+                self._said = f"window not usable: {error}"
+                self._publish(stamp, [], [])
+                continue
+            self._fits += 1
+            self._announce(stamp, self.live.conclude(end, found))
+
+    def _announce(self, stamp: int, update: FitUpdate) -> None:
+        if update.loop_model is not None:
+            valid_from = stamp + self.settings.fit_latency * self._step
+            self._token = str(valid_from)
+            text = update.loop_model.to_yaml(valid_from=valid_from)
+            self._model.publish(String(data=text))
+        rows = []
+        for valve in update.identification.valves:
+            rows.append((f"{valve.name}.f_s", valve.static_friction, valve.static_interval))
+            rows.append((f"{valve.name}.f_d", valve.dynamic_friction, valve.dynamic_interval))
+        self._publish(stamp, [row[0] for row in rows], [(row[1], *row[2]) for row in rows])
+        verdicts = ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
+        self._said = f"last window: {verdicts}"
+        keys: list[tuple[str, object]] = [("window_end", stamp)]
+        for name, friction in update.trusted.items():
+            keys.append((f"{name}.trusted_f_s", friction.static_friction))
+            keys.append((f"{name}.trusted_f_d", friction.dynamic_friction))
+        keys.append(("identification", json.dumps(_finite(update.identification.to_json()))))
+        self.report([("fit", verdicts, keys)])
+
+    def _publish(
+        self, stamp: int, names: list[str], values: list[tuple[float, float, float]]
+    ) -> None:
+        """Publish one fit: value, lower and upper end; empty when the window was not usable."""
+        message = joint_state(stamp, names, [value for value, _, _ in values])
+        message.velocity = [low for _, low, _ in values]
+        message.effort = [high for _, _, high in values]
+        message.header.frame_id = self._token
+        self._stiction.publish(message)
+
+
+def _finite(value: Any) -> Any:
+    """Return JSON data with null in place of numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def main() -> int:
+    """Run the node."""
+    return run("estimator", "Identifies friction and process from op and pv.", EstimatorNode)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

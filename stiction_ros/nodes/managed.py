@@ -1,0 +1,239 @@
+"""What all nodes share: lifecycle, counted publishers, peers, diagnostics, configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+from stiction_ros import __version__
+from stiction_ros.errors import InputError
+from stiction_ros.nodes import parameters
+from stiction_ros.nodes.messages import status, to_stamp
+
+SIGNAL_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED_QOS = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+LINK_PERIOD = 0.02  # s between two looks at the graph until all peers are there
+
+
+class Outlet:
+    """A publisher that counts, and knows which nodes must hear its first message."""
+
+    def __init__(self, publisher: Publisher, readers: tuple[str, ...]) -> None:
+        self.publisher = publisher
+        self.readers = readers
+        self.count = 0
+
+    def publish(self, message: Any) -> None:
+        """Publish and count."""
+        self.count += 1
+        self.publisher.publish(message)
+
+
+class ManagedNode(LifecycleNode):
+    """A lifecycle node that starts by itself unless ``autostart`` is false.
+
+    Subclasses write :meth:`configure`, :meth:`activate` and :meth:`deactivate`. An
+    :class:`InputError` in any of them is logged in one line, kept in :attr:`failure`, and
+    leaves the node where it was.
+    """
+
+    def __init__(self, name: str, settings: type[Any], **kwargs: Any) -> None:
+        """Declare the parameters of ``settings``; ``kwargs`` go to the ROS node."""
+        super().__init__(name, **kwargs)
+        self.settings_class = settings
+        self.failure = ""
+        self.finished = False
+        self.running = False
+        self.stamp = 0
+        self.outlets: dict[str, Outlet] = {}
+        self._linked = False
+        parameters.declare(self, settings)
+        self.settings = settings()
+
+    # ---- lifecycle -------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Configure and activate, as ``autostart`` does."""
+        self.trigger_configure()
+        if not self.failure:
+            self.trigger_activate()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return self._guarded(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        result = super().on_activate(state)
+        if result is not TransitionCallbackReturn.SUCCESS:
+            return result
+        return self._guarded(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.running = False
+        self.deactivate()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._tear_down()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.running = False
+        self.finished = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def configure(self) -> None:
+        """Build what the node runs; may raise InputError."""
+
+    def activate(self) -> None:
+        """Begin; may raise InputError."""
+
+    def deactivate(self) -> None:
+        """Stop for a while."""
+
+    def finish(self) -> None:
+        """Publish the last diagnostics and wait until all readers have everything."""
+        if not self.outlets:
+            return
+        self.running = False
+        self.deactivate()
+        self.report()
+        for outlet in self.outlets.values():
+            outlet.publisher.wait_for_all_acked(Duration(seconds=2.0))
+
+    def _configure(self) -> None:
+        self.settings = parameters.read(self, self.settings_class)
+        self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
+        self._config = self.outlet(String, "~/config", LATCHED_QOS)
+        self._timers = [self.create_timer(1.0, self._each_second)]
+        self.configure()
+        self.add_on_set_parameters_callback(self._on_set)
+        document = {
+            "node": self.get_fully_qualified_name(),
+            "version": __version__,
+            "parameters": parameters.as_mapping(self.settings),
+        }
+        text = yaml.safe_dump(document | self.configuration(), sort_keys=False)
+        self._config.publish(String(data=text))
+
+    def _activate(self) -> None:
+        self._linked = False
+        self.activate()
+        self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
+
+    def _tear_down(self) -> None:
+        self.remove_on_set_parameters_callback(self._on_set)
+        for timer in self._timers:
+            self.destroy_timer(timer)
+        for subscription in list(self.subscriptions):
+            self.destroy_subscription(subscription)
+        for outlet in self.outlets.values():
+            self.destroy_publisher(outlet.publisher)
+        self.outlets = {}
+
+    def _guarded(self, action: Any) -> TransitionCallbackReturn:
+        try:
+            action()
+        except InputError as error:
+            self.failure = str(error)
+            self.get_logger().error(self.failure)
+            if self.outlets:
+                self._tear_down()
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    # ---- topics ----------------------------------------------------------------------------
+
+    def outlet(
+        self, kind: Any, topic: str, qos: QoSProfile, readers: tuple[str, ...] = ()
+    ) -> Outlet:
+        """Create a counted publisher; ``recorder`` is among the readers of every topic."""
+        publisher = self.create_publisher(kind, topic, qos)
+        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"))
+        return self.outlets[topic]
+
+    def linked(self) -> None:
+        """Called once when every node of ``wait_for`` has matched."""
+
+    def _look_for_peers(self) -> None:
+        wanted = {name for name in self.settings.wait_for if name}
+        heard = set()
+        for topic, outlet in self.outlets.items():
+            found = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))
+            names = {info.node_name for info in found}
+            heard |= names
+            if not wanted.intersection(outlet.readers) <= names:
+                return
+            if outlet.publisher.get_subscription_count() < len(found):
+                return
+        if not wanted <= heard:
+            return
+        self.destroy_timer(self._link_timer)
+        self._linked = self.running = True
+        self.report()
+        self.linked()
+
+    # ---- parameters ------------------------------------------------------------------------
+
+    def configuration(self) -> dict[str, Any]:
+        """Return what ``~/config`` tells besides the parameters."""
+        return {}
+
+    def retune(self, settings: Any) -> None:
+        """React to changed settings; InputError refuses them."""
+
+    def _on_set(self, changed: list[Any]) -> Any:
+        known = {p.name: p.value for p in changed if hasattr(self.settings, p.name)}
+        if not known:
+            return parameters.accepted()
+        try:
+            settings = parameters.read(self, self.settings_class, known)
+            self.retune(settings)
+        except InputError as error:
+            return parameters.refusal(error)
+        self.settings = settings
+        return parameters.accepted()
+
+    # ---- diagnostics -----------------------------------------------------------------------
+
+    def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        """Return level (ok, warn, error), message and key-values of the 1 Hz status."""
+        return "ok", "running", []
+
+    def report(self, extra: Iterable[tuple[str, str, list[tuple[str, object]]]] = ()) -> None:
+        """Publish the health now, and ``extra`` as further statuses (task, text, values)."""
+        if not self._linked:
+            return
+        level, text, values = self.health()
+        self._diagnostics.count += 1  # this message counts as well
+        counts = [
+            (f"published:{self.resolve_topic_name(topic)}", outlet.count)
+            for topic, outlet in self.outlets.items()
+        ]
+        name, hardware = self.get_name(), self.hardware()
+        message = DiagnosticArray()
+        message.header.stamp = to_stamp(self.stamp)
+        message.status = [status(f"{name}: status", hardware, level, text, [*values, *counts])]
+        message.status += [
+            status(f"{name}: {task}", hardware, "ok", said, keys) for task, said, keys in extra
+        ]
+        self._diagnostics.publisher.publish(message)
+
+    def hardware(self) -> str:
+        """Return the identifier of the loop for ``hardware_id``."""
+        return self.get_name()
+
+    def _each_second(self) -> None:
+        if self.running:
+            self.report()

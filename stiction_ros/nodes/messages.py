@@ -1,0 +1,79 @@
+"""Between arrays and the messages of common_interfaces."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Duration, Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from stiction_ros.effects.behaviour import FloatArray
+
+SECOND = 1_000_000_000
+LEVELS = {"ok": b"\x00", "warn": b"\x01", "error": b"\x02"}
+
+
+def to_ns(stamp: Time) -> int:
+    """Return a stamp in nanoseconds."""
+    return int(stamp.sec) * SECOND + int(stamp.nanosec)
+
+
+def to_stamp(nanoseconds: int) -> Time:
+    """Return nanoseconds as a stamp."""
+    seconds, rest = divmod(nanoseconds, SECOND)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def joint_state(stamp: int, names: Sequence[str], values: Iterable[float]) -> JointState:
+    """Return tags and values as the topics pv, sp, op, stem and dv carry them."""
+    message = JointState()
+    message.header.stamp = to_stamp(stamp)
+    message.name = list(names)
+    message.position = array("d", values)
+    return message
+
+
+def values_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
+    """Return the values of ``names`` in their order, or None when one is not there."""
+    if len(message.position) != len(message.name):
+        return None
+    if message.name == list(names):
+        return np.array(message.position, dtype=float)
+    found = dict(zip(message.name, message.position, strict=True))
+    if any(name not in found for name in names):
+        return None
+    return np.array([found[name] for name in names], dtype=float)
+
+
+def trajectory(
+    stamp: int, names: Sequence[str], rows: FloatArray, times: Sequence[float]
+) -> JointTrajectory:
+    """Return a plan: ``rows`` (K, names) at ``times`` (K,) seconds from the stamp."""
+    message = JointTrajectory()
+    message.header.stamp = to_stamp(stamp)
+    message.joint_names = list(names)
+    for row, time in zip(rows, times, strict=True):
+        seconds, rest = divmod(round(time * SECOND), SECOND)
+        message.points.append(
+            JointTrajectoryPoint(
+                positions=array("d", row), time_from_start=Duration(sec=seconds, nanosec=rest)
+            )
+        )
+    return message
+
+
+def status(
+    name: str, hardware: str, level: str, text: str, values: Iterable[tuple[str, object]]
+) -> DiagnosticStatus:
+    """Return one diagnostic status; ``level`` is ok, warn or error."""
+    return DiagnosticStatus(
+        name=name,
+        hardware_id=hardware,
+        level=LEVELS[level],
+        message=text,
+        values=[KeyValue(key=key, value=str(value)) for key, value in values],
+    )

@@ -1,0 +1,142 @@
+"""The simulated plant: publishes pv (and sp), holds op, and owns the simulated time."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel, Plant, SetPoints
+from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, values_of
+from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared import NodeSettings
+from stiction_ros.settings import setting
+
+
+@dataclasses.dataclass(frozen=True)
+class PlantSettings(NodeSettings):
+    """What the plant simulates, how long and how fast."""
+
+    model: str = setting("", "loop model file, *.loop.yaml", fixed=True)
+    set_points: str = setting(
+        "", "set-point schedule file; empty when sp comes from elsewhere", fixed=True
+    )
+    seed: int = setting(0, "seed of the noise", low=0, fixed=True)
+    samples: int = setting(0, "samples to run; 0 runs until stopped", low=0, fixed=True)
+    pace: str = setting(
+        "lockstep",
+        "lockstep waits for the op of each sample; realtime does not",
+        choices=("lockstep", "realtime"),
+        fixed=True,
+    )
+    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
+    start_time: float = setting(1.0, "simulated time of the first sample, s", low=0.0, fixed=True)
+
+
+class PlantNode(ManagedNode):
+    """Thin shell around :class:`stiction_ros.loop.Plant`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Build the node ``plant``; ``kwargs`` go to the ROS node."""
+        super().__init__("plant", PlantSettings, **kwargs)
+        self._pacer: Any = None
+
+    def configure(self) -> None:
+        settings = self.settings
+        if not settings.model:
+            raise InputError("no loop model", where="plant: model", fix="set it to a *.loop.yaml")
+        self.model = LoopModel.load(find_config(settings.model))
+        self.schedule = None
+        if settings.set_points:
+            path = find_config(settings.set_points)
+            self.schedule = SetPoints.load(path, self.model.outputs)
+        self.plant = Plant(self.model, settings.seed)
+        self._op = np.array(self.model.stem_start)
+        self._step = round(self.model.sample_time * SECOND)
+        self._start = round(settings.start_time * SECOND)
+        self.stamp = self._start
+        self._clock = self.outlet(Clock, "/clock", SIGNAL_QOS)
+        self._pv = self.outlet(JointState, "pv", SIGNAL_QOS, ("controller", "estimator"))
+        self._sp = None
+        if self.schedule is not None:
+            self._sp = self.outlet(JointState, "sp", SIGNAL_QOS, ("controller", "estimator"))
+        self._stem = self.outlet(JointState, "stem", SIGNAL_QOS)
+        self._dv = None
+        if self.model.process.measured_disturbances:
+            self._dv = self.outlet(JointState, "dv", SIGNAL_QOS, ("controller",))
+        self.create_subscription(JointState, "op", self._on_op, SIGNAL_QOS)
+
+    def configuration(self) -> dict[str, Any]:
+        return {"seed": self.settings.seed, "model": self.model.to_mapping()}
+
+    def hardware(self) -> str:
+        return self.model.name
+
+    def linked(self) -> None:
+        self._show()
+        if self.settings.pace == "realtime":
+            period = self.model.sample_time / self.settings.speed
+            self._pacer = self.create_timer(period, self._advance)
+
+    def deactivate(self) -> None:
+        if self._pacer is not None:
+            self.destroy_timer(self._pacer)
+            self._pacer = None
+
+    def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        text = "finished" if self.finished else "running"
+        return "ok", text, [("sample", self.plant.sample), ("pace", self.settings.pace)]
+
+    def retune(self, settings: Any) -> None:
+        if self._pacer is not None and settings.speed != self.settings.speed:
+            self.deactivate()
+            period = self.model.sample_time / settings.speed
+            self._pacer = self.create_timer(period, self._advance)
+
+    def _on_op(self, message: JointState) -> None:
+        if not self.running:
+            return
+        op = values_of(message, self.model.valve_names)
+        if op is None or not np.isfinite(op).all():
+            self.get_logger().warning(
+                f"op without finite values for {', '.join(self.model.valve_names)} is ignored"
+            )
+            return
+        self._op = op
+        if self.settings.pace == "lockstep" and to_ns(message.header.stamp) == self.stamp:
+            self._advance()
+
+    def _advance(self) -> None:
+        stem = self.plant.apply(self._op)
+        self._stem.publish(joint_state(self.stamp, self.model.valve_names, stem))
+        self.stamp = self._start + self.plant.sample * self._step
+        if self.plant.sample == self.settings.samples:
+            self.running, self.finished = False, True
+            return
+        self._show()
+
+    def _show(self) -> None:
+        measured = self.plant.measure()
+        self._clock.publish(Clock(clock=to_stamp(self.stamp)))
+        if self._dv is not None:
+            names = self.model.process.measured_disturbances
+            self._dv.publish(joint_state(self.stamp, names, measured.dv))
+        if self._sp is not None and self.schedule is not None:
+            sp = self.schedule.at(measured.time)
+            self._sp.publish(joint_state(self.stamp, self.model.outputs, sp))
+        self._pv.publish(joint_state(self.stamp, self.model.outputs, measured.pv))
+
+
+def main() -> int:
+    """Run the node."""
+    return run("plant", "Simulates a loop model with sticky valves.", PlantNode)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

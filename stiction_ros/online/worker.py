@@ -1,0 +1,45 @@
+"""A worker process for the fits, so that nothing else waits for them."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+from concurrent.futures import Future, ProcessPoolExecutor
+
+from stiction_ros.identification import Identification, IdentificationOptions
+from stiction_ros.online.live_estimator import fit
+from stiction_ros.records import Record
+
+_PR_SET_PDEATHSIG = 1
+
+
+class FitWorker:
+    """One process that runs one fit after the other, in order.
+
+    It leaves interrupts to its parent and dies with it.
+    """
+
+    def __init__(self) -> None:
+        """Start the process and let it load what it needs."""
+        context = multiprocessing.get_context("spawn")
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
+        self._ready = self._pool.submit(os.getpid)
+
+    def submit(self, record: Record, options: IdentificationOptions) -> Future[Identification]:
+        """Queue a fit; the future may hold the InputError of an unusable window."""
+        return self._pool.submit(fit, record, options)
+
+    def close(self) -> None:
+        """Drop queued fits and end the process once the running one is done."""
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _settle() -> None:
+    """Prepare the worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        # The kernel ends the worker when its parent dies, however that happens.
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
