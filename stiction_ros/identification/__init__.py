@@ -1,0 +1,23 @@
+"""Friction of valves and dynamics of processes from recorded OP and PV."""
+
+from __future__ import annotations
+
+from stiction_ros.identification.engine import identify
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.results import (
+    FitStatus,
+    Identification,
+    OutputModel,
+    ValveEstimate,
+    VerdictKind,
+)
+
+__all__ = [
+    "FitStatus",
+    "Identification",
+    "IdentificationOptions",
+    "OutputModel",
+    "ValveEstimate",
+    "VerdictKind",
+    "identify",
+]

@@ -1,0 +1,60 @@
+"""What a caller may choose, and the constants behind the verdict."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.errors import InputError
+
+
+@dataclasses.dataclass(frozen=True)
+class IdentificationOptions:
+    """Options of :func:`stiction_ros.identification.identify`.
+
+    Attributes:
+        output_order: n_a; None lets BIC choose among 1, 2 and 3 under the noise model.
+        input_order: n_b; None means equal to n_a.
+        delay: inclusive range of t_d, samples, for every channel.
+        law: friction law.
+        friction_limit: largest f_S searched, %; None is the OP span of each valve.
+        noise_order: order p of the autoregressive noise on the free-run error.
+        confidence: level of the intervals.
+        resolution: final step of the friction grid as a share of the OP span.
+        bic_margin: BIC by which friction must beat the friction-free rival to be believed.
+        min_moves: fewest stem moves from which anything may be concluded.
+        negligible_friction: f_S up to this is healthy, %.
+        negligible_share: f_S up to this share of the OP span is healthy.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    output_order: int | None = None
+    input_order: int | None = None
+    delay: tuple[int, int] = (0, 10)
+    law: str = "he"
+    friction_limit: float | None = None
+    noise_order: int = 6
+    confidence: float = 0.95
+    resolution: float = 0.0005
+    bic_margin: float = 20.0
+    min_moves: int = 6
+    negligible_friction: float = 0.3
+    negligible_share: float = 0.03
+
+    def __post_init__(self) -> None:
+        low, high = self.delay
+        if not 0 <= low <= high:
+            raise InputError(
+                f"{low}:{high} is no delay range", where="delay", fix="use LO:HI, 0 <= LO <= HI"
+            )
+        for key in ("output_order", "input_order"):
+            order = getattr(self, key)
+            if order is not None and not 1 <= order <= 10:
+                raise InputError(f"order {order} lies outside 1 to 10", where=key)
+        if self.friction_limit is not None and not self.friction_limit > 0:
+            raise InputError(f"{self.friction_limit} is not positive", where="friction_limit")
+        if not 0.5 < self.confidence < 1:
+            raise InputError(f"{self.confidence} is no level", where="confidence", fix="use 0.95")
+        if not 0 <= self.noise_order <= 20:
+            raise InputError(f"order {self.noise_order} lies outside 0 to 20", where="noise_order")

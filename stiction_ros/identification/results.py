@@ -1,0 +1,158 @@
+"""What identification returns: frozen values that can judge and print themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Mapping
+from typing import Any
+
+from stiction_ros.effects.behaviour import FloatArray
+
+
+class VerdictKind(enum.StrEnum):
+    """What the record says about one valve."""
+
+    STICKY = "sticky"
+    HEALTHY = "healthy"
+    UNDECIDED = "undecided"
+
+
+class FitStatus(enum.StrEnum):
+    """How the identification ended; everything but ``OK`` is a failure as a value."""
+
+    OK = "ok"
+    NOT_CONVERGED = "not_converged"
+    NO_MODEL = "no_model"
+
+
+@dataclasses.dataclass(frozen=True)
+class ValveEstimate:
+    """Friction of one valve and the verdict on it.
+
+    Attributes:
+        name: tag of the valve.
+        verdict: sticky, healthy or undecided.
+        law: friction law that the figures belong to.
+        static_friction: f_S, %, the middle of its interval.
+        static_interval: values of f_S whose switching pattern the record does not reject, %.
+        dynamic_friction: f_D, %, the best fit.
+        dynamic_interval: values of f_D that the record does not reject, %.
+        jump: J = f_S − f_D, %, the smallest move of the stem; 0 where the record does not
+            distinguish the friction from a pure deadband (J = 0).
+        stem_start: stem position before the first sample, %.
+        moves: number of samples at which the estimated stem moved.
+        evidence: named figures behind the verdict, see :mod:`.verdict`.
+    """
+
+    name: str
+    verdict: VerdictKind
+    law: str
+    static_friction: float
+    static_interval: tuple[float, float]
+    dynamic_friction: float
+    dynamic_interval: tuple[float, float]
+    jump: float
+    stem_start: float
+    moves: int
+    evidence: Mapping[str, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json``."""
+        return {
+            "name": self.name,
+            "verdict": self.verdict.value,
+            "law": self.law,
+            "f_s": self.static_friction,
+            "f_s_interval": list(self.static_interval),
+            "f_d": self.dynamic_friction,
+            "f_d_interval": list(self.dynamic_interval),
+            "jump": self.jump,
+            "evidence": dict(self.evidence),
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputModel:
+    r"""Linear part of one output, equations (7)-(9) with a constant.
+
+    .. math:: y_k = -\sum_i a_i y_{k-i} + \sum_j \sum_i b_{j,i} \chi^{(j)}_{k-i-t_{d,j}} + bias
+
+    driven by the stems in free run; what remains is autoregressive noise.
+
+    Attributes:
+        name: tag of the output.
+        a: a_1 … a_na, sign as in (8a).
+        b: per valve b_1 … b_nb, engineering units per %.
+        delay: per valve t_d, samples.
+        bias: constant of the equation, engineering units.
+        noise_std: standard deviation of the innovations, engineering units.
+        fit_one_step: NRMSE fit of the one-step prediction with the noise model, %.
+        fit_free_run: NRMSE fit of the free run, 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %.
+    """
+
+    name: str
+    a: tuple[float, ...]
+    b: Mapping[str, tuple[float, ...]]
+    delay: Mapping[str, int]
+    bias: float
+    noise_std: float
+    fit_one_step: float
+    fit_free_run: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json``."""
+        return {
+            "name": self.name,
+            "a": list(self.a),
+            "b": {valve: list(values) for valve, values in self.b.items()},
+            "delay": dict(self.delay),
+            "bias": self.bias,
+            "noise_std": self.noise_std,
+            "fit_one_step": self.fit_one_step,
+            "fit_free_run": self.fit_free_run,
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class Identification:
+    """Everything one record says about its valves.
+
+    Attributes:
+        status: ok, or why there is no trustworthy model.
+        reason: one sentence; empty when ok.
+        method: name of the search.
+        samples, sample_time: of the record, seconds.
+        seconds: wall time spent.
+        valves, outputs: estimates in the order of the record.
+        stem: estimated stem positions, shape (N, m), %, read-only.
+        notes: remarks for people.
+    """
+
+    status: FitStatus
+    reason: str
+    method: str
+    samples: int
+    sample_time: float
+    seconds: float
+    valves: tuple[ValveEstimate, ...]
+    outputs: tuple[OutputModel, ...]
+    stem: FloatArray
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json`` but for ``record``."""
+        return {
+            "samples": self.samples,
+            "sample_time": self.sample_time,
+            "seconds": self.seconds,
+            "model": {
+                "kind": "arx",
+                "status": self.status.value,
+                "reason": self.reason,
+                "method": self.method,
+                "notes": list(self.notes),
+            },
+            "valves": [valve.to_json() for valve in self.valves],
+            "outputs": [output.to_json() for output in self.outputs],
+        }

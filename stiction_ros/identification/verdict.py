@@ -1,0 +1,93 @@
+"""Is the valve sticky? Friction against no friction, each with its own best linear part.
+
+Evidence, all under the noise model:
+
+- ``delta_bic``: BIC of the best friction-free rival (orders n_a, n_a + 1, n_a + 2, own delays)
+  minus BIC of the model with friction.
+- ``variance_ratio``: innovation variance without friction over that with friction.
+- ``free_run_ratio``: free-run error without friction over that with friction.
+- ``half_1``, ``half_2``: −2 log likelihood gained by friction in either half of the record.
+- ``share``: f_S over the OP span; ``moves``: number of stem moves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.results import VerdictKind
+from stiction_ros.identification.search import Data, Model
+
+
+def evidence(
+    data: Data, sticky: Model, rivals: list[Model], valve: int, span: float
+) -> dict[str, float]:
+    """Return the named figures for one valve.
+
+    Args:
+        sticky: the model with friction.
+        rivals: the same without this valve's friction, of several orders.
+        span: OP span of the valve, %.
+    """
+    rival = min(rivals, key=lambda model: model.bic)
+    count = sum(fit.count for fit in sticky.fits)
+    friction_parameters = 2.0 * np.log(count)
+    halves = half_gains(sticky, rival)
+    return {
+        "delta_bic": float(rival.bic - sticky.bic - friction_parameters),
+        "variance_ratio": float(np.exp((rival.loss - sticky.loss) / count)),
+        "free_run_ratio": free_run_energy(data, rival) / free_run_energy(data, sticky),
+        "half_1": halves[0],
+        "half_2": halves[1],
+        "share": float(sticky.friction[valve, 0] / span),
+        "moves": float(np.count_nonzero(np.diff(sticky.stems[valve]))),
+        "rival_order": float(rival.fits[0].orders.output),
+    }
+
+
+def half_gains(sticky: Model, rival: Model) -> tuple[float, float]:
+    """Return −2 log likelihood gained by friction in both halves, variances from the whole."""
+    gains = np.zeros(2)
+    for with_friction, without in zip(sticky.fits, rival.fits, strict=True):
+        scale = with_friction.energy / with_friction.count
+        rival_scale = without.energy / without.count
+        gain: FloatArray = (
+            without.innovations**2 / rival_scale
+            + np.log(rival_scale)
+            - with_friction.innovations**2 / scale
+            - np.log(scale)
+        )
+        middle = len(gain) // 2
+        gains += [gain[:middle].sum(), gain[middle:].sum()]
+    return float(gains[0]), float(gains[1])
+
+
+def free_run_energy(data: Data, model: Model) -> float:
+    """Return the sum of squared free-run errors over all (scaled) outputs."""
+    total = 0.0
+    for y, fit in zip(data.y, model.fits, strict=True):
+        error = y[len(y) - len(fit.free_run) :] - fit.free_run
+        total += float(error @ error)
+    return max(total, 1e-300)
+
+
+def judge(
+    figures: dict[str, float],
+    static: tuple[float, float],
+    span: float,
+    options: IdentificationOptions,
+) -> VerdictKind:
+    """Return the verdict of one valve from its evidence and its interval of f_S."""
+    negligible = max(options.negligible_share * span, min(options.negligible_friction, 0.1 * span))
+    believed = (
+        figures["delta_bic"] > options.bic_margin
+        and min(figures["half_1"], figures["half_2"]) > 0.0
+    )
+    if believed and static[0] > options.negligible_share * span:
+        return (
+            VerdictKind.STICKY if figures["moves"] >= options.min_moves else VerdictKind.UNDECIDED
+        )
+    if static[1] <= negligible and figures["moves"] >= options.min_moves:
+        return VerdictKind.HEALTHY
+    return VerdictKind.UNDECIDED
