@@ -95,7 +95,7 @@ class _Table:
                 if not any(cell.strip() for cell in cells):
                     continue
                 if not header:
-                    header = tuple(cell.strip() for cell in cells)
+                    header = tuple(" ".join(cell.split()) for cell in cells)
                     continue
                 rows.append(cells)
                 lines.append(reader.line_num)
@@ -115,8 +115,9 @@ class _Table:
 
     def find(self, name: str) -> int | None:
         """Return the index of the column ``name``, its exact case first; None if absent."""
+        name = " ".join(name.split())
         exact = [i for i, column in enumerate(self.header) if column == name]
-        folded = name.strip().casefold()
+        folded = name.casefold()
         found = exact or [i for i, column in enumerate(self.header) if column.casefold() == folded]
         if len(found) > 1:
             raise InputError(

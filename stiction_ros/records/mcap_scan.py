@@ -27,6 +27,8 @@ _LARGEST_CHUNK = 2**31
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _CHUNK = struct.Struct("<QQQI")
+_FOOTER_HEAD = _RECORD.pack(FOOTER, 20)
+_FOOTER_SIZE = len(_FOOTER_HEAD) + 20 + len(MAGIC)
 _U16 = struct.Struct("<H")
 _U32 = struct.Struct("<I")
 _U64 = struct.Struct("<Q")
@@ -185,10 +187,11 @@ class McapScan:
 
     def _torn(self, file: BinaryIO, left: int) -> None:
         """Note an unfinished file; raise when the file had been finished."""
-        file.seek(-len(MAGIC), os.SEEK_END)
-        start = file.tell()
-        if start > 0 and file.read() == MAGIC:
-            raise self._damaged(start - left, "a record is longer than the file")
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - _FOOTER_SIZE, 0))
+        end = file.read()
+        if end.startswith(_FOOTER_HEAD) and end.endswith(MAGIC):
+            raise self._damaged(size - left, "a record is longer than the file")
         tail = f", its last {left} bytes are no whole record and are left out" if left else ""
         self.notes.append(f"{self.path.name} was not closed by its writer{tail}")
 

@@ -57,17 +57,19 @@ def sample_time(
             where=where,
             fix="cut the record there or resample it",
         )
-    mean = float(time[-1] - time[0]) / len(steps)
+    step = _shortest(time, max(float(jitter[worst]), 1e-5))
     if jitter[worst] <= SILENT:
-        return _clean(mean, len(steps)), ()
+        return step, ()
     note = f"sample times jitter by up to {100 * jitter[worst]:.2g} %, taken as regular"
-    return _clean(mean, len(steps)), (note,)
+    return step, (note,)
 
 
-def _clean(value: float, steps: int) -> float:
-    """Return the shortest decimal that keeps the last sample within 0.1 % of a step."""
+def _shortest(time: FloatArray, tolerance: float) -> float:
+    """Return the shortest decimal that moves the last sample by ``tolerance`` steps at most."""
+    steps = len(time) - 1
+    mean = float(time[-1] - time[0]) / steps
     for digits in range(1, 15):
-        short = float(f"{value:.{digits}g}")
-        if abs(short - value) * steps <= 1e-3 * value:
+        short = float(f"{mean:.{digits}g}")
+        if abs(short - mean) * steps <= tolerance * mean:
             return short
-    return value
+    return mean
