@@ -1,0 +1,184 @@
+"""What a bag says of its topics and of itself: QoS, topics, ``metadata.yaml``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import yaml
+
+from stiction_ros.errors import InputError
+
+VERSION = 9
+"""Version of ``metadata.yaml``: QoS is a list of mappings with enums as words."""
+
+INFINITE_NS = 2**63 - 1
+"""Nanoseconds by which ROS writes an infinite duration."""
+
+_WORDS = {
+    "history": ("system_default", "keep_last", "keep_all", "unknown"),
+    "reliability": ("system_default", "reliable", "best_effort", "best_available", "unknown"),
+    "durability": ("system_default", "transient_local", "volatile", "best_available", "unknown"),
+    "liveliness": ("system_default", "automatic", "manual_by_topic", "best_available", "unknown"),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Qos:
+    """Quality of service that a publisher offers.
+
+    Attributes:
+        history: ``keep_last``, ``keep_all``, ``system_default`` or ``unknown``.
+        depth: messages kept when history is ``keep_last``.
+        reliability: ``reliable``, ``best_effort``, …
+        durability: ``volatile``, ``transient_local``, …
+        deadline: longest time between two messages, ns.
+        lifespan: time a message stays valid, ns.
+        liveliness: ``automatic``, ``manual_by_topic``, …
+        liveliness_lease_duration: ns.
+        avoid_ros_namespace_conventions: as in ROS.
+
+    Raises:
+        InputError: a word that ROS does not know.
+    """
+
+    history: str = "keep_last"
+    depth: int = 10
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    deadline: int = INFINITE_NS
+    lifespan: int = INFINITE_NS
+    liveliness: str = "automatic"
+    liveliness_lease_duration: int = INFINITE_NS
+    avoid_ros_namespace_conventions: bool = False
+
+    def __post_init__(self) -> None:
+        for key, words in _WORDS.items():
+            word = getattr(self, key)
+            if word not in words:
+                raise InputError(
+                    f"{word!r} is no QoS {key}", where="qos", fix=f"use one of {', '.join(words)}"
+                )
+
+    def mapping(self) -> dict[str, Any]:
+        """Return the profile as rosbag2 writes it, keys in its order."""
+        values: dict[str, Any] = {}
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.name in ("deadline", "lifespan", "liveliness_lease_duration"):
+                value = {"sec": value // 10**9, "nsec": value % 10**9}
+            values[field.name] = value
+        return values
+
+
+LATCHED = Qos(depth=1, durability="transient_local")
+"""QoS of topics whose last message late joiners get."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BagTopic:
+    """One topic of a bag.
+
+    Attributes:
+        name: full topic name.
+        type: ``sensor_msgs/msg/JointState``.
+        definition: the message definition with its dependencies, ``ros2msg``.
+        type_hash: ``RIHS01_…``, empty when not known.
+        qos_yaml: the offered profiles, the YAML that the channel carries.
+        encoding: of the messages; ROS 2 writes ``cdr``.
+        schema_encoding: ``ros2msg``; other recorders may write ``ros2idl``.
+    """
+
+    name: str
+    type: str
+    definition: str
+    type_hash: str = ""
+    qos_yaml: str = ""
+    encoding: str = "cdr"
+    schema_encoding: str = "ros2msg"
+
+    def channel_metadata(self) -> dict[str, str]:
+        """Return the metadata of the topic's MCAP channel."""
+        return {"offered_qos_profiles": self.qos_yaml, "topic_type_hash": self.type_hash}
+
+
+def qos_yaml(profiles: Sequence[Qos]) -> str:
+    """Return the YAML list of ``profiles`` that goes into the channel metadata."""
+    return _yaml([profile.mapping() for profile in profiles]).strip() if profiles else ""
+
+
+@dataclasses.dataclass(frozen=True)
+class BagFile:
+    """One storage file of a bag: its name and what is in it (times in ns)."""
+
+    name: str
+    counts: Mapping[str, int]
+    first: int | None
+    last: int | None
+
+    @property
+    def span(self) -> dict[str, Any]:
+        """Return starting time, duration and count as ``metadata.yaml`` has them."""
+        first = INFINITE_NS if self.first is None else self.first
+        last = first if self.last is None else self.last
+        return {
+            "duration": {"nanoseconds": last - first},
+            "starting_time": {"nanoseconds_since_epoch": first},
+            "message_count": sum(self.counts.values()),
+        }
+
+
+def bag_information(
+    file: BagFile, topics: Sequence[BagTopic], *, ros_distro: str = "jazzy"
+) -> dict[str, Any]:
+    """Return the mapping ``rosbag2_bagfile_information`` of a bag with one storage file."""
+    return {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        **file.span,
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type,
+                    "serialization_format": topic.encoding,
+                    "offered_qos_profiles": yaml.safe_load(topic.qos_yaml) or [],
+                    "type_description_hash": topic.type_hash,
+                },
+                "message_count": file.counts.get(topic.name, 0),
+            }
+            for topic in topics
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.name],
+        "files": [{"path": file.name, **_reordered(file.span)}],
+        "custom_data": None,
+        "ros_distro": ros_distro,
+    }
+
+
+def metadata_record(information: Mapping[str, Any]) -> dict[str, str]:
+    """Return the content of the MCAP metadata record ``rosbag2``."""
+    return {"serialized_metadata": _yaml(information)}
+
+
+def metadata_yaml(information: Mapping[str, Any]) -> str:
+    """Return the text of ``metadata.yaml``."""
+    return _yaml({"rosbag2_bagfile_information": information})
+
+
+def _reordered(span: dict[str, Any]) -> dict[str, Any]:
+    return {key: span[key] for key in ("starting_time", "duration", "message_count")}
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes equal mappings out again instead of by alias."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _yaml(value: Any) -> str:
+    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True))

@@ -1,0 +1,252 @@
+"""What a bag of the live loop tells besides its record: estimates, modes, configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from stiction_ros.records.bag_messages import (
+    BagMessage,
+    MessageDecoder,
+    last_part,
+    read_raw,
+    stamp_ns,
+)
+from stiction_ros.records.bag_metadata import BagTopic
+from stiction_ros.records.bag_reader import JOINT_STATE, LoopSignals, is_signal
+from stiction_ros.records.record import Record
+
+_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+_STRING = "std_msgs/msg/String"
+_CLOCK = "rosgraph_msgs/msg/Clock"
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """One parameter of one fit.
+
+    Attributes:
+        stamp: end of the window, ns.
+        name: ``V1.f_s``.
+        value: estimate, % of travel for friction.
+        low: lower end of its interval, NaN when not given.
+        high: upper end of its interval, NaN when not given.
+    """
+
+    stamp: int
+    name: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclasses.dataclass(frozen=True)
+class ModeChange:
+    """The controller's mode from a moment on.
+
+    Attributes:
+        stamp: of the first ``op`` of the new mode, ns.
+        mode: ``unaware``, ``embedding``, ``inversion`` or ``hold``.
+        model: of the valves that it works with, as the controller names it.
+        reason: why it changed.
+    """
+
+    stamp: int
+    mode: str
+    model: str = ""
+    reason: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Text:
+    """A string that a node published: its topic, log time in ns and content."""
+
+    topic: str
+    log_time: int
+    text: str
+
+
+@dataclasses.dataclass(frozen=True)
+class RunLog:
+    """A run of the live loop as its bag tells it.
+
+    Attributes:
+        record: the loop's signals.
+        start: stamp of the record's first sample, ns.
+        estimates: in the order they came.
+        modes: every change of mode or model, the mode at the start first.
+        loop_models: the YAML texts on ``loop_model``.
+        configs: what the nodes published on ``~/config``.
+        clock: the simulated times on ``/clock``, ns.
+        recorded: messages in the bag by topic.
+        published: messages by topic as the nodes counted them in ``/diagnostics``.
+        notes: what was left out while reading, one sentence each.
+    """
+
+    record: Record
+    start: int
+    estimates: tuple[Estimate, ...]
+    modes: tuple[ModeChange, ...]
+    loop_models: tuple[Text, ...]
+    configs: tuple[Text, ...]
+    clock: tuple[int, ...]
+    recorded: Mapping[str, int]
+    published: Mapping[str, int]
+    notes: tuple[str, ...] = ()
+
+    def seconds(self, stamp: int) -> float:
+        """Return the time of a stamp in s since the first sample."""
+        return (stamp - self.start) / 1e9
+
+    @property
+    def swap(self) -> ModeChange | None:
+        """The first change from ``unaware`` to a mode that knows of the friction."""
+        before = ""
+        for change in self.modes:
+            if before == "unaware" and change.mode in ("embedding", "inversion"):
+                return change
+            before = change.mode
+        return None
+
+
+def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
+    """Read everything that a report needs from a bag, in one pass.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        namespace: of the loop's topics; needed when the bag holds several loops.
+
+    Raises:
+        InputError: as :func:`stiction_ros.records.bag_reader.read_bag`.
+    """
+    notes: list[str] = []
+    recorded: Counter[str] = Counter()
+    messages: list[BagMessage] = []
+    signals = LoopSignals(str(path))
+    decoder = MessageDecoder()
+    for raw in read_raw(path, notes):
+        recorded[raw.topic.name] += 1
+        signal = is_signal(raw.topic)
+        if not signal and not _wanted(raw.topic):
+            continue
+        message = decoder.decode(raw, str(path))
+        if message is None:
+            continue
+        if signal:
+            signals.add(message)
+        else:
+            messages.append(message)
+    notes.extend(decoder.notes)
+    record = signals.record(Path(path).name, namespace, notes)
+    return RunLog(
+        record=record,
+        start=signals.first_stamp(namespace),
+        estimates=estimates(messages),
+        modes=mode_changes(messages) or mode_texts(messages),
+        loop_models=texts(messages, "loop_model"),
+        configs=texts(messages, "config"),
+        clock=clock(messages),
+        recorded=dict(recorded),
+        published=published_counts(messages),
+        notes=record.notes,
+    )
+
+
+def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
+    """Return the estimates on ``stiction`` in their order."""
+    found = []
+    for message in _of(messages, JOINT_STATE, "stiction"):
+        state = message.message
+        stamp = stamp_ns(state)
+        for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
+            low = _item(state.velocity, index)
+            high = _item(state.effort, index)
+            found.append(Estimate(stamp, str(name), float(value), low, high))
+    return tuple(found)
+
+
+def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
+    """Return the changes of mode or model that ``/diagnostics`` tells, with swap times."""
+    changes: list[ModeChange] = []
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            values = {item.key: item.value for item in status.values}
+            if "mode" not in values:
+                continue
+            change = ModeChange(
+                stamp_ns(message.message),
+                values["mode"],
+                values.get("model", ""),
+                values.get("reason", ""),
+            )
+            if not changes or (changes[-1].mode, changes[-1].model) != (change.mode, change.model):
+                changes.append(change)
+    return tuple(changes)
+
+
+def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
+    """Return the changes on ``mode``, whose messages bear no stamp: log times stand in."""
+    changes: list[ModeChange] = []
+    for text in texts(messages, "mode"):
+        if not changes or changes[-1].mode != text.text:
+            changes.append(ModeChange(text.log_time, text.text, reason="time of reception"))
+    return tuple(changes)
+
+
+def texts(messages: Iterable[BagMessage], name: str) -> tuple[Text, ...]:
+    """Return the strings on topics whose last part is ``name``."""
+    return tuple(
+        Text(message.topic, message.log_time, str(message.message.data))
+        for message in _of(messages, _STRING, name)
+    )
+
+
+def clock(messages: Iterable[BagMessage]) -> tuple[int, ...]:
+    """Return the times on ``/clock``, ns."""
+    return tuple(
+        int(message.message.clock.sec) * 10**9 + int(message.message.clock.nanosec)
+        for message in _of(messages, _CLOCK, "clock")
+    )
+
+
+def published_counts(messages: Iterable[BagMessage]) -> dict[str, int]:
+    """Return how many messages of each topic the nodes say they published.
+
+    The keys are ``published:<topic>`` (or with a space); of one node, named before the
+    colon in the status name, the last count holds; several nodes on a topic add up.
+    """
+    last: dict[tuple[str, str], int] = {}
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            node = str(status.name).partition(":")[0].strip()
+            for item in status.values:
+                key = str(item.key)
+                if key.startswith(("published:", "published ")) and item.value.isdecimal():
+                    last[node, key[len("published:") :].strip()] = int(item.value)
+    totals: Counter[str] = Counter()
+    for (_, topic), count in last.items():
+        totals[topic] += count
+    return dict(totals)
+
+
+def _wanted(topic: BagTopic) -> bool:
+    name = last_part(topic.name)[1]
+    return (topic.type, name) in {
+        (JOINT_STATE, "stiction"),
+        (_DIAGNOSTICS, "diagnostics"),
+        (_CLOCK, "clock"),
+        (_STRING, "mode"),
+        (_STRING, "loop_model"),
+        (_STRING, "config"),
+    }
+
+
+def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
+    return (m for m in messages if m.type == type_name and last_part(m.topic)[1] == name)
+
+
+def _item(values: Iterable[float], index: int) -> float:
+    items = list(values)
+    return float(items[index]) if index < len(items) else float("nan")

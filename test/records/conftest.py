@@ -1,0 +1,18 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+# The tests of this folder share bag_making.py; importlib mode does not look beside them.
+sys.path.insert(0, str(Path(__file__).parent))
+
+from bag_making import Bag
+
+from stiction_ros.records.bag_writer import BagWriter
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Bag:
+    return Bag(BagWriter(tmp_path / "run"))
