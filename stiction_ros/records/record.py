@@ -67,7 +67,7 @@ class Record:
     @property
     def time(self) -> FloatArray:
         """Seconds since the first sample, shape (N,)."""
-        return np.arange(len(self)) * self.sample_time
+        return np.arange(len(self), dtype=np.float64) * self.sample_time
 
     def part(self, first: int, last: int) -> Record:
         """Return samples ``first`` up to, not including, ``last``."""
