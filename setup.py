@@ -6,7 +6,6 @@ shell launchers are installed as data files, the same under pip and under colcon
 command `stiction` alone is a console script in bin.
 """
 
-import os
 from glob import glob
 
 from setuptools import setup
@@ -14,10 +13,8 @@ from setuptools import setup
 NAME = "stiction_ros"
 
 
-def launchers() -> list[str]:
-    """Return the launchers of the nodes; the shared file behind the links is no node."""
-    return sorted(path for path in glob("launchers/*") if os.path.islink(path))
-
+# Links to one file, which itself is no node.
+LAUNCHERS = sorted(set(glob("launchers/*")) - {"launchers/node"})
 
 setup(
     python_requires=">=3.11",  # here, as colcon cannot read it from setup.cfg
@@ -25,6 +22,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", sorted(glob("config/*.yaml") + glob("config/*.xml"))),
-        (f"lib/{NAME}", launchers()),
+        (f"lib/{NAME}", LAUNCHERS),
     ],
 )
