@@ -11,8 +11,6 @@ from glob import glob
 from setuptools import setup
 
 NAME = "stiction_ros"
-
-
 # Links to one file, which itself is no node.
 LAUNCHERS = sorted(set(glob("launchers/*")) - {"launchers/node"})
 
