@@ -101,9 +101,7 @@ class Behaviour(ABC):
                     fix=f"known keys: {', '.join(known)}",
                 )
         required = {
-            field.name
-            for field in dataclasses.fields(cls)
-            if field.default is dataclasses.MISSING
+            field.name for field in dataclasses.fields(cls) if field.default is dataclasses.MISSING
         }
         for key, attribute in known.items():
             if attribute in required and key not in values:

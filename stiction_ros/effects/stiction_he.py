@@ -79,7 +79,7 @@ class HeStiction(Behaviour):
     def inverse(self, memory: Memory, wanted: float) -> float:
         """Return the OP that moves the stem to ``wanted`` if the valve can go there.
 
-        The stem moves by at least J, so for 0 < \\|wanted − χ\\| < J the nearer of staying
+        The stem moves by at least J, so for 0 < |wanted − χ| < J the nearer of staying
         and the smallest jump is taken; staying returns the stem position itself.
         """
         assert isinstance(memory, float | int)

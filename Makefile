@@ -1,0 +1,76 @@
+# make setup   install everything into .venv (needs Python 3.11 or newer, no root)
+# make demo    the live demonstration; options in ARGS, such as ARGS="siso --out out/siso"
+# make test    linters, types and tests; pytest's options in ARGS
+# make lint    linters and types alone
+# make clean   remove .venv and all that was built
+#
+# PYTHON=... names the interpreter of a new .venv; without it python3.12, python3.11 and
+# python3 are tried.
+
+.SUFFIXES:
+.PHONY: setup demo test lint clean
+
+VENV := .venv
+BIN := $(VENV)/bin
+# The empty file that a finished installation leaves. It names the folder, as an environment
+# that was copied or moved elsewhere does not work there.
+DONE := $(VENV)/installed$(subst /,-,$(subst $() $(),-,$(CURDIR)))
+PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
+SOURCES := setup.py setup.cfg pyproject.toml package.xml stiction_ros/__init__.py \
+    $(wildcard resource/* launchers/* config/*)
+
+setup: $(DONE)
+
+# A first or broken-off installation starts from an empty environment; after that only what
+# has changed is installed. The package itself is installed editable, so that the command
+# and the nodes follow the tree; install_data adds what an editable installation leaves out:
+# launchers, marker and config files. $(BIN)/python is missing when its Python has gone.
+$(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
+	@test -e $@ -a -x $(BIN)/python || { $(find-python); \
+	    echo "setup: new environment $(VENV) with `$$python --version`"; \
+	    $$python -m venv --clear $(VENV) || \
+	    { echo "setup: $$python cannot make $(VENV); see the lines above" >&2; exit 1; }; }
+	@rm -f $@
+	@echo "setup: installing"
+	@$(PIP) install -c constraints.txt "setuptools<80" wheel && \
+	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,test]" && \
+	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || \
+	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
+	  exit 1; }
+	@touch $@
+	@echo "setup: done, the command is $(BIN)/stiction"
+
+.PHONY: missing
+missing:
+
+# Leaves in $$python the first interpreter that runs, is new enough and can make environments.
+define find-python
+fault='no Python found'; \
+for python in $(if $(PYTHON),"$(PYTHON)",python3.12 python3.11 python3); do \
+    version=`$$python -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null` || \
+        { [ -z "$(PYTHON)" ] || fault="$(PYTHON) does not run"; continue; }; \
+    $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+        { fault="$$python is Python $$version"; continue; }; \
+    $$python -c 'import ensurepip, venv' 2>/dev/null || \
+        { fault="$$python lacks the module venv or ensurepip (package python3-venv)"; continue; }; \
+    fault=''; break; \
+done; \
+[ -z "$$fault" ] || { \
+    echo "setup: $$fault; install Python 3.11 or newer with venv, or name it: make setup PYTHON=..." >&2; \
+    exit 1; }
+endef
+
+demo: setup
+	$(BIN)/stiction demo $(ARGS)
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: lint
+	$(BIN)/python -m pytest $(ARGS)
+
+clean:
+	rm -rf $(VENV) build dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find stiction_ros test -name __pycache__ -prune -exec rm -rf {} +

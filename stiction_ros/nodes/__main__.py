@@ -1,0 +1,23 @@
+"""Start one node: ``python -m stiction_ros.nodes plant --ros-args -p pace:=lockstep``."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+NODES = ("plant", "controller", "estimator", "recorder")
+
+
+def main() -> int:
+    """Run the node named first on the command line and return its exit code."""
+    if len(sys.argv) < 2 or sys.argv[1] not in NODES:
+        given = f"unknown node {sys.argv[1]!r}" if len(sys.argv) > 1 else "no node named"
+        print(f"{given}; known nodes: {', '.join(NODES)}", file=sys.stderr)
+        return 2
+    name = sys.argv[1]
+    sys.argv[:2] = [name]
+    return importlib.import_module(f"stiction_ros.nodes.{name}").main() or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,18 @@
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from stiction_ros.nodes.__main__ import NODES, main
+
+
+@pytest.mark.parametrize("arguments", [[], ["pump"], ["--help"]])
+def test_anything_but_a_node_is_answered_with_the_names(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["nodes", *arguments])
+    assert main() == 2
+    answer = capsys.readouterr().err
+    assert len(answer.splitlines()) == 1
+    assert all(name in answer for name in NODES)

@@ -1,0 +1,105 @@
+"""What is said twice about the package is said alike."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import importlib.metadata
+import re
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import stiction_ros
+from stiction_ros.nodes.__main__ import NODES
+
+ROOT = Path(__file__).resolve().parents[2]
+# Python module → distribution in setup.cfg, where the names differ.
+DISTRIBUTION = {"mcap_ros2": "mcap-ros2-support", "yaml": "pyyaml"}
+# Distribution in setup.cfg → rosdep key in package.xml; the others are installed with pip.
+ROSDEP = {
+    "matplotlib": "python3-matplotlib",
+    "numpy": "python3-numpy",
+    "pyyaml": "python3-yaml",
+    "rich": "python3-rich",
+    "scipy": "python3-scipy",
+}
+
+
+def config() -> configparser.ConfigParser:
+    parser = configparser.ConfigParser()
+    parser.read(ROOT / "setup.cfg")
+    return parser
+
+
+def requirements(text: str) -> set[str]:
+    """Return the names at the head of requirement lines, normalised."""
+    heads = [re.match(r"[\w.-]+", line.strip()) for line in text.splitlines()]
+    return {re.sub(r"[-_.]+", "-", head.group()).lower() for head in heads if head}
+
+
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def imports() -> set[str]:
+    """Return the top-level modules that the package imports, its own and Python's left out."""
+    found: set[str] = set()
+    for path in (ROOT / "stiction_ros").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                found.add(node.module.partition(".")[0])
+    return found - set(sys.stdlib_module_names) - {"stiction_ros"}
+
+
+def test_version_is_the_same_everywhere() -> None:
+    assert manifest().findtext("version") == stiction_ros.__version__
+    assert importlib.metadata.version("stiction_ros") == stiction_ros.__version__
+
+
+def test_manifest_agrees_with_setup() -> None:
+    metadata = config()["metadata"]
+    root = manifest()
+    assert root.get("format") == "3"
+    assert root.findtext("name") == metadata["name"]
+    assert root.findtext("license") == metadata["license"]
+    assert root.findtext("description") == metadata["description"]
+    maintainer = root.find("maintainer")
+    assert maintainer is not None
+    assert maintainer.get("email") == metadata["maintainer_email"]
+    assert root.findtext("export/build_type") == "ament_python"
+
+
+def test_every_import_is_a_declared_dependency() -> None:
+    base = requirements(config()["options"]["install_requires"])
+    keys = {entry.text for entry in manifest().findall("exec_depend")}
+    for module in sorted(imports()):
+        if module in keys:  # a ROS package
+            continue
+        distribution = DISTRIBUTION.get(module, module)
+        assert distribution in base, f"{module} is imported and stands not in setup.cfg"
+
+
+def test_every_rosdep_key_is_in_the_manifest() -> None:
+    base = requirements(config()["options"]["install_requires"])
+    keys = {entry.text for entry in manifest().findall("exec_depend")}
+    assert {key for key in keys if key and key.startswith("python3-")} == set(ROSDEP.values())
+    assert set(ROSDEP) <= base
+
+
+def test_every_requirement_is_pinned_and_explained() -> None:
+    extras = config()["options.extras_require"]
+    wanted = requirements(config()["options"]["install_requires"])
+    wanted |= requirements(extras["ros"]) | requirements(extras["test"])
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    assert all("==" in line for line in lines if line and not line.startswith("#"))
+    assert wanted <= requirements("\n".join(line for line in lines if "==" in line))
+    document = (ROOT / "docs" / "dependencies.md").read_text()
+    explained = {name.lower() for name in re.findall(r"^\| `([\w.-]+)", document, re.MULTILINE)}
+    assert explained == wanted
+
+
+def test_every_node_has_a_launcher() -> None:
+    assert {path.name for path in (ROOT / "launchers").iterdir()} == {"node", *NODES}

@@ -1,0 +1,142 @@
+"""The same tree installs under pip and under colcon where `ros2 run` looks.
+
+`ros2 run` finds the package through the ament index and its executables in lib/stiction_ros.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from stiction_ros.nodes.__main__ import NODES
+
+ROOT = Path(__file__).resolve().parents[2]
+PARTS = ("launchers", "resource", "config", "stiction_ros")
+FILES = ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "LICENSE", "README.md")
+
+pytest.importorskip("ament_index_python")
+pytestmark = pytest.mark.slow
+
+
+def run(*command: object, **environment: str) -> str:
+    """Run a command that must succeed and return what it printed."""
+    done = subprocess.run(
+        [str(word) for word in command],
+        env=os.environ | environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Copy the package, as building leaves files beside setup.py."""
+    root = tmp_path_factory.mktemp("tree")
+    for part in PARTS:
+        if (ROOT / part).is_dir():
+            skip = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / part, root / part, symlinks=True, ignore=skip)
+    for name in FILES:
+        shutil.copy(ROOT / name, root / name)
+    return root
+
+
+@pytest.fixture(scope="module")
+def pip_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install into a new environment that sees the packages of this one after its own."""
+    prefix = tmp_path_factory.mktemp("pip") / "environment"
+    run(sys.executable, "-m", "venv", "--without-pip", prefix)
+    site = prefix / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
+    (site / "shared.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    options = ["--no-deps", "--no-index", "--no-build-isolation"]
+    python = prefix / "bin" / "python"
+    run(sys.executable, "-m", "pip", "--python", python, "install", *options, tree)
+    return prefix
+
+
+def colcon(tree: Path, where: Path, *options: str) -> Path:
+    """Build the workspace and return the prefix of the package."""
+    program = Path(sys.executable).with_name("colcon")
+    if not program.exists():
+        pytest.skip("colcon is not installed")
+    bases = ["--base-paths", tree, "--build-base", where / "build", "--install-base", where / "i"]
+    log = ["--log-base", where / "log"]
+    run(program, *log, "build", *bases, *options, COLCON_HOME=str(where / "home"))
+    return where / "i" / "stiction_ros"
+
+
+@pytest.fixture(scope="module")
+def colcon_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return colcon(tree, tmp_path_factory.mktemp("colcon"))
+
+
+@pytest.fixture(scope="module")
+def symlink_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return colcon(tree, tmp_path_factory.mktemp("symlink"), "--symlink-install")
+
+
+@pytest.fixture(params=["pip", "colcon", "symlink"])
+def prefix(request: pytest.FixtureRequest) -> Path:
+    return request.getfixturevalue(f"{request.param}_prefix")
+
+
+def test_ament_index_knows_the_package(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ament_index_python import get_package_prefix, get_package_share_directory
+
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
+    assert get_package_prefix("stiction_ros") == str(prefix)
+    share = Path(get_package_share_directory("stiction_ros"))
+    assert (share / "package.xml").read_text() == (ROOT / "package.xml").read_text()
+
+
+def test_every_node_is_an_executable(prefix: Path) -> None:
+    found = {path.name for path in (prefix / "lib" / "stiction_ros").iterdir() if path.is_file()}
+    assert found == set(NODES)
+    for name in found:
+        assert os.access(prefix / "lib" / "stiction_ros" / name, os.X_OK)
+
+
+def test_only_the_command_is_in_bin(prefix: Path) -> None:
+    names = {path.name for path in (prefix / "bin").iterdir()}
+    assert "stiction" in names
+    assert not names & set(NODES)
+
+
+def test_config_files_are_installed(prefix: Path) -> None:
+    wanted = {path.name for kind in ("yaml", "xml") for path in ROOT.glob(f"config/*.{kind}")}
+    folder = prefix / "share" / "stiction_ros" / "config"
+    assert {path.name for path in folder.glob("*")} == wanted
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_launcher_starts_its_node_of_this_installation(
+    prefix: Path, name: str, tmp_path: Path
+) -> None:
+    # Modules of the current folder must not be found instead of the installed ones.
+    (tmp_path / "stiction_ros.py").write_text("raise SystemExit('wrong module')")
+    shell = f'cd "{tmp_path}"; [ ! -e "{prefix}/../local_setup.sh" ] || . "{prefix}/../setup.sh"; '
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    probe = "import stiction_ros.nodes as n; print(n.__path__[0])"
+    python = prefix / "bin" / "python"
+    python = python if python.exists() else Path(sys.executable)
+    where = run("sh", "-c", f'{shell} "{python}" -P -c "{probe}"', PATH=path).strip()
+    assert Path(where).resolve() != ROOT / "stiction_ros" / "nodes"
+
+    if importlib.util.find_spec(f"stiction_ros.nodes.{name}") is None:
+        pytest.skip(f"there is no node {name} yet")
+    launcher = prefix / "lib" / "stiction_ros" / name
+    out = run("sh", "-c", f'{shell} "{launcher}" --help', PATH=path)
+    assert "usage" in out.lower()
