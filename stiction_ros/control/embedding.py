@@ -188,9 +188,7 @@ class _Problem:
         column[first:last, valve] = 1.0
         return column.reshape(-1)
 
-    def solve(
-        self, state: FloatArray, target: Target, last: FloatArray
-    ) -> HorizonSolution | None:
+    def solve(self, state: FloatArray, target: Target, last: FloatArray) -> HorizonSolution | None:
         deviation = last - target.stem
         offset = np.zeros((self._horizon, self._width))
         for j in self._stays:

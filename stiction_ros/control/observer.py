@@ -59,11 +59,11 @@ class Observer:
         _check_detectable(model)
         self.model = model
         n, p = model.order, len(model.pv0)
-        self.gain = _luenberger(model, tuning) if tuning.kind == "luenberger" else _kalman(
-            model, tuning
+        self.gain = (
+            _luenberger(model, tuning) if tuning.kind == "luenberger" else _kalman(model, tuning)
         )
         self._gain_x, self._gain_d = self.gain[:n], self.gain[n:]
-        self.state = np.zeros(n)
+        self.state: FloatArray = np.zeros(n)
         self.disturbance = np.zeros(p)
         self.innovation = np.zeros(p)
 

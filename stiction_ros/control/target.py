@@ -61,9 +61,7 @@ class TargetSelector:
         self._curvature += 1e-12 * scale * np.eye(basis.shape[1])
         self._inverse = np.linalg.pinv(balance, rcond=1e-10)
 
-    def select(
-        self, sp: FloatArray, disturbance: FloatArray, dv: FloatArray
-    ) -> Target | None:
+    def select(self, sp: FloatArray, disturbance: FloatArray, dv: FloatArray) -> Target | None:
         """Return the target for set-points ``sp`` (p,), or None when no state is feasible."""
         model = self.model
         drive = model.constant + (model.e @ dv if model.e.shape[1] else 0.0)

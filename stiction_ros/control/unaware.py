@@ -16,9 +16,7 @@ class UnawareMpc:
 
     mode = ControlMode.UNAWARE
 
-    def __init__(
-        self, model: LinearModel, weights: HorizonWeights, limits: HorizonLimits
-    ) -> None:
+    def __init__(self, model: LinearModel, weights: HorizonWeights, limits: HorizonLimits) -> None:
         """Condense the problem; limits as in :class:`HorizonLimits`."""
         self.limits = limits
         self.cost = HorizonCost(model, weights)

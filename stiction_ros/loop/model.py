@@ -109,7 +109,9 @@ class LoopModel:
         pv0 = process.linear(sample_time).pv0
         point.finish()
         sensors = _read_sensors(top, process.outputs)
-        disturbances = tuple(_read_disturbance(s, process) for s in top.sections("disturbances", []))
+        disturbances = tuple(
+            _read_disturbance(s, process) for s in top.sections("disturbances", [])
+        )
         initial = top.section("initial", {})
         stem_start = named_numbers(initial, "stem", tags, op0)
         pv_start = named_numbers(initial, "pv", process.outputs, pv0)
@@ -188,7 +190,7 @@ class LoopModel:
 
     def with_ideal_valves(self) -> LoopModel:
         """Return the loop with valves that follow OP exactly."""
-        return self.with_valve_effects({name: () for name in self.valve_names})
+        return self.with_valve_effects(dict.fromkeys(self.valve_names, ()))
 
 
 def named_numbers(
@@ -261,5 +263,3 @@ def _read_pi(section: Section) -> PiTuning:
     tuning = PiTuning(section.number("gain"), section.number("integral_time", above=0.0))
     section.finish()
     return tuning
-
-

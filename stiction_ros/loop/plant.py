@@ -63,9 +63,7 @@ class Plant:
             _Chain(effects, float(start))
             for effects, start in zip(model.sensors, model.pv_start, strict=True)
         ]
-        self._disturbances = [
-            (d.place, _Chain((d.behaviour,), 0.0)) for d in model.disturbances
-        ]
+        self._disturbances = [(d.place, _Chain((d.behaviour,), 0.0)) for d in model.disturbances]
         self._measurement_std = process.noise_std(NoiseEntry.MEASUREMENT)
         self._equation_std = process.noise_std(NoiseEntry.EQUATION)
         self._state = process.rest(model.stem_start, model.pv_start)

@@ -99,9 +99,7 @@ class Section:
         """Return a whole number ≥ low."""
         value = self.raw(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < low:
-            raise InputError(
-                f"{_show(value)} is no whole number ≥ {low}", where=self.at(key)
-            )
+            raise InputError(f"{_show(value)} is no whole number ≥ {low}", where=self.at(key))
         return value
 
     def flag(self, key: str, default: Any = _REQUIRED) -> bool:
@@ -111,7 +109,9 @@ class Section:
             raise InputError(f"{_show(value)} is neither true nor false", where=self.at(key))
         return value
 
-    def numbers(self, key: str, default: Any = _REQUIRED, *, count: int | None = None) -> FloatArray:
+    def numbers(
+        self, key: str, default: Any = _REQUIRED, *, count: int | None = None
+    ) -> FloatArray:
         """Return a list of finite numbers, shape (count,)."""
         value = self.raw(key, default)
         if not isinstance(value, list | tuple):

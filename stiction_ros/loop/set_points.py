@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,11 @@ class SetPoints:
         """
         top = Section(value, where)
         repeat = top.number("repeat", above=0.0) if "repeat" in top else np.inf
-        times, rows = [], []
+        times: list[float] = []
+        rows: list[list[float]] = []
         for section in top.sections("moves"):
             times.append(section.number("time", low=0.0))
-            before = rows[-1] if rows else [None] * len(outputs)
+            before: list[float | None] = [*rows[-1]] if rows else [None] * len(outputs)
             rows.append(
                 [
                     section.number(tag) if tag in section or last is None else last
@@ -52,7 +54,7 @@ class SetPoints:
         top.finish()
         if not times or times[0] != 0.0:
             raise InputError("the first move is not at time 0", where=where, fix="add time: 0")
-        if any(b <= a for a, b in zip(times, times[1:], strict=False)) or times[-1] >= repeat:
+        if any(b <= a for a, b in itertools.pairwise(times)) or times[-1] >= repeat:
             raise InputError("times must increase and end before repeat", where=where)
         return cls(outputs, np.array(times), np.array(rows, dtype=float), repeat)
 

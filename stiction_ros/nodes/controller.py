@@ -220,9 +220,7 @@ class ControllerNode(ManagedNode):
             self._mode.publish(String(data=change.mode.value))
             frictions = [
                 (f"{name}.{key}", value)
-                for name, friction in zip(
-                    self.model.valve_names, self.live.frictions, strict=True
-                )
+                for name, friction in zip(self.model.valve_names, self.live.frictions, strict=True)
                 if friction is not None
                 for key, value in (
                     ("f_s", friction.static_friction),

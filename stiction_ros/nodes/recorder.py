@@ -52,9 +52,7 @@ class RecorderNode(ManagedNode):
         try:
             self._wanted = re.compile(self.settings.topics)
         except re.error as error:
-            raise InputError(
-                f"no regular expression ({error})", where="recorder: topics"
-            ) from None
+            raise InputError(f"no regular expression ({error})", where="recorder: topics") from None
         self.writer = BagWriter(self.settings.directory, compression=self.settings.compression)
         self._topics: dict[str, str] = {}
         self._skipped: dict[str, str] = {}

@@ -76,9 +76,7 @@ class LiveController:
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
         self._fallback = self._controller
-        self.changes: list[ModeChange] = [
-            ModeChange(0, self._controller.mode, "start", model.name)
-        ]
+        self.changes: list[ModeChange] = [ModeChange(0, self._controller.mode, "start", model.name)]
 
     @property
     def mode(self) -> ControlMode:

@@ -169,6 +169,4 @@ def run_live(
         scenario.seed if seed is None else seed,
         progress,
     )
-    return LiveRun(
-        run, np.array(loop.stems), tuple(loop.controller.changes), tuple(loop.fits)
-    )
+    return LiveRun(run, np.array(loop.stems), tuple(loop.controller.changes), tuple(loop.fits))
