@@ -71,7 +71,8 @@ class Observer:
         """Start from the steady state at ``stem`` (m,), d̂ chosen so that it shows ``pv``."""
         model = self.model
         drive = model.b @ (stem - model.stem0) + model.constant
-        self.state = np.linalg.lstsq(np.eye(model.order) - model.a, drive, rcond=None)[0]
+        steady = np.linalg.lstsq(np.eye(model.order) - model.a, drive, rcond=None)[0]
+        self.state = np.asarray(steady, dtype=float)
         self.disturbance = pv - model.pv0 - model.c @ self.state
 
     def correct(self, pv: FloatArray) -> None:

@@ -18,6 +18,8 @@ class TrustRule:
 
     1. ``confirmations`` successive windows say *sticky* and their intervals of f_S and of f_D
        overlap: the friction is trusted, with the intersection of the intervals.
+       Each end is first moved out by ``tolerance`` of f_S: an interval of one window covers
+       the noise, not that the process is a little nonlinear.
     2. A later window is intersected with what is trusted. A loop that is compensated no
        longer excites the friction band, so its window is wide and changes nothing.
     3. Only ``contradictions`` successive windows whose intervals are disjoint from the trusted
@@ -26,6 +28,9 @@ class TrustRule:
     """
 
     confirmations: int = setting(2, "successive sticky windows before trust", low=1, high=20)
+    tolerance: float = setting(
+        0.02, "share of f_S by which every interval is widened", low=0.0, high=0.5
+    )
     contradictions: int = setting(2, "successive disjoint windows before a change", low=1, high=20)
 
 
@@ -56,11 +61,12 @@ class ValveTrust:
 
     def update(self, estimate: ValveEstimate) -> TrustedFriction | None:
         """Take in the estimate of one more window and return what is trusted now."""
+        slack = self.rule.tolerance * estimate.static_friction
         found = TrustedFriction(
             estimate.static_friction,
-            estimate.static_interval,
+            _widened(estimate.static_interval, slack),
             estimate.dynamic_friction,
-            estimate.dynamic_interval,
+            _widened(estimate.dynamic_interval, slack),
         )
         sticky = estimate.verdict is VerdictKind.STICKY
         if self.trusted is not None:
@@ -122,6 +128,10 @@ def _combine(old: TrustedFriction, new: TrustedFriction) -> TrustedFriction | No
         min(max(old.dynamic_friction, dynamic[0]), dynamic[1]),
         dynamic,
     )
+
+
+def _widened(interval: Interval, slack: float) -> Interval:
+    return max(interval[0] - slack, 0.0), interval[1] + slack
 
 
 def _intersect(one: Interval, other: Interval) -> Interval | None:
