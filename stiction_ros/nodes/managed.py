@@ -116,7 +116,7 @@ class ManagedNode(LifecycleNode):
         self.settings = parameters.read(self, self.settings_class)
         self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
         self._config = self.outlet(String, "~/config", LATCHED_QOS)
-        self._timers = [self.create_timer(1.0, self._each_second)]
+        self._beat = self.create_timer(1.0, self._each_second)
         self.configure()
         self.add_on_set_parameters_callback(self._on_set)
         document = {
@@ -134,8 +134,7 @@ class ManagedNode(LifecycleNode):
 
     def _tear_down(self) -> None:
         self.remove_on_set_parameters_callback(self._on_set)
-        for timer in self._timers:
-            self.destroy_timer(timer)
+        self.destroy_timer(self._beat)
         for subscription in list(self.subscriptions):
             self.destroy_subscription(subscription)
         for outlet in self.outlets.values():

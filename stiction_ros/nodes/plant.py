@@ -61,11 +61,11 @@ class PlantNode(ManagedNode):
         self._step = round(self.model.sample_time * SECOND)
         self._start = round(settings.start_time * SECOND)
         self.stamp = self._start
-        self._clock = self.outlet(Clock, "/clock", SIGNAL_QOS)
+        self._clock_out = self.outlet(Clock, "/clock", SIGNAL_QOS)
         self._pv = self.outlet(JointState, "pv", SIGNAL_QOS, ("controller", "estimator"))
         self._sp = None
         if self.schedule is not None:
-            self._sp = self.outlet(JointState, "sp", SIGNAL_QOS, ("controller", "estimator"))
+            self._sp = self.outlet(JointState, "sp", SIGNAL_QOS, ("controller",))
         self._stem = self.outlet(JointState, "stem", SIGNAL_QOS)
         self._dv = None
         if self.model.process.measured_disturbances:
@@ -123,7 +123,7 @@ class PlantNode(ManagedNode):
 
     def _show(self) -> None:
         measured = self.plant.measure()
-        self._clock.publish(Clock(clock=to_stamp(self.stamp)))
+        self._clock_out.publish(Clock(clock=to_stamp(self.stamp)))
         if self._dv is not None:
             names = self.model.process.measured_disturbances
             self._dv.publish(joint_state(self.stamp, names, measured.dv))
