@@ -61,6 +61,7 @@ class PlantNode(ManagedNode):
         self._step = round(self.model.sample_time * SECOND)
         self._start = round(settings.start_time * SECOND)
         self.stamp = self._start
+        self._every = -(-settings.samples // 100)  # a hundred lines of progress
         self._clock_out = self.outlet(Clock, "/clock", SIGNAL_QOS)
         self._pv = self.outlet(JointState, "pv", SIGNAL_QOS, ("controller", "estimator"))
         self._sp = None
@@ -118,8 +119,10 @@ class PlantNode(ManagedNode):
         self.stamp = self._start + self.plant.sample * self._step
         if self.plant.sample == self.settings.samples:
             self.running, self.finished = False, True
-            return
-        self._show()
+        else:
+            self._show()
+        if self._every and self.plant.sample % self._every == 0:
+            self.get_logger().info(f"sample {self.plant.sample} of {self.settings.samples}")
 
     def _show(self) -> None:
         measured = self.plant.measure()
