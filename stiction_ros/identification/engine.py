@@ -104,6 +104,7 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
         limit=limit,
         delay=options.delay,
         min_moves=options.min_moves,
+        resolution=options.resolution,
     )
 
 
