@@ -8,7 +8,6 @@ from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
 from stiction_ros.errors import InputError
 
-
 LAWS: dict[str, type[SimulatesGrid]] = {"he": HeStiction}
 
 

@@ -24,7 +24,8 @@ from stiction_ros.identification.scan import OutputScan
 BLOCK = 1_500_000
 CLOUD = 260
 PARENTS = 6
-SWEEPS = 5
+SWEEPS = 6
+PATIENCE = 2
 DELAY_MARGIN = 2.0
 
 
@@ -300,6 +301,7 @@ def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
             best = min(best, rival, key=lambda candidate: candidate.loss)
     if best.friction[valve, 0] == 0.0:
         return best
+    failures = 0
     for sweep in range(SWEEPS):
         before = best.loss
         if sweep == 0:
@@ -311,7 +313,8 @@ def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
             parents = [np.append(grid[index], best.start[valve]) for index in chosen]
         parents.append(np.append(best.friction[valve], best.start[valve]))
         best = evolve(data, best, orders, valve, np.array(parents), sweep)
-        if best.loss > before - 1.0:
+        failures = failures + 1 if best.loss > before - 1.0 else 0
+        if failures == PATIENCE:
             break
     return best
 
@@ -336,7 +339,7 @@ def evolve(
     generator = np.random.default_rng(seed)
     limit = float(data.limit[valve])
     delay = _delay_range(data, model, valve) if prefilter else data.delay
-    scale = limit / (25.0 * (1.0 if seed < 2 else 2.5**seed) if prefilter else 25.0)
+    scale = limit / (25.0 * (1.0, 2.5, 1.0, 6.0, 1.0, 15.0)[seed] if prefilter else 25.0)
     while True:
         rows = offspring(generator, parents, CLOUD, scale, limit)
         friction, starts = rows[:, :2], rows[:, 2]
