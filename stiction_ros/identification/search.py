@@ -8,6 +8,7 @@ A valve's friction is found by scanning the triangle with everything else fixed
 from __future__ import annotations
 
 import dataclasses
+import enum
 
 import numpy as np
 
@@ -27,6 +28,14 @@ PARENTS = 6
 SWEEPS = 6
 PATIENCE = 2
 DELAY_MARGIN = 2.0
+
+
+class Criterion(enum.Enum):
+    """Prefilter of a scan: which error of the current model counts."""
+
+    ONE_STEP = enum.auto()
+    FREE_RUN = enum.auto()
+    INNOVATIONS = enum.auto()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,14 +137,14 @@ def scan_valve(
     valve: int,
     grid: FloatArray,
     ratios: FloatArray | float,
-    prefilter: bool = True,
+    criterion: Criterion = Criterion.INNOVATIONS,
     delay: tuple[int, int] | None = None,
 ) -> ValveScan:
     """Scan the friction of ``valve`` with the other valves of ``model`` fixed.
 
     Args:
         ratios: start of the stem in units of f_S, shape (G,) or one for all.
-        prefilter: filter by D/A of the model's fits; otherwise the one-step criterion.
+        criterion: filter by 1, 1/A or D/A of the model's fits.
         delay: range of delays scanned; None is that of the data.
     """
     others = [j for j in range(len(data.u)) if j != valve]
@@ -147,8 +156,8 @@ def scan_valve(
             tuple(delays[j] for j in others),
             orders,
             delay or data.delay,
-            fit.noise if prefilter else one,
-            fit.a if prefilter else one,
+            fit.noise if criterion is Criterion.INNOVATIONS else one,
+            fit.a if criterion is not Criterion.ONE_STEP else one,
         )
         for y, fit, delays in zip(data.y, model.fits, model.delays, strict=True)
     ]
@@ -240,9 +249,9 @@ def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
     if data.delay[0] == data.delay[1]:
         return model
     for valve in range(len(data.u)):
-        for prefilter in (False, True):
+        for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
             friction = model.friction[valve][None, :]
-            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], prefilter)
+            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
             now = [row[valve] for row in model.delays]
             if list(scan.delays[0]) == now:
                 continue
@@ -290,8 +299,8 @@ def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     limit = float(data.limit[valve])
     grid = coarse_grid(limit)
     best, parents = model, []
-    for prefilter in (False, True):
-        scan = scan_valve(data, model, orders, valve, grid, 0.0, prefilter)
+    for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
+        scan = scan_valve(data, model, orders, valve, grid, 0.0, criterion)
         chosen = scan.best(6, data.min_moves, limit / 25.0)
         parents += [np.append(grid[index], 0.0) for index in chosen]
         for index in chosen[:2]:
@@ -305,8 +314,9 @@ def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     for sweep in range(SWEEPS):
         before = best.loss
         if sweep == 0:
-            one_step = evolve(data, best, orders, valve, np.array(parents), 97, False)
-            best = min(best, one_step, key=lambda candidate: candidate.loss)
+            rows = np.array(parents)
+            for criterion in (Criterion.ONE_STEP, Criterion.FREE_RUN):
+                best = evolve(data, best, orders, valve, rows, 0, criterion)
         else:
             scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
             chosen = scan.best(4, data.min_moves, limit / 25.0)
@@ -326,7 +336,7 @@ def evolve(
     valve: int,
     parents: FloatArray,
     seed: int,
-    prefilter: bool = True,
+    criterion: Criterion = Criterion.INNOVATIONS,
 ) -> Model:
     """Refine (f_S, f_D, start) by shrinking clouds of points round the best ones.
 
@@ -338,12 +348,13 @@ def evolve(
     """
     generator = np.random.default_rng(seed)
     limit = float(data.limit[valve])
-    delay = _delay_range(data, model, valve) if prefilter else data.delay
-    scale = limit / (25.0 * (1.0, 2.5, 1.0, 6.0, 1.0, 15.0)[seed] if prefilter else 25.0)
+    local = criterion is Criterion.INNOVATIONS
+    delay = _delay_range(data, model, valve) if local else data.delay
+    scale = limit / (25.0 * (1.0, 2.5, 1.0, 6.0, 1.0, 15.0)[seed])
     while True:
         rows = offspring(generator, parents, CLOUD, scale, limit)
         friction, starts = rows[:, :2], rows[:, 2]
-        scan = scan_valve(data, model, orders, valve, friction, starts, prefilter, delay)
+        scan = scan_valve(data, model, orders, valve, friction, starts, criterion, delay)
         chosen = scan.best(PARENTS, data.min_moves, 0.4 * scale)
         if not chosen:
             return model
