@@ -104,6 +104,7 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
         limit=limit,
         delay=options.delay,
         min_moves=options.min_moves,
+        resolution=options.resolution,
     )
 
 
@@ -152,9 +153,11 @@ def linear_rivals(
         raised = dataclasses.replace(
             orders, output=orders.output + extra, input=orders.input + extra
         )
-        rivals.append(linear_model(data, raised, freed))
-        own = dataclasses.replace(freed, delays=linear.delays)
-        rivals.append(refit(data, own, raised, warm=False))
+        rival = linear_model(data, raised, freed)
+        rivals.append(rival)
+        if rival.delays != linear.delays:
+            own = dataclasses.replace(freed, delays=linear.delays)
+            rivals.append(refit(data, own, raised, warm=False))
     return rivals
 
 

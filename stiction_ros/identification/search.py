@@ -8,12 +8,12 @@ A valve's friction is found by scanning the triangle with everything else fixed
 from __future__ import annotations
 
 import dataclasses
+import enum
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
 from stiction_ros.identification.friction_grid import (
-    around,
     coarse_grid,
     count_moves,
     simulate,
@@ -23,7 +23,19 @@ from stiction_ros.identification.output_error import Orders, OutputFit, fit_outp
 from stiction_ros.identification.scan import OutputScan
 
 BLOCK = 1_500_000
-START_RATIOS = np.linspace(-1.0, 1.0, 9)
+CLOUD = 260
+PARENTS = 6
+SWEEPS = 6
+PATIENCE = 2
+DELAY_MARGIN = 2.0
+
+
+class Criterion(enum.Enum):
+    """Prefilter of a scan: which error of the current model counts."""
+
+    ONE_STEP = enum.auto()
+    FREE_RUN = enum.auto()
+    INNOVATIONS = enum.auto()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +49,7 @@ class Data:
         limit: largest f_S per valve, %, shape (m,).
         delay: inclusive range of t_d.
         min_moves: fewest stem moves of an accepted candidate.
+        resolution: final step of the grid as a share of the limit.
     """
 
     y: FloatArray
@@ -45,6 +58,7 @@ class Data:
     limit: FloatArray
     delay: tuple[int, int]
     min_moves: int
+    resolution: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,12 +82,12 @@ class Model:
     @property
     def loss(self) -> float:
         """Sum over outputs of n log(mean squared innovation)."""
-        return sum(fit.loss for fit in self.fits)
+        return float(sum(fit.loss for fit in self.fits))
 
     @property
     def bic(self) -> float:
         """BIC of the linear parts and noise; friction is not counted here."""
-        return sum(fit.bic for fit in self.fits)
+        return float(sum(fit.bic for fit in self.fits))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +126,8 @@ class ValveScan:
 def stem_of(data: Data, valve: int, friction: FloatArray, ratio: float) -> FloatArray:
     """Return the stem of one valve, shape (N,)."""
     u = data.u[valve]
-    return simulate(data.law, friction[None, :], u, u[0] + ratio * friction[0])[0]
+    stems = simulate(data.law, friction[None, :], u, float(u[0] + ratio * friction[0]))
+    return np.asarray(stems[0])
 
 
 def scan_valve(
@@ -122,14 +137,14 @@ def scan_valve(
     valve: int,
     grid: FloatArray,
     ratios: FloatArray | float,
-    prefilter: bool = True,
+    criterion: Criterion = Criterion.INNOVATIONS,
     delay: tuple[int, int] | None = None,
 ) -> ValveScan:
     """Scan the friction of ``valve`` with the other valves of ``model`` fixed.
 
     Args:
         ratios: start of the stem in units of f_S, shape (G,) or one for all.
-        prefilter: filter by D/A of the model's fits; otherwise the one-step criterion.
+        criterion: filter by 1, 1/A or D/A of the model's fits.
         delay: range of delays scanned; None is that of the data.
     """
     others = [j for j in range(len(data.u)) if j != valve]
@@ -141,8 +156,8 @@ def scan_valve(
             tuple(delays[j] for j in others),
             orders,
             delay or data.delay,
-            fit.noise if prefilter else one,
-            fit.a if prefilter else one,
+            fit.noise if criterion is Criterion.INNOVATIONS else one,
+            fit.a if criterion is not Criterion.ONE_STEP else one,
         )
         for y, fit, delays in zip(data.y, model.fits, model.delays, strict=True)
     ]
@@ -234,9 +249,9 @@ def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
     if data.delay[0] == data.delay[1]:
         return model
     for valve in range(len(data.u)):
-        for prefilter in (False, True):
+        for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
             friction = model.friction[valve][None, :]
-            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], prefilter)
+            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
             now = [row[valve] for row in model.delays]
             if list(scan.delays[0]) == now:
                 continue
@@ -255,23 +270,27 @@ def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
 
 
 def neighbouring_delays(data: Data, model: Model, orders: Orders) -> Model:
-    """Try each channel's delay one sample earlier and later by the exact fit."""
-    improved = True
-    while improved:
-        improved = False
-        for i in range(len(data.y)):
-            for j in range(len(data.u)):
-                for shift in (-1, 1):
+    """Try each channel's delay earlier and later by the exact fit.
+
+    A leading coefficient that the data cannot tell from zero counts as delay: of delays that
+    fit equally well (within ``DELAY_MARGIN``) the longest is kept.
+    """
+    for i, y in enumerate(data.y):
+        for j in range(len(data.u)):
+            for shift, margin in ((-1, -DELAY_MARGIN), (1, DELAY_MARGIN)):
+                best = model.fits[i].loss
+                while True:
                     row = list(model.delays[i])
                     row[j] += shift
                     if not data.delay[0] <= row[j] <= data.delay[1]:
-                        continue
-                    fit = fit_output(data.y[i], model.stems, tuple(row), orders)
-                    if fit.loss < model.fits[i].loss - 1e-6:
-                        delays, fits = list(model.delays), list(model.fits)
-                        delays[i], fits[i] = tuple(row), fit
-                        model = dataclasses.replace(model, delays=tuple(delays), fits=tuple(fits))
-                        improved = True
+                        break
+                    fit = fit_output(y, model.stems, tuple(row), orders)
+                    if fit.loss > best + margin:
+                        break
+                    best = min(best, fit.loss)
+                    delays, fits = list(model.delays), list(model.fits)
+                    delays[i], fits[i] = tuple(row), fit
+                    model = dataclasses.replace(model, delays=tuple(delays), fits=tuple(fits))
     return model
 
 
@@ -279,53 +298,100 @@ def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     """Return the best model over the whole triangle of one valve; never worse than ``model``."""
     limit = float(data.limit[valve])
     grid = coarse_grid(limit)
-    best = model
-    for prefilter in (False, True):
-        scan = scan_valve(data, model, orders, valve, grid, 0.0, prefilter)
-        for index in scan.best(2, data.min_moves, limit / 10.0):
+    best, parents = model, []
+    for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
+        scan = scan_valve(data, model, orders, valve, grid, 0.0, criterion)
+        chosen = scan.best(6, data.min_moves, limit / 25.0)
+        parents += [np.append(grid[index], 0.0) for index in chosen]
+        for index in chosen[:2]:
             rival = with_valve(
                 data, model, orders, valve, grid[index], 0.0, scan.delays[index], warm=False
             )
             best = min(best, rival, key=lambda candidate: candidate.loss)
-    for _ in range(3):
-        if best.friction[valve, 0] == 0.0:
-            break
+    if best.friction[valve, 0] == 0.0:
+        return best
+    failures = 0
+    for sweep in range(SWEEPS):
         before = best.loss
-        best = best_start(data, best, orders, valve)
-        scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
-        for index in scan.best(1, data.min_moves, 0.0):
-            best = _better(data, best, orders, valve, scan, index)
-        best = zoom(data, best, orders, valve, limit / 30.0, limit / 400.0)
-        if best.loss > before - 2.0:
+        if sweep == 0:
+            rows = np.array(parents)
+            for criterion in (Criterion.ONE_STEP, Criterion.FREE_RUN):
+                best = evolve(data, best, orders, valve, rows, 0, criterion)
+        else:
+            scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
+            chosen = scan.best(4, data.min_moves, limit / 25.0)
+            parents = [np.append(grid[index], best.start[valve]) for index in chosen]
+        parents.append(np.append(best.friction[valve], best.start[valve]))
+        best = evolve(data, best, orders, valve, np.array(parents), sweep)
+        failures = failures + 1 if best.loss > before - 1.0 else 0
+        if failures == PATIENCE:
             break
     return best
 
 
-def best_start(data: Data, model: Model, orders: Orders, valve: int) -> Model:
-    """Return the model with the best stem position before the first sample."""
-    grid = np.repeat(model.friction[valve][None, :], len(START_RATIOS), axis=0)
-    scan = scan_valve(data, model, orders, valve, grid, START_RATIOS)
-    index = int(scan.loss.argmin())
-    middle = len(START_RATIOS) // 2
-    if scan.loss[index] > scan.loss[middle] - 1e-6:
-        return model
-    return _better(data, model, orders, valve, scan, index, float(START_RATIOS[index]))
+def evolve(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    parents: FloatArray,
+    seed: int,
+    criterion: Criterion = Criterion.INNOVATIONS,
+) -> Model:
+    """Refine (f_S, f_D, start) by shrinking clouds of points round the best ones.
 
+    The criterion is piecewise constant in f_S with many local minima on the way down, so
+    several parents are kept apart from each other in every round. Deterministic for a seed.
 
-def zoom(data: Data, model: Model, orders: Orders, valve: int, step: float, final: float) -> Model:
-    """Refine one valve's friction on ever finer local grids down to step ``final``."""
-    centres = model.friction[valve][None, :]
-    limit, ratio = float(data.limit[valve]), float(model.start[valve])
-    delay = _delay_range(data, model, valve)
-    while step > final:
-        grid = around(centres, step, limit)
-        scan = scan_valve(data, model, orders, valve, grid, ratio, delay=delay)
-        chosen = scan.best(3, data.min_moves, 1.5 * step)
+    Args:
+        parents: rows (f_S, f_D, start ratio).
+    """
+    generator = np.random.default_rng(seed)
+    limit = float(data.limit[valve])
+    local = criterion is Criterion.INNOVATIONS
+    delay = _delay_range(data, model, valve) if local else data.delay
+    scale = limit / (25.0 * (1.0, 2.5, 1.0, 6.0, 1.0, 15.0)[seed])
+    while True:
+        rows = offspring(generator, parents, CLOUD, scale, limit)
+        friction, starts = rows[:, :2], rows[:, 2]
+        scan = scan_valve(data, model, orders, valve, friction, starts, criterion, delay)
+        chosen = scan.best(PARENTS, data.min_moves, 0.4 * scale)
         if not chosen:
             return model
-        centres = scan.grid[chosen]
-        step /= 3.0
-    return _better(data, model, orders, valve, scan, chosen[0])
+        parents = rows[chosen]
+        if scale < data.resolution * limit:
+            break
+        scale /= 2.5
+    best = model
+    for index in chosen[:2]:
+        best = _better(data, best, orders, valve, scan, index, float(rows[index, 2]))
+    return best
+
+
+def offspring(
+    generator: np.random.Generator, parents: FloatArray, count: int, scale: float, limit: float
+) -> FloatArray:
+    """Return the parents and about ``count`` points round them, rows (f_S, f_D, start)."""
+    copies = max(1, count // len(parents))
+    rows = np.repeat(parents, copies, axis=0)
+    size = scale * generator.choice([0.2, 1.0], (len(rows), 1))
+    move = generator.standard_normal((len(rows), 2))
+    # A reversal slips once u has turned by f_S + f_D, a repeated move by J = f_S − f_D: the
+    # valleys of the criterion run along constant sums and constant differences.
+    kind = generator.integers(0, 6, len(rows))
+    move[kind == 0, 1] = 0.0
+    move[kind == 1, 0] = 0.0
+    move[kind == 2, 1] = move[kind == 2, 0]
+    sums = (kind == 3) | (kind == 4)
+    move[sums, 1] = -move[sums, 0]
+    size = np.where(sums[:, None], 2.0 * size, size)
+    rows[:, :2] += size * move
+    rows[:, 0] = np.clip(rows[:, 0], 1e-6 * limit, limit)
+    rows[:, 1] = np.clip(rows[:, 1], 0.0, rows[:, 0])
+    shake = generator.standard_normal(len(rows)) * np.minimum(1.0, 8.0 * scale / limit)
+    shake *= generator.random(len(rows)) < 0.5
+    rows[:, 2] = np.clip(rows[:, 2] + shake, -1.0, 1.0)
+    return np.vstack([parents, rows])
 
 
 def _delay_range(data: Data, model: Model, valve: int) -> tuple[int, int]:
