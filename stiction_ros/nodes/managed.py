@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterable
 from typing import Any
 
@@ -150,6 +151,10 @@ class ManagedNode(LifecycleNode):
             if self.outlets:
                 self._tear_down()
             return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it without a word
+            self.failure = f"internal error: {error!r}"
+            self.get_logger().error(traceback.format_exc())
+            return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
     # ---- topics ----------------------------------------------------------------------------

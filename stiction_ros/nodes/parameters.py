@@ -42,7 +42,9 @@ def read(node: Node, cls: type[Any], changed: dict[str, Any] | None = None) -> A
     """
     values = {}
     for entry in settings_of(cls):
-        value = node.get_parameter(entry.name).value
+        value = node.get_parameter_or(entry.name).value
+        if value is None:  # an empty list in a parameter file has no type
+            value = entry.default
         if changed is not None and entry.name in changed:
             value = changed[entry.name]
         values[entry.name] = check(entry, value, node.get_name())
