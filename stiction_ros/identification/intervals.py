@@ -9,8 +9,8 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import around, coarse_grid
+from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.search import Data, Model, ValveScan, scan_valve, with_valve
 
 
 @dataclasses.dataclass(frozen=True)
