@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.json_output import write_json
-from stiction_ros.cli.node_processes import NodeFailure, NodeProcesses, require_ros
+from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.cli.scenarios import SCENARIOS, load, node_parameters
 from stiction_ros.errors import InputError
@@ -78,7 +78,7 @@ def _run_scenario(name: str, directory: Path, options: argparse.Namespace, show:
         finally:
             processes.stop()
         processes.check()
-    except NodeFailure as failure:
+    except NodeError as failure:
         print(f"stiction: {name}: {failure}; see {directory / 'log'}", file=sys.stderr)
         return False
     seconds = time.monotonic() - begin

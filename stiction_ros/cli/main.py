@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"stiction: {error}", file=sys.stderr)
         return USAGE
     except BrokenPipeError:
-        sys.stdout = None  # type: ignore[assignment]  # the reader has gone
+        sys.stdout = None  # the reader has gone
         return DONE
     except KeyboardInterrupt:
         print("stiction: interrupted", file=sys.stderr)

@@ -27,7 +27,7 @@ SILENCE = 180.0  # s without progress before the run is given up
 _PROGRESS = re.compile(r"sample (\d+) of (\d+)")
 
 
-class NodeFailure(Exception):
+class NodeError(Exception):
     """A node ended or stopped moving when it should not have; the text says which and why."""
 
 
@@ -73,22 +73,22 @@ class NodeProcesses:
         """Wait until the plant has run all its samples.
 
         Raises:
-            NodeFailure: a node ended before, or nothing moves any more.
+            NodeError: a node ended before, or nothing moves any more.
         """
         plant = self._processes["plant"]
         while plant.poll() is None:
             for name, process in self._processes.items():
                 if name != "plant" and process.poll() is not None:
-                    raise NodeFailure(self._describe(name, process.returncode))
+                    raise NodeError(self._describe(name, process.returncode))
             if time.monotonic() - self._moved > SILENCE:
-                raise NodeFailure(f"no sample for {SILENCE:.0f} s at sample {self.sample}")
+                raise NodeError(f"no sample for {SILENCE:.0f} s at sample {self.sample}")
             progress(self.sample / max(self.samples, 1))
             try:
                 plant.wait(0.1)
             except subprocess.TimeoutExpired:
                 continue
         if plant.returncode != 0:
-            raise NodeFailure(self._describe("plant", plant.returncode))
+            raise NodeError(self._describe("plant", plant.returncode))
 
     def stop(self) -> None:
         """End every node, in an order in which nobody's last message is lost."""
@@ -107,10 +107,10 @@ class NodeProcesses:
             reader.join(5.0)
 
     def check(self) -> None:
-        """Raise NodeFailure when a node that was stopped did not end cleanly."""
+        """Raise NodeError when a node that was stopped did not end cleanly."""
         for name, process in self._processes.items():
             if process.returncode != 0:
-                raise NodeFailure(self._describe(name, process.returncode))
+                raise NodeError(self._describe(name, process.returncode))
 
     def _read(self, name: str, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.stats import chi2  # type: ignore[import-untyped]
+from scipy.stats import chi2
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import around, coarse_grid

@@ -17,8 +17,8 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack, solve_triangular  # type: ignore[import-untyped]
-from scipy.signal import lfilter  # type: ignore[import-untyped]
+from scipy.linalg import lapack, solve_triangular
+from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
 

@@ -9,7 +9,7 @@ n_b × n_b systems built from lagged correlations.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter  # type: ignore[import-untyped]
+from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.output_error import Orders

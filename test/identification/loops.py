@@ -37,10 +37,7 @@ def example1(
         error += change
         command += gain * (change + error / integral_time)
         op[k] = command
-        if max(friction) > 0.0:
-            position = float(valve.step(position, command)[1])
-        else:
-            position = command
+        position = float(valve.step(position, command)[1]) if max(friction) > 0.0 else command
         stem[k] = position
     columns = (part[:samples, None] for part in (op, pv, sp, stem))
     return Record("example1", 1.0, ("V1",), ("PV1",), *columns)

@@ -21,7 +21,8 @@ def test_example1_for_both_noise_placements(noise: str) -> None:
     found = identify(record, THIRD_ORDER, seen.append)
     valve, output = found.valves[0], found.outputs[0]
     assert found.status is FitStatus.OK
-    assert seen == sorted(seen) and seen[-1] == 1.0
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
     assert valve.verdict is VerdictKind.STICKY
     assert valve.static_friction == pytest.approx(5.0, abs=0.1)
     assert valve.dynamic_friction == pytest.approx(2.0, abs=0.1)

@@ -25,7 +25,8 @@ def test_coarse_grid_fills_the_triangle(limit: float) -> None:
 def test_local_grid_stays_in_the_triangle(static: float, dynamic: float, step: float) -> None:
     grid = around(np.array([[static, min(static, dynamic)]]), step, 10.0)
     assert (grid[:, 1] <= grid[:, 0]).all()
-    assert (grid[:, 0] <= 10.0).all() and (grid >= 0.0).all()
+    assert (grid[:, 0] <= 10.0).all()
+    assert (grid >= 0.0).all()
 
 
 @settings(max_examples=50, deadline=None)
