@@ -84,11 +84,11 @@ class ControllerNode(ManagedNode):
         sp_qos = QoSProfile(depth=100)
         if settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
-        self.create_subscription(JointState, "pv", self._on_pv, SIGNAL_QOS)
-        self.create_subscription(JointState, "sp", self._on_sp, sp_qos)
-        self.create_subscription(JointState, "dv", self._on_dv, SIGNAL_QOS)
-        self.create_subscription(JointState, "stiction", self._on_stiction, SIGNAL_QOS)
-        self.create_subscription(String, "loop_model", self._on_model, LATCHED_QOS)
+        self.inlet(JointState, "pv", self._on_pv, SIGNAL_QOS, ("plant",))
+        self.inlet(JointState, "sp", self._on_sp, sp_qos)
+        self.inlet(JointState, "dv", self._on_dv, SIGNAL_QOS)
+        self.inlet(JointState, "stiction", self._on_stiction, SIGNAL_QOS, ("estimator",))
+        self.inlet(String, "loop_model", self._on_model, LATCHED_QOS, ("estimator",))
 
     def configuration(self) -> dict[str, Any]:
         return {"model": self.model.to_mapping()}

@@ -58,8 +58,8 @@ class EstimatorNode(ManagedNode):
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.create_subscription(JointState, "pv", self._on_pv, SIGNAL_QOS)
-        self.create_subscription(JointState, "op", self._on_op, SIGNAL_QOS)
+        self.inlet(JointState, "pv", self._on_pv, SIGNAL_QOS, ("plant",))
+        self.inlet(JointState, "op", self._on_op, SIGNAL_QOS, ("controller",))
 
     def hardware(self) -> str:
         return str(self.settings.loop)
@@ -71,6 +71,7 @@ class EstimatorNode(ManagedNode):
     def finish(self) -> None:
         if self._worker is not None:
             self._worker.close()
+            self._collect()
         super().finish()
 
     # ---- samples in ------------------------------------------------------------------------

@@ -71,7 +71,7 @@ class PlantNode(ManagedNode):
         self._dv = None
         if self.model.process.measured_disturbances:
             self._dv = self.outlet(JointState, "dv", SIGNAL_QOS, ("controller",))
-        self.create_subscription(JointState, "op", self._on_op, SIGNAL_QOS)
+        self.inlet(JointState, "op", self._on_op, SIGNAL_QOS, ("controller",))
 
     def configuration(self) -> dict[str, Any]:
         return {"seed": self.settings.seed, "model": self.model.to_mapping()}
