@@ -20,7 +20,7 @@ from rich.table import Table
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.node_processes import NodeProcesses, require_ros, ros_environment
 from stiction_ros.cli.progress import Bar, bar
-from stiction_ros.cli.scenarios import node_parameters
+from stiction_ros.cli.scenarios import find, node_parameters
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag_messages import read_raw
 
@@ -127,7 +127,7 @@ def _lockstep(name: str, controller: Mapping[str, Any], show: Bar) -> Any:
     """Return ms per sample of a recorded lockstep run."""
     with tempfile.TemporaryDirectory() as folder:
         directory = Path(folder)
-        nodes = node_parameters(name, directory)
+        nodes = node_parameters(find(name), directory)
         nodes["controller"].update(controller)
         if controller:
             nodes.pop("estimator")

@@ -13,8 +13,9 @@ from typing import Any
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
-from stiction_ros.cli.scenarios import SCENARIOS, load, node_parameters
+from stiction_ros.cli.scenarios import SCENARIOS, find, node_parameters
 from stiction_ros.errors import InputError
+from stiction_ros.online.session import Scenario
 
 
 def add(commands: Any) -> None:
@@ -26,7 +27,10 @@ def add(commands: Any) -> None:
         "cycle; identify the friction; swap the controller; record all traffic; write the report.",
     )
     parser.add_argument(
-        "scenario", nargs="*", metavar="SCENARIO", help=f"{' | '.join(SCENARIOS)} (default: all)"
+        "scenario",
+        nargs="*",
+        metavar="SCENARIO",
+        help="tank, siso, or a file (default: both)",
     )
     parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
@@ -42,28 +46,26 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    for name in options.scenario:
-        if name not in SCENARIOS:
-            raise InputError(
-                f"unknown scenario {name!r}", fix=f"known scenarios: {', '.join(SCENARIOS)}"
-            )
+    scenarios = [Scenario.load(find(name)) for name in options.scenario or SCENARIOS]
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)
     good = True
-    for name in options.scenario or SCENARIOS:
-        directory = Path(options.out) / name
+    for scenario in scenarios:
+        directory = Path(options.out) / scenario.name
         _make_empty(directory)
-        with bar(f"{name}: starting") as show:
-            good = _run_scenario(name, directory, options, show) and good
+        with bar(f"{scenario.name}: starting") as show:
+            good = _run_scenario(scenario, directory, options, show) and good
     return 0 if good else 1
 
 
-def _run_scenario(name: str, directory: Path, options: argparse.Namespace, show: Bar) -> bool:
+def _run_scenario(
+    scenario: Scenario, directory: Path, options: argparse.Namespace, show: Bar
+) -> bool:
     """Run one scenario and print its table; return whether it succeeded."""
     from stiction_ros.report import report_scenario
 
-    scenario = load(name)
-    nodes = node_parameters(name, directory)
+    name = scenario.name
+    nodes = node_parameters(scenario.path, directory)
     seed = scenario.seed if options.seed is None else options.seed
     nodes["plant"]["seed"] = seed
     if options.speed is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -21,30 +20,8 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, trajectory, values_of
 from stiction_ros.nodes.runner import run
-from stiction_ros.nodes.shared import NodeSettings
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings
-from stiction_ros.settings import setting
-
-
-@dataclasses.dataclass(frozen=True)
-class ControllerSettings(LiveControllerSettings, NodeSettings):
-    """The live controller's settings and what belongs to the node."""
-
-    model: str = setting("", "loop model file the controller is built from", fixed=True)
-    pace: str = setting(
-        "lockstep",
-        "lockstep holds op until an awaited fit is there; realtime does not",
-        choices=("lockstep", "realtime"),
-        fixed=True,
-    )
-    sp_source: str = setting(
-        "schedule",
-        "schedule: sp comes with every pv; external: the last sp (transient local) holds",
-        choices=("schedule", "external"),
-        fixed=True,
-    )
-    fit_timeout: float = setting(120.0, "s to wait for an awaited fit", low=0.1, high=1e5)
-    prediction_points: int = setting(11, "points of the published plan", low=1, high=1001)
+from stiction_ros.online.live_controller import LiveController
+from stiction_ros.online.node_settings import ControllerNodeSettings
 
 
 class ControllerNode(ManagedNode):
@@ -52,7 +29,7 @@ class ControllerNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``controller``; ``kwargs`` go to the ROS node."""
-        super().__init__("controller", ControllerSettings, **kwargs)
+        super().__init__("controller", ControllerNodeSettings, **kwargs)
         self._wall = RosClock(clock_type=ClockType.STEADY_TIME)
 
     def configure(self) -> None:

@@ -116,6 +116,7 @@ class ManagedNode(LifecycleNode):
             outlet.publisher.wait_for_all_acked(Duration(seconds=2.0))
 
     def _configure(self) -> None:
+        parameters.refuse_unknown(self)
         self.settings = parameters.read(self, self.settings_class)
         self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
         self._beat = self.create_timer(1.0, self._each_second)

@@ -51,6 +51,19 @@ def read(node: Node, cls: type[Any], changed: dict[str, Any] | None = None) -> A
     return cls(**values)
 
 
+def refuse_unknown(node: Node) -> None:
+    """Raise InputError for a given parameter that the node does not have.
+
+    rclpy itself passes over it without a word.
+    """
+    for name in node._parameter_overrides:  # there is no public way to these names
+        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
+            known = ", ".join(sorted(node.get_parameters_by_prefix("")))
+            raise InputError(
+                f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
+            )
+
+
 def refusal(error: InputError) -> SetParametersResult:
     """Return the answer that leaves the old value in force."""
     return SetParametersResult(successful=False, reason=str(error))

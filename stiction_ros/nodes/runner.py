@@ -53,7 +53,6 @@ def run(
         if node.get_parameter("autostart").value:
             node.start()
         if node.failure:
-            print(f"{name}: {node.failure}", file=sys.stderr)
             return 2
         try:
             while not stop and not node.finished:
