@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.session import Scenario, run_live
