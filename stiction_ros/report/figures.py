@@ -15,18 +15,17 @@ from stiction_ros.report.drawing import (
     GREY,
     INK,
     MODE_COLOURS,
-    ORANGE,
     VERMILION,
     Drawing,
     TimeAxis,
-    data_limits,
     legend,
     mark_swap,
     panels,
     style,
 )
 from stiction_ros.report.scoring import errors
-from stiction_ros.report.story import Story, step_response, true_response
+from stiction_ros.report.shapes import draw_output, draw_responses, draw_valve
+from stiction_ros.report.story import Story
 
 _STRIP = 0.16  # height of the mode strip as a share of a panel
 
@@ -52,19 +51,8 @@ def trends(story: Story) -> Drawing:
     count = len(record.outputs)
     time, axes, figure = _run_panels(story, count, 2.0)
     for j, name in enumerate(record.outputs):
-        axis = axes[j]
-        axis.plot(time(record.time), record.pv[:, j], color=BLUE, linewidth=0.9, label="PV")
-        if record.sp is not None:
-            axis.plot(
-                time(record.time),
-                record.sp[:, j],
-                color=INK,
-                linewidth=1.0,
-                drawstyle="steps-post",
-                label="SP",
-            )
-        axis.set_ylabel(_with_unit(story, name))
-        axis.set_title(name)
+        draw_output(axes[j], time(record.time), record, j, slice(None))
+        axes[j].set_ylabel(_with_unit(story, name))
     legend(axes[0])
     return Drawing(
         "trends",
@@ -80,7 +68,7 @@ def valves(story: Story) -> Drawing:
     record = story.record
     time, axes, figure = _run_panels(story, len(record.valves), 2.2)
     for j, name in enumerate(record.valves):
-        _draw_valve(axes[j], story, j, time(record.time), slice(None))
+        _draw_stems(axes[j], story, j, time(record.time), slice(None))
         axes[j].set_title(name)
     legend(axes[0])
     caption = "Controller output u and the stem position χ̂ that the controller works with"
@@ -156,14 +144,10 @@ def end_of_cycle(story: Story) -> Drawing | None:
     rows = len(record.outputs) + len(sticky)
     figure, axes = panels(rows, 0.6 + 1.8 * rows, sharex=True)
     for j, name in enumerate(record.outputs):
-        axis = axes[j, 0]
-        axis.plot(at, record.pv[part, j], color=BLUE, label="PV")
-        if record.sp is not None:
-            axis.plot(at, record.sp[part, j], color=INK, drawstyle="steps-post", label="SP")
-        axis.set_title(name)
-        axis.set_ylabel(_with_unit(story, name))
+        draw_output(axes[j, 0], at, record, j, part)
+        axes[j, 0].set_ylabel(_with_unit(story, name))
     for row, j in enumerate(sticky, start=len(record.outputs)):
-        _draw_valve(axes[row, 0], story, j, at, part)
+        _draw_stems(axes[row, 0], story, j, at, part)
         axes[row, 0].set_title(record.valves[j])
         legend(axes[row, 0])
     for axis in axes[:, 0]:
@@ -222,38 +206,12 @@ def rounds(story: Story) -> Drawing | None:
 def step_responses(story: Story) -> Drawing | None:
     """Draw the identified step responses, beside the true ones where known."""
     outputs = story.identified.get("outputs", [])
-    record = story.record
     if not outputs:
         return None
-    length = _response_samples(story)
-    time = TimeAxis.spanning(length * record.sample_time)
-    at = time(np.arange(length) * record.sample_time)
-    figure, axes = panels(
-        len(outputs), 0.6 + 2.1 * len(outputs), len(record.valves), sharex=True, sharey="row"
-    )
-    for row, output in enumerate(outputs):
-        for column, valve in enumerate(record.valves):
-            axis = axes[row, column]
-            shown = []
-            if story.truth is not None:
-                shown.append(true_response(story.truth, row, column, length))
-                axis.plot(at, shown[0], color=VERMILION, linestyle=(0, (5, 3)), label="true")
-            shown.append(step_response(output, valve, length))
-            axis.plot(at, shown[-1], color=BLUE, label="identified")
-            axis.set_title(f"{valve} → {output['name']}")
-            if column == 0:
-                axis.set_ylabel(_with_unit(story, output["name"]))
-            if row == len(outputs) - 1:
-                axis.set_xlabel(f"time since the step ({time.unit})")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=2)
-    return Drawing(
-        "step_responses",
-        "Identified process",
-        "Response of each PV to a stem step of 1 %, by the fit that the swap rests on"
-        + (", beside the simulated process linearised." if story.truth is not None else "."),
-        figure,
-    )
+    caption = "Response of each PV to a stem step of 1 %, by the fit that the swap rests on"
+    caption += ", beside the simulated process linearised." if story.truth is not None else "."
+    figure = draw_responses(outputs, story.record, story.truth, story.units)
+    return Drawing("step_responses", "Identified process", caption, figure)
 
 
 def _run_panels(story: Story, count: int, height: float) -> tuple[TimeAxis, list[Any], Any]:
@@ -295,33 +253,15 @@ def _draw_modes(axis: Any, story: Story, time: TimeAxis) -> None:
             )
 
 
-def _draw_valve(axis: Any, story: Story, valve: int, at: Any, part: slice) -> None:
-    record, estimate = story.record, story.log.stem_estimate
-    drawn = [record.op[part, valve]]
-    axis.plot(at, drawn[0], color=GREY, linewidth=0.9, drawstyle="steps-post", label="OP u")
-    if record.stem is not None:
-        drawn.append(record.stem[part, valve])
-        axis.plot(
-            at,
-            drawn[-1],
-            color=ORANGE,
-            linewidth=2.4,
-            alpha=0.85,
-            drawstyle="steps-post",
-            label="stem χ, true",
-        )
-    if estimate is not None:
-        drawn.append(estimate[part, valve])
-        axis.plot(
-            at,
-            drawn[-1],
-            color=BLUE,
-            linewidth=0.9,
-            drawstyle="steps-post",
-            label="stem χ̂, estimated",
-        )
-    data_limits(axis, drawn)
-    axis.set_ylabel("position (%)")
+def _draw_stems(axis: Any, story: Story, valve: int, at: FloatArray, part: slice) -> None:
+    truth, estimate = story.record.stem, story.log.stem_estimate
+    draw_valve(
+        axis,
+        at,
+        story.record.op[part, valve],
+        None if truth is None else truth[part, valve],
+        None if estimate is None else estimate[part, valve],
+    )
 
 
 def _friction_limits(values: FloatArray) -> tuple[float, float]:
@@ -358,21 +298,6 @@ def _sticky(story: Story) -> list[int]:
     verdicts = {v["name"]: v["verdict"] for v in story.identified.get("valves", [])}
     sticky = [j for j, n in enumerate(story.record.valves) if verdicts.get(n) == "sticky"]
     return sticky or list(range(len(story.record.valves)))
-
-
-def _response_samples(story: Story) -> int:
-    """Return after how many samples the slowest of the shown models has settled."""
-    radius = 0.0
-    if story.truth is not None:
-        linear = story.truth.process.linear(story.truth.sample_time)
-        radius = float(np.abs(np.linalg.eigvals(linear.a)).max())
-    else:
-        for output in story.identified.get("outputs", []):
-            roots = np.abs(np.roots([1.0, *output["a"]]))
-            radius = max(radius, float(roots.max(initial=0.0)))
-    if not 0.0 < radius < 1.0:
-        return 100
-    return int(np.clip(math.ceil(math.log(0.01) / math.log(radius)), 20, 400))
 
 
 def _unit(story: Story, name: str) -> str:

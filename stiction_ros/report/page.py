@@ -58,7 +58,7 @@ figcaption b { color: var(--ink); }
 details { margin: 10px 0; border: 1px solid var(--line); border-radius: 8px; padding: 8px 14px; }
 summary { cursor: pointer; }
 pre { overflow-x: auto; font-size: 0.82rem; line-height: 1.45; }
-code { font-size: 0.92em; }
+sub { font-size: 0.72em; line-height: 0; }
 .note { color: var(--soft); font-size: 0.92rem; }
 .warn { border-left: 5px solid var(--bad); background: var(--panel); padding: 10px 14px;
   border-radius: 6px; }
@@ -91,11 +91,26 @@ def text(value: object) -> str:
     return html.escape(str(value), quote=True)
 
 
+def words(value: object) -> str:
+    """Return ``value`` for HTML with f_S and f_D set as symbols and lines kept."""
+    return (
+        text(value)
+        .replace("f_S", "f<sub>S</sub>")
+        .replace("f_D", "f<sub>D</sub>")
+        .replace("\n", "<br>")
+    )
+
+
+def count(value: object) -> str:
+    """Return a whole number; a dash when there is none."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else "–"
+
+
 def card(kind: str, what: str, big: str, more: str) -> str:
     """Return a box with one result; ``kind`` is bad, good or open."""
     return (
         f'<div class="card {kind}"><div class="what">{text(what)}</div>'
-        f'<div class="big">{text(big)}</div><div class="more">{text(more)}</div></div>'
+        f'<div class="big">{text(big)}</div><div class="more">{words(more)}</div></div>'
     )
 
 
@@ -103,7 +118,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], texts: int = 1) -
     """Return a table; the first ``texts`` columns hold words, the others figures."""
     lines = ['<div class="scroll"><table><tr>']
     for column, title in enumerate(head):
-        lines.append(f"<th{_kind('text' if column < texts else '')}>{text(title)}</th>")
+        lines.append(f"<th{_kind('text' if column < texts else '')}>{words(title)}</th>")
     lines.append("</tr>")
     for row in rows:
         lines.append("<tr>")
@@ -111,7 +126,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], texts: int = 1) -
             kind, value = cell if isinstance(cell, tuple) else ("", cell)
             if column < texts:
                 kind = f"text {kind}".strip()
-            lines.append(f"<td{_kind(kind)}>{text(value)}</td>")
+            lines.append(f"<td{_kind(kind)}>{words(value)}</td>")
         lines.append("</tr>")
     return "".join([*lines, "</table></div>"])
 
@@ -132,11 +147,11 @@ def folded(title: str, content: str) -> str:
 
 
 def number(value: object, digits: int = 3) -> str:
-    """Return a figure with ``digits`` significant digits; a dash when there is none."""
+    """Return a figure with ``digits`` significant digits, whole ones whole; else a dash."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return "–"
-    if value == 0:
-        return "0"
+    if value == round(value) and abs(value) < 1e6:
+        return f"{value:.0f}".replace("-", "−")
     if not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits - 1}e}".replace("-", "−")
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)

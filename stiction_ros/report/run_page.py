@@ -10,6 +10,7 @@ from stiction_ros.report.drawing import Drawing
 from stiction_ros.report.page import (
     Cell,
     card,
+    count,
     duration,
     embedded,
     folded,
@@ -19,6 +20,7 @@ from stiction_ros.report.page import (
     percent,
     table,
     text,
+    words,
 )
 from stiction_ros.report.scoring import PhaseStatus
 from stiction_ros.report.story import Story
@@ -28,7 +30,7 @@ _KINDS = {"sticky": "bad", "healthy": "good"}
 _SCORES = (
     ("amplitude", "amplitude of the cycle", ""),
     ("offset", "offset", ""),
-    ("iae_per_hour", "IAE per hour", " h/h"),
+    ("iae_per_hour", "IAE per hour", "·h/h"),
 )
 
 
@@ -41,17 +43,17 @@ def run_page(story: Story, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
     """
     record = story.record
     kicker = (
-        f"{len(record):,} samples of {number(record.sample_time)} s, "
+        f"{len(record)} samples of {record.sample_time:g} s, "
         f"{duration(len(record) * record.sample_time)} of operation"
-    ).replace(",", " ")
+    )
     if story.seed is not None:
         kicker += f", seed {story.seed}"
     parts = [
         f"<h1>{text(headline(story))}</h1>",
         f'<p class="kicker">Loop {text(story.name)}: {text(kicker)}</p>',
         _trouble(story),
-        *[f'<p class="lead">{text(line)}</p>' for line in findings(story)],
-        valve_cards(story.identified.get("valves", [])),
+        *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
+        valve_cards(story.identified.get("valves", []), story),
         _gain(story),
         *[embedded(drawing, png) for drawing, png in drawings],
         _fits(story),
@@ -66,19 +68,25 @@ def run_page(story: Story, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
 def headline(story: Story) -> str:
     """Return the answer in one line: which valve, and what became of it."""
     verdicts = story.identified.get("valves", [])
-    sticky = [v["name"] for v in verdicts if v["verdict"] == "sticky"]
-    if not verdicts:
-        return "No fit of the valves yet"
-    if not sticky:
-        healthy = all(v["verdict"] == "healthy" for v in verdicts)
-        return "The valves are healthy" if healthy else "No valve is shown to stick"
-    names = _listed(sticky)
-    verb = "sticks" if len(sticky) == 1 else "stick"
+    line = verdict_line(verdicts)
+    if not any(valve["verdict"] == "sticky" for valve in verdicts):
+        return line
     if story.log.swap is None:
-        return f"{names} {verb}; the controller was not swapped"
-    if _gone(story):
-        return f"{names} {verb}; the swapped controller ended the limit cycle"
-    return f"{names} {verb}; the controller was swapped"
+        return f"{line}; the controller was not swapped"
+    return f"{line}; the swap ended the limit cycle" if _gone(story) else f"{line}; swapped"
+
+
+def verdict_line(valves: Sequence[Mapping[str, Any]]) -> str:
+    """Return the verdicts on all valves in a few words."""
+    if not valves:
+        return "No fit of the valves"
+    sticky = [valve["name"] for valve in valves if valve["verdict"] == "sticky"]
+    if sticky:
+        return f"{_listed(sticky)} {'sticks' if len(sticky) == 1 else 'stick'}"
+    one = len(valves) == 1
+    if all(valve["verdict"] == "healthy" for valve in valves):
+        return f"{_listed([v['name'] for v in valves])} {'is' if one else 'are'} healthy"
+    return "No valve is shown to stick"
 
 
 def findings(story: Story) -> list[str]:
@@ -86,8 +94,13 @@ def findings(story: Story) -> list[str]:
     lines = []
     swap, found = story.log.swap, story.phases
     if swap is not None:
-        known = ", ".join(f"{name} = {percent(value)} %" for name, value in swap.frictions.items())
-        with_known = f", with {known}" if known else ""
+        known = [
+            f"{valve} f_S = {percent(swap.frictions[key])} % and "
+            f"f_D = {percent(swap.frictions.get(f'{valve}.f_d'))} %"
+            for valve in story.record.valves
+            if (key := f"{valve}.f_s") in swap.frictions
+        ]
+        with_known = f", on trusting for {'; for '.join(known)}" if known else ""
         lines.append(
             f"After {duration(story.swap_time)} the controller changed from unaware to "
             f"{swap.mode} between two samples{with_known}."
@@ -99,8 +112,8 @@ def findings(story: Story) -> list[str]:
     return lines
 
 
-def valve_cards(valves: Sequence[Mapping[str, Any]]) -> str:
-    """Return one box a valve: verdict and friction with intervals."""
+def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None) -> str:
+    """Return one box a valve: verdict, friction with intervals, and the truth where known."""
     boxes = []
     for valve in valves:
         more = (
@@ -109,9 +122,11 @@ def valve_cards(valves: Sequence[Mapping[str, Any]]) -> str:
         )
         if valve["verdict"] == "healthy":
             more = f"f_S at most {percent(valve['f_s_interval'][1])} % of travel"
-        boxes.append(
-            card(_KINDS.get(valve["verdict"], "open"), valve["name"], valve["verdict"], more)
-        )
+        truth = None if story is None else story.true_friction(valve["name"])
+        if truth is not None:
+            more += f"\nsimulated with f_S = {truth[0]:g} %, f_D = {truth[1]:g} %"
+        kind = _KINDS.get(valve["verdict"], "open")
+        boxes.append(card(kind, valve["name"], valve["verdict"], more))
     return f'<div class="cards">{"".join(boxes)}</div>' if boxes else ""
 
 
@@ -266,7 +281,7 @@ def _fits(story: Story) -> str:
                     percent(valve["f_d"]),
                     interval(valve["f_d_interval"]),
                     " / ".join(trusted) if f"{name}.f_s" in fit.trusted else "–",
-                    number(fit.identification.get("samples"), 6),
+                    count(fit.identification.get("samples")),
                     number(fit.identification.get("seconds"), 2),
                 ]
             )
@@ -287,15 +302,15 @@ def _fits(story: Story) -> str:
         for valve in story.record.valves
         if (truth := story.true_friction(valve)) is not None
     ]
-    said = f'<p class="note">Simulated: {text("; ".join(known))}.</p>' if known else ""
+    said = f'<p class="note">Simulated: {words("; ".join(known))}.</p>' if known else ""
     return "<h2>Every fit</h2>" + table(head, rows, texts=3) + said
 
 
 def _messages(story: Story) -> str:
     counts = messages(story.log.published, story.log.recorded)
     rows: list[list[Cell]] = [
-        [topic, number(count["published"], 9), number(count["recorded"], 9)]
-        for topic, count in counts.items()
+        [topic, count(found["published"]), count(found["recorded"])]
+        for topic, found in counts.items()
     ]
     return (
         "<h2>Messages</h2>"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.online.session import Scenario
+from stiction_ros.records.run_log import read_run
 from stiction_ros.report.figures import draw_run
 from stiction_ros.report.run_page import run_page
 from stiction_ros.report.story import Story, tell
@@ -50,7 +51,11 @@ def report_run(
     Raises:
         InputError: as :func:`stiction_ros.records.run_log.read_run`.
     """
-    story = tell(bag, scenario=scenario, name=name)
+    return write_run(tell(read_run(bag), scenario=scenario, name=name), out, seconds)
+
+
+def write_run(story: Story, out: str | Path, seconds: float | None = None) -> RunReport:
+    """Write what :func:`report_run` writes of a run that has been scored."""
     out = Path(out)
     alone = out.suffix.lower() == ".html"
     folder = out.parent if alone else out

@@ -5,20 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.processes.process import NoiseEntry
 from stiction_ros.records.record import Record
-from stiction_ros.records.run_log import RunLog, read_run
+from stiction_ros.records.run_log import RunLog
 from stiction_ros.report.scoring import Phase, Phases, phases, round_length, score
 
 _TANK_UNITS = {"C": "kg/m³", "T": "°C"}
@@ -82,18 +79,14 @@ class Story:
         return None
 
 
-def tell(bag: str | Path, *, scenario: Scenario | None = None, name: str | None = None) -> Story:
-    """Read a bag and score it.
+def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = None) -> Story:
+    """Score a run.
 
     Args:
-        bag: of the topics of a live loop.
+        log: of the run, from a bag or from :func:`log_of`.
         scenario: that was run; with it the stiction-free loop is simulated for comparison.
-        name: for headings; the scenario's or the bag's when not given.
-
-    Raises:
-        InputError: as :func:`stiction_ros.records.run_log.read_run`.
+        name: for headings; the scenario's or the record's when not given.
     """
-    log = read_run(bag)
     record = log.record
     truth, seed = simulated_plant(log)
     if scenario is not None:
@@ -148,34 +141,3 @@ def simulated_plant(log: RunLog) -> tuple[LoopModel | None, int | None]:
             model = None
         return model, seed if isinstance(seed, int) else None
     return None, None
-
-
-def step_response(
-    output: Mapping[str, Any], valve: str, samples: int, scale: float = 1.0
-) -> FloatArray:
-    """Return the response, shape (N,), of one identified output to a stem step of 1 %.
-
-    Args:
-        output: entry of ``outputs`` of ``identify --json``: a, b, delay.
-        valve: whose stem steps at sample 0.
-        samples: N.
-        scale: of the step, %.
-    """
-    a, b = output["a"], output["b"].get(valve, [])
-    delay = int(output["delay"].get(valve, 0))
-    y = np.zeros(samples)
-    for k in range(1, samples):
-        past = sum(a[i] * y[k - 1 - i] for i in range(min(len(a), k)))
-        driven = sum(b[i] for i in range(len(b)) if k - 1 - i - delay >= 0)
-        y[k] = scale * driven - past
-    return y
-
-
-def true_response(model: LoopModel, output: int, valve: int, samples: int) -> FloatArray:
-    """Return the response, shape (N,), of the true loop, linearised, to a stem step of 1 %."""
-    linear = model.process.linear(model.sample_time)
-    state, y = np.zeros(linear.order), np.zeros(samples)
-    for k in range(samples):
-        y[k] = linear.c[output] @ state
-        state = linear.a @ state + linear.b[:, valve]
-    return y
