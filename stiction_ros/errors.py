@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
+
+def is_finite(value: float) -> bool:
+    """Return whether ``value`` fits a double; whole numbers of any size may be asked."""
+    return abs(value) <= sys.float_info.max
+
 
 class InputError(ValueError):
     """Input that cannot be used.

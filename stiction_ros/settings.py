@@ -12,7 +12,7 @@ import typing
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, is_finite
 
 T = TypeVar("T")
 
@@ -118,8 +118,10 @@ def _check_one(entry: Setting, value: Any, place: str) -> Any:
     whole = entry.kind == "int"
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
         raise InputError(f"{value!r} is no {'whole ' if whole else ''}number", where=place)
-    if math.isnan(value) or not entry.low <= value <= entry.high:
+    fits = is_finite(value) or isinstance(value, float)  # lists of limits may hold inf
+    if not fits or not entry.low <= value <= entry.high:
+        shown = f"{value:g}" if fits else "the number"
         raise InputError(
-            f"{value} is out of range", where=place, fix=f"use [{entry.low:g}, {entry.high:g}]"
+            f"{shown} is out of range", where=place, fix=f"use [{entry.low:g}, {entry.high:g}]"
         )
     return value if whole else float(value)

@@ -113,7 +113,7 @@ class MpcController:
         """Take over from another controller of the same loop without a stop.
 
         The valve models are replayed over the whole past OP, which finds the stem exactly
-        after one slip; the observer is restarted on the last ``hand_over_samples`` samples
+        after one move that slips wherever the stem was before; the observer is restarted on the last ``hand_over_samples`` samples
         with these stems as input.
         """
         stems = np.array(history.op, dtype=float)
@@ -138,7 +138,7 @@ class MpcController:
             applied: the OP applied last, shape (m,), held when nothing better is found.
         """
         begin = time.perf_counter()
-        if not self._started:
+        if not self._started and np.isfinite(pv).all():
             self.start(applied, pv)
         zero = np.zeros(len(sp))
         plan: Plan | None = None
@@ -152,8 +152,9 @@ class MpcController:
         op = applied if plan is None else plan.op
         limits = self.design.limits.stem
         op = np.clip(op, limits[:, 0], limits[:, 1])
-        self._move_stems(op)
-        self.observer.predict(self.stem, dv)
+        if self._started:
+            self._move_stems(op)
+            self.observer.predict(self.stem, dv)
         seconds = time.perf_counter() - begin
         return StepResult(status, reason, self.mode, op, plan, miss, seconds)
 

@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.processes import LinearModel
 
-SLACK_WEIGHT = 1e4  # on slack², relative to the mean curvature of the inputs
+SLACK_WEIGHT = 1e4  # of slack², relative to what the whole horizon gains per squared PV
 ITERATION_LIMIT = 2000
 
 
@@ -132,9 +132,12 @@ class HorizonQp:
         hessian = np.zeros((self.size + slacks, self.size + slacks))
         core = shape.T @ cost.hessian @ shape
         hessian[: self.size, : self.size] = core
-        slack_weight = SLACK_WEIGHT * float(np.trace(core)) / max(self.size, 1)
-        hessian[self.size :, self.size :] = slack_weight * np.eye(slacks)
         horizon = cost.horizon
+        # The same for every pattern of moves, or their costs would not compare.
+        reach = (cost.forced_output[:, self._bounded] ** 2).sum(axis=(0, 2))
+        scale = float(np.trace(cost.hessian)) / np.maximum(reach, 1e-300)
+        self._slack_weight = SLACK_WEIGHT * horizon * scale
+        hessian[self.size :, self.size :] = np.diag(self._slack_weight)
         blocks = [np.hstack([rows, np.zeros((len(rows), slacks))])]
         self._output_rows = cost.forced_output[:, self._bounded] @ shape  # (N, s, r)
         for sign in (1.0, -1.0):
@@ -183,10 +186,7 @@ class HorizonQp:
             return None
         self._fill_bounds(state, offset, lower, upper, target_pv)
         if self.size == 0:
-            variables = np.zeros(0)
-            return HorizonSolution(
-                offset.reshape(self.cost.horizon, -1), base, np.zeros(len(target_pv)), variables
-            )
+            return self._only_plan(state, offset, base, target_pv)
         flag = self._load(linear)
         if flag < 0:
             return None
@@ -199,6 +199,18 @@ class HorizonQp:
         slack[self._bounded] = solution[self.size :]
         plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
         return HorizonSolution(plan, float(value) + base, slack, variables)
+
+    def _only_plan(
+        self, state: FloatArray, offset: FloatArray, cost: float, target_pv: FloatArray
+    ) -> HorizonSolution:
+        """Return the plan of a pattern that leaves nothing to decide."""
+        pv = (self.cost.outputs(state, offset) + target_pv)[:, self._bounded]
+        beyond = np.maximum(pv - self._output_bounds[:, 1], self._output_bounds[:, 0] - pv)
+        slack = np.zeros(len(target_pv))
+        slack[self._bounded] = np.maximum(beyond, 0.0).max(axis=0, initial=0.0)
+        cost += 0.5 * float(self._slack_weight @ slack[self._bounded] ** 2)
+        plan = offset.reshape(self.cost.horizon, -1)
+        return HorizonSolution(plan, cost, slack, np.zeros(0))
 
     def _fill_bounds(
         self,

@@ -13,6 +13,11 @@ from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
 
+# With more valves than outputs the curvature is as good as singular: proximal steps then
+# find the same optimum where one plain solve gives up.
+PROXIMAL = 1e-5
+
+
 @dataclasses.dataclass(frozen=True)
 class Target:
     """A steady state of the model.
@@ -83,6 +88,7 @@ class TargetSelector:
                 high,
                 low,
                 np.zeros(len(low), dtype=np.int32),
+                eps_prox=PROXIMAL,
             )
             if flag < 1:
                 return None

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, is_finite
 
 FloatArray = NDArray[np.float64]
 Memory = float | tuple[float, ...]
@@ -71,8 +71,8 @@ class Behaviour(ABC):
             value = getattr(self, entry.attribute)
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise InputError(f"{value!r} is no number", where=entry.key)
-            if not math.isfinite(value):
-                raise InputError(f"{value} is not finite", where=entry.key)
+            if not is_finite(value):
+                raise InputError("the value is not finite", where=entry.key)
             if not entry.low <= value <= entry.high:
                 raise InputError(
                     f"{value:g} lies outside [{entry.low:g}, {entry.high:g}] {entry.unit}",

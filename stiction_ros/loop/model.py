@@ -105,6 +105,10 @@ class LoopModel:
         section = top.section("process")
         point = top.section("operating_point", {})
         process = read_process(section, point, tags, sample_time)
+        if len(set(process.outputs)) != len(process.outputs):
+            raise InputError(
+                "two outputs have one name", where=section.at("outputs"), fix="rename one"
+            )
         op0 = process.linear(sample_time).stem0
         pv0 = process.linear(sample_time).pv0
         point.finish()
@@ -120,7 +124,7 @@ class LoopModel:
         if "controller" in top:
             controller = _read_pi(top.section("controller"))
         provenance = tuple(dict(entry.values) for entry in top.sections("provenance", []))
-        top.raw("valid_from", 0)
+        top.integer("valid_from", 0)
         top.finish()
         return cls(
             name,

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, is_finite
 
 _REQUIRED: Any = object()
 
@@ -37,6 +37,8 @@ def parse_yaml(text: str, where: str) -> Any:
         line = f" in line {mark.line + 1}" if mark is not None else ""
         problem = getattr(error, "problem", None) or "cannot be parsed"
         raise InputError(f"no valid YAML{line} ({problem})", where=where) from None
+    except (ValueError, RecursionError) as error:  # a date that does not exist, 1000 brackets
+        raise InputError(f"no valid YAML ({error})", where=where) from None
 
 
 class Section:
@@ -163,10 +165,19 @@ class Section:
 
 def _number(value: Any, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{_show(value)} is no number", where=where)
-    if not math.isfinite(value):
-        raise InputError(f"{value} is not finite", where=where, fix="give a finite number")
+        raise InputError(f"{_show(value)} is no number", where=where, fix=_as_number(value))
+    if not is_finite(value):
+        raise InputError(f"{_show(value)} is not finite", where=where, fix="give a finite number")
     return float(value)
+
+
+def _as_number(value: Any) -> str:
+    """Return how to write a text such as 1e-3, which YAML does not take for a number."""
+    try:
+        text = repr(float(value)) if isinstance(value, str) else ""
+    except ValueError:
+        return ""
+    return f"write {text if '.' in text else text.replace('e', '.0e')}" if text else ""
 
 
 def _show(value: Any) -> str:

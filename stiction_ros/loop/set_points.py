@@ -65,7 +65,8 @@ class SetPoints:
 
     def at(self, time: float) -> FloatArray:
         """Return the set-points, shape (p,), in force at ``time`` seconds."""
+        time += 1e-9  # a clock that rounds down must not shift a move, nor the start of a round
         if np.isfinite(self.repeat):
             time = time % self.repeat
-        row = int(np.searchsorted(self.times, time + 1e-9, side="right")) - 1
+        row = int(np.searchsorted(self.times, time, side="right")) - 1
         return np.asarray(self.values[max(row, 0)])

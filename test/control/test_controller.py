@@ -1,0 +1,255 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import first_order, kalman, limits_for, models, stable_model, weights_for
+
+from stiction_ros.control import ControlDesign, ControlMode, History, MpcController, StepStatus
+from stiction_ros.effects import HeStiction
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+NO_DV = np.zeros(0)
+FRICTION = HeStiction(8.0, 1.0)
+
+
+def design_for(model: LinearModel, **options: float) -> ControlDesign:
+    p = len(model.pv0)
+    return ControlDesign(
+        model,
+        limits_for(model, **options),
+        weights_for(model, 15),
+        weights_for(model, 15, 0.01),
+        np.ones(p),
+        kalman(p),
+    )
+
+
+class Loop:
+    """A plant of ``model`` with sticky valves under ``controller``."""
+
+    def __init__(
+        self,
+        model: LinearModel,
+        controller: MpcController,
+        friction: HeStiction | None = None,
+        disturbance: float = 0.0,
+    ) -> None:
+        self.model, self.controller, self.friction = model, controller, friction
+        self.disturbance = disturbance
+        self.x = np.zeros(model.order)
+        self.stem, self.applied = np.array(model.stem0), np.array(model.stem0)
+        self.op: list[np.ndarray] = []
+        self.pv: list[np.ndarray] = []
+        self.stems: list[np.ndarray] = []
+
+    def run(self, samples: int, sp: np.ndarray) -> np.ndarray:
+        """Advance and return the last output."""
+        for _ in range(samples):
+            pv = self.model.c @ self.x + self.model.pv0 + self.disturbance
+            result = self.controller.step(pv, sp, NO_DV, self.applied)
+            self.applied = result.op
+            if self.friction is None:
+                self.stem = result.op.copy()
+            else:
+                moved = [
+                    self.friction.step(float(s), float(u))[1]
+                    for s, u in zip(self.stem, result.op, strict=True)
+                ]
+                self.stem = np.array(moved)
+            self.x = self.model.a @ self.x + self.model.b @ (self.stem - self.model.stem0)
+            self.x = self.x + self.model.constant
+            self.op.append(result.op)
+            self.pv.append(pv)
+            self.stems.append(self.stem)
+        return self.model.c @ self.x + self.model.pv0 + self.disturbance
+
+    @property
+    def history(self) -> History:
+        return History(np.array(self.op), np.array(self.pv), np.zeros((len(self.op), 0)))
+
+
+def test_a_wrong_model_and_a_disturbance_leave_no_offset() -> None:
+    controller = MpcController(design_for(first_order(gain=0.5)), ControlMode.UNAWARE)
+    loop = Loop(first_order(gain=0.8, pole=0.85), controller, disturbance=-3.0)
+    assert loop.run(400, np.array([24.0])) == pytest.approx([24.0], abs=1e-6)
+
+
+def test_a_sticky_valve_that_is_known_lets_the_loop_come_to_rest() -> None:
+    model = first_order()
+    controller = MpcController(design_for(model), ControlMode.EMBEDDING, (FRICTION,))
+    loop = Loop(model, controller, FRICTION)
+    final = loop.run(300, np.array([24.0]))
+    assert abs(final[0] - 24.0) < 0.5 * FRICTION.static_friction * 0.5
+    assert np.ptp(np.array(loop.op[-50:])) == 0.0
+
+
+def test_the_stem_estimate_is_the_true_stem() -> None:
+    model = first_order()
+    controller = MpcController(design_for(model), ControlMode.EMBEDDING, (FRICTION,))
+    loop = Loop(model, controller, FRICTION)
+    for sp in (24.0, 15.0, 22.0):
+        loop.run(30, np.array([sp]))
+        assert controller.stem == pytest.approx(loop.stem, abs=1e-9)
+
+
+@pytest.mark.parametrize("mode", [ControlMode.EMBEDDING, ControlMode.INVERSION])
+def test_taking_over_finds_the_true_stem_after_one_slip_from_wherever_it_was(
+    mode: ControlMode,
+) -> None:
+    model = first_order()
+    unaware = MpcController(design_for(model), ControlMode.UNAWARE)
+    loop = Loop(model, unaware, FRICTION)
+    loop.stem = np.array([44.0])  # the controller's 50 % is not where the stem is
+    loop.run(80, np.array([26.0]))
+    loop.run(80, np.array([12.0]))
+    op = np.array(loop.op)[:, 0]
+    reach = op.max() - op.min()
+    assert reach > 2.0 * FRICTION.static_friction + 14.0, "no move slips from every start"
+    successor = MpcController(design_for(model), mode, (FRICTION,))
+    successor.take_over(loop.history)
+    assert successor.stem == pytest.approx(loop.stem, abs=1e-12)
+
+
+def test_taking_over_goes_on_without_a_step_in_the_estimate() -> None:
+    model = first_order()
+    first = MpcController(design_for(model), ControlMode.UNAWARE)
+    loop = Loop(model, first)
+    loop.run(300, np.array([26.0]))
+    second = MpcController(design_for(model), ControlMode.UNAWARE)
+    second.take_over(loop.history)
+    assert second.observer.state == pytest.approx(first.observer.state, abs=1e-9)
+    assert second.observer.disturbance == pytest.approx(first.observer.disturbance, abs=1e-9)
+
+
+def test_taking_over_replays_only_the_last_samples_into_the_observer() -> None:
+    model = first_order()
+    design = dataclasses.replace(design_for(model), hand_over_samples=5)
+    loop = Loop(model, MpcController(design, ControlMode.UNAWARE))
+    loop.run(40, np.array([26.0]))
+    history = loop.history
+    spoilt = History(history.op, history.pv.copy(), history.dv)
+    spoilt.pv[:30] = 1e6
+    successor = MpcController(design, ControlMode.UNAWARE)
+    successor.take_over(spoilt)
+    assert np.abs(successor.observer.disturbance).max() < 100.0
+
+
+def test_without_friction_the_modes_that_know_of_it_refuse_or_do_the_same() -> None:
+    model = first_order()
+    with pytest.raises(InputError):
+        MpcController(design_for(model), ControlMode.EMBEDDING, (None,))
+    design = design_for(model)
+    runs = []
+    for mode in (ControlMode.UNAWARE, ControlMode.INVERSION):
+        loop = Loop(model, MpcController(design, mode, (None,)))
+        loop.run(50, np.array([24.0]))
+        runs.append(np.array(loop.op))
+    assert np.array_equal(*runs)
+
+
+def test_hold_keeps_what_was_applied() -> None:
+    controller = MpcController(design_for(first_order()), ControlMode.HOLD)
+    result = controller.step(np.array([10.0]), np.array([30.0]), NO_DV, np.array([47.0]))
+    assert (result.op.tolist(), result.status, result.plan) == ([47.0], StepStatus.HELD, None)
+    assert result.mode is ControlMode.HOLD
+
+
+def test_an_unreachable_set_point_is_a_status_with_its_miss() -> None:
+    controller = MpcController(design_for(first_order()), ControlMode.UNAWARE)
+    result = controller.step(np.array([20.0]), np.array([60.0]), NO_DV, np.array([50.0]))
+    assert result.status is StepStatus.UNREACHABLE
+    assert result.miss == pytest.approx([15.0])
+    assert "reach" in result.reason
+
+
+def test_no_feasible_plan_is_a_value() -> None:
+    controller = MpcController(design_for(first_order()), ControlMode.UNAWARE)
+    controller.step(np.array([20.0]), np.array([20.0]), NO_DV, np.array([50.0]))
+    controller._formulation = type("Never", (), {"plan": lambda *_: None})()  # type: ignore[assignment]
+    result = controller.step(np.array([20.0]), np.array([20.0]), NO_DV, np.array([47.0]))
+    assert (result.status, result.op.tolist()) == (StepStatus.HELD, [47.0])
+    assert result.reason == "no plan found"
+
+
+@pytest.mark.parametrize("mode", list(ControlMode))
+@pytest.mark.parametrize("which", ["pv", "sp"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_value_that_is_not_finite_holds_and_is_forgotten(
+    mode: ControlMode, which: str, bad: float
+) -> None:
+    model = first_order()
+    controller = MpcController(design_for(model), mode, (FRICTION,))
+    good, wrong = np.array([21.0]), np.array([bad])
+    for first in (True, False):  # also as the first sample of all
+        given_values = {"pv": good, "sp": good} | {which: wrong}
+        result = controller.step(given_values["pv"], given_values["sp"], NO_DV, np.array([50.0]))
+        assert (result.status, result.op.tolist()) == (StepStatus.HELD, [50.0])
+        after = controller.step(good, good, NO_DV, np.array([50.0]))
+        expected = StepStatus.HELD if mode is ControlMode.HOLD else StepStatus.SOLVED
+        assert after.status is expected, first
+        assert np.isfinite(controller.observer.state).all()
+        assert np.isfinite(controller.observer.disturbance).all()
+
+
+@given(
+    models(),
+    st.sampled_from(list(ControlMode)),
+    st.integers(0, 1000),
+    st.floats(0.5, 20.0),
+    st.sampled_from([np.inf, 2.0]),
+)
+@settings(max_examples=60, deadline=None)
+def test_no_input_raises_or_leaves_the_limits(
+    model: LinearModel, mode: ControlMode, seed: int, static: float, move: float
+) -> None:
+    random = np.random.default_rng(seed)
+    p, m = len(model.pv0), len(model.stem0)
+    known = [HeStiction(static, 0.3 * static) if random.random() < 0.7 else None for _ in range(m)]
+    if mode is ControlMode.EMBEDDING and not any(known):
+        known[0] = HeStiction(static, 0.3 * static)
+    design = design_for(model, low=10.0, high=90.0, move=move)
+    design = dataclasses.replace(design, unaware=weights_for(model, 4))
+    design = dataclasses.replace(design, embedding=weights_for(model, 9))
+    controller = MpcController(design, mode, known)
+    applied = np.full(m, 50.0)
+    for _ in range(12):
+        pv, sp = (10.0 ** random.uniform(-1, 6) * random.normal(size=p) for _ in range(2))
+        if random.random() < 0.3:
+            pv[random.integers(p)] = random.choice([np.nan, np.inf, -np.inf])
+        result = controller.step(pv, sp, NO_DV, applied)
+        assert np.all((result.op >= 10.0) & (result.op <= 90.0))
+        assert result.mode is mode
+        if result.status is StepStatus.HELD:
+            assert result.plan is None
+            assert result.reason
+            assert np.array_equal(result.op, np.clip(applied, 10.0, 90.0))
+        else:
+            assert result.plan is not None
+            assert np.isfinite(pv).all()
+            assert (result.status is StepStatus.UNREACHABLE) == bool(result.miss.any())
+        applied = result.op
+
+
+def test_the_same_inputs_give_the_same_outputs_bit_for_bit() -> None:
+    model = stable_model(3, 3, 2, 2)
+    runs = []
+    for _ in range(2):
+        controller = MpcController(design_for(model), ControlMode.EMBEDDING, (FRICTION, None))
+        loop = Loop(model, controller, FRICTION)
+        for sp in ([1.0, 0.0], [-2.0, 3.0]):
+            loop.run(40, np.array(sp))
+        runs.append(np.array(loop.op))
+    assert np.array_equal(*runs)
+
+
+def test_rate_limits_hold_from_sample_to_sample() -> None:
+    model = first_order()
+    loop = Loop(model, MpcController(design_for(model, move=1.5), ControlMode.UNAWARE))
+    loop.run(30, np.array([40.0]))
+    op = np.array(loop.op)[:, 0]
+    assert np.abs(np.diff(op, prepend=50.0)).max() <= 1.5 + 1e-9

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import equation_19a, models, outputs_of, target_at, weights_for
+
+from stiction_ros.control.horizon import HorizonCost
+from stiction_ros.processes import LinearModel
+
+
+@given(models(), st.integers(1, 8), st.integers(0, 1000))
+@settings(deadline=None)
+def test_the_condensed_cost_is_19a(model: LinearModel, horizon: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    weights = weights_for(model, horizon, seed=seed)
+    m = len(model.stem0)
+    target = target_at(model, random.uniform(20.0, 80.0, m))
+    state = target.state + random.normal(size=model.order)
+    last = random.uniform(0.0, 100.0, m)
+    stems = random.uniform(0.0, 100.0, (horizon, m))
+    cost, z, v0 = HorizonCost(model, weights), state - target.state, last - target.stem
+    v = (stems - target.stem).reshape(-1)
+    condensed = 0.5 * v @ cost.hessian @ v + v @ cost.linear(z, v0) + cost.constant(z, v0)
+    literal = equation_19a(model, weights, state, last, target, stems)
+    assert condensed == pytest.approx(literal, rel=1e-9, abs=1e-6)
+
+
+@given(models(), st.integers(1, 8), st.integers(0, 1000))
+@settings(deadline=None)
+def test_condensed_outputs_are_simulated_ones(model: LinearModel, horizon: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    m, p = len(model.stem0), len(model.pv0)
+    target = target_at(model, random.uniform(20.0, 80.0, m))
+    state = target.state + random.normal(size=model.order)
+    stems = random.uniform(0.0, 100.0, (horizon, m))
+    cost = HorizonCost(model, weights_for(model, horizon))
+    condensed = cost.outputs(state - target.state, stems - target.stem) + target.pv
+    literal = outputs_of(model, state, stems, np.zeros(p))[1:]
+    assert condensed == pytest.approx(literal, abs=1e-6)
+
+
+def test_the_hessian_is_symmetric_and_positive() -> None:
+    from loops import stable_model
+
+    hessian = HorizonCost(model := stable_model(2, 4, 2, 2), weights_for(model, 20)).hessian
+    assert np.array_equal(hessian, hessian.T)
+    assert np.linalg.eigvalsh(hessian).min() > 0.0

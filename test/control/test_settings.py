@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stiction_ros.config_files import find_config
+from stiction_ros.control import ControlSettings
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+
+TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
+
+
+def test_weights_are_those_of_19a_on_the_outputs() -> None:
+    settings = ControlSettings(
+        output_weights=(100.0, 1.0), state_weight=0.01, terminal_weight=5.0, move_weights=(0.1, 0.2)
+    )
+    design = settings.design(TANK)
+    c = TANK.process.linear(60.0).c
+    q = c.T @ np.diag([100.0, 1.0]) @ c
+    assert design.unaware.state == pytest.approx(q + 0.01 * np.eye(5))
+    assert design.unaware.terminal == pytest.approx(q + 5.0 * np.eye(5))
+    assert design.unaware.move.tolist() == [[0.1, 0.0], [0.0, 0.2]]
+
+
+def test_a_single_entry_stands_for_all() -> None:
+    design = ControlSettings(embedding_move_weights=(0.3,), op_rate_limits=(7.0,)).design(TANK)
+    assert design.embedding.move.tolist() == [[0.3, 0.0], [0.0, 0.3]]
+    assert design.limits.move.tolist() == [7.0, 7.0]
+
+
+def test_limits_come_from_the_valves() -> None:
+    assert ControlSettings().design(TANK).limits.stem.tolist() == [[0.0, 100.0], [0.0, 100.0]]
+
+
+LISTS = (
+    "output_weights",
+    "move_weights",
+    "embedding_move_weights",
+    "target_weights",
+    "op_rate_limits",
+    "pv_low",
+    "pv_high",
+    "disturbance_noise",
+    "measurement_noise",
+)
+
+
+@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize("values", [(), (1.0, 1.0, 1.0)])
+def test_a_list_of_the_wrong_length_is_refused_by_name(name: str, values: Any) -> None:
+    with pytest.raises(InputError) as caught:
+        ControlSettings(**{name: values}).design(TANK)
+    assert (caught.value.where, bool(caught.value.fix)) == (name, True)
+
+
+def test_crossed_output_bounds_are_refused() -> None:
+    with pytest.raises(InputError, match="pv_low"):
+        ControlSettings(pv_low=(5.0,), pv_high=(5.0,)).design(TANK)

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from stiction_ros.effects import HeStiction, SmoothedHeStiction
+from stiction_ros.effects.behaviour import Symbolic
+
+percent = st.floats(-100.0, 100.0)
+frictions = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 1.0)).map(lambda p: (p[0], p[0] * p[1]))
+smoothings = st.floats(0.1, 1e5)
+
+
+def equations_5_and_6(u: float, stem: float, f_s: float, f_d: float, tau: float) -> float:
+    e = u - stem
+    eta_1 = 0.5 * math.tanh(tau * (e + f_s)) + 0.5 * math.tanh(tau * (-e + f_s))
+    eta_2 = 0.5 * math.tanh(-tau * (e + f_s)) + 0.5 * math.tanh(tau * (-e + f_s))
+    return eta_1 * stem + (1.0 - eta_1) * u + eta_2 * f_d
+
+
+@given(frictions, smoothings, percent, percent)
+def test_step_is_equations_5_and_6(
+    friction: tuple[float, float], tau: float, stem: float, op: float
+) -> None:
+    expected = equations_5_and_6(op, stem, *friction, tau)
+    assert SmoothedHeStiction(*friction, tau).step(stem, op)[1] == pytest.approx(
+        expected, abs=1e-11
+    )
+
+
+@given(frictions, smoothings, percent, percent)
+def test_the_casadi_expression_is_the_step(
+    friction: tuple[float, float], tau: float, stem: float, op: float
+) -> None:
+    law = SmoothedHeStiction(*friction, tau)
+    x, u = casadi.SX.sym("x"), casadi.SX.sym("u")
+    value = float(casadi.Function("next", [x, u], [law.expression(x, u)])(stem, op))
+    assert value == pytest.approx(law.step(stem, op)[1], abs=1e-11)
+
+
+@given(frictions, percent, percent)
+def test_the_distance_to_he_falls_as_tau_grows(
+    friction: tuple[float, float], stem: float, op: float
+) -> None:
+    assume(abs(abs(op - stem) - friction[0]) > 0.01)
+    hard = HeStiction(*friction).step(stem, op)[1]
+    misses = [
+        abs(SmoothedHeStiction(*friction, tau).step(stem, op)[1] - hard)
+        for tau in (1.0, 10.0, 100.0, 1e4)
+    ]
+    assert all(later <= sooner + 1e-9 for sooner, later in itertools.pairwise(misses))
+    assert misses[-1] < 1e-9
+
+
+def test_at_the_default_tau_the_signature_is_that_of_he() -> None:
+    op = 50.0 + 12.0 * np.sin(np.arange(400) / 17.0)
+    smooth = SmoothedHeStiction(5.0, 2.0).simulate(op)
+    assert np.abs(smooth - HeStiction(5.0, 2.0).simulate(op)).max() < 1e-9
+
+
+def test_it_is_symbolic_and_he_is_not() -> None:
+    assert isinstance(SmoothedHeStiction(5.0, 2.0), Symbolic)
+    assert not isinstance(HeStiction(5.0, 2.0), Symbolic)
