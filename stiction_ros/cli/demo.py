@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.cli.scenarios import SCENARIOS, find, node_parameters
@@ -62,7 +61,7 @@ def _run_scenario(
     scenario: Scenario, directory: Path, options: argparse.Namespace, show: Bar
 ) -> bool:
     """Run one scenario and print its table; return whether it succeeded."""
-    from stiction_ros.report import report_scenario
+    from stiction_ros.report.run_report import report_run
 
     name = scenario.name
     nodes = node_parameters(scenario.path, directory)
@@ -85,11 +84,10 @@ def _run_scenario(
         return False
     seconds = time.monotonic() - begin
     show(0.92, f"{name}: reporting")
-    summary = report_scenario(directory / "bag", directory, scenario, seed, seconds)
-    write_json(str(directory / "summary.json"), summary)
+    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds)
     show(1.0)
-    _print(summary, directory)
-    return bool(summary["status"] == "ok")
+    _print(report.summary, directory)
+    return bool(report.summary["status"] == "ok")
 
 
 def _print(summary: dict[str, Any], directory: Path) -> None:

@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json != "-":
         _print(document, found)
     if options.out is not None:
-        from stiction_ros.report import report_record
+        from stiction_ros.report.record_report import report_record
 
         directory = Path(options.out)
         try:

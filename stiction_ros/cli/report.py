@@ -26,12 +26,13 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    from stiction_ros.report import report_record, report_run
+    from stiction_ros.report.record_report import report_record
+    from stiction_ros.report.run_report import report_run
 
     directory = Path(options.out)
     directory.mkdir(parents=True, exist_ok=True)
     if is_bag(options.record):
-        print(report_run(options.record, directory))
+        print(report_run(options.record, directory).page)
         return 0
     record = open_record(options.record, columns(options))
     print(report_record(record, identify(record, IdentificationOptions()), directory))
