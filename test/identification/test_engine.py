@@ -3,7 +3,7 @@
 import dataclasses
 import json
 
-import loops
+import simulated_loops as loops
 import numpy as np
 import pytest
 
