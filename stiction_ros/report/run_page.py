@@ -127,7 +127,7 @@ def _later_changes(story: Story, swap: ModeChange) -> list[str]:
         at, mode = duration(story.log.seconds(change.stamp)), change.mode
         lines.append(f"After {at} it changed to {mode}: {change.reason}.")
     if renewed:
-        times = "once" if renewed == 1 else f"{renewed} times"
+        times = {1: "once", 2: "twice"}.get(renewed, f"{renewed} times")
         lines.append(f"Since the swap it has taken over new friction values {times}.")
     return lines
 
