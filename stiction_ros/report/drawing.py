@@ -136,7 +136,7 @@ def legend(axis: Any, columns: int = 6) -> None:
 
 
 def mark_swap(axis: Any, at: float | None, text: str = "") -> None:
-    """Draw the swap as a vertical line, named on top when there is a text."""
+    """Draw the swap as a vertical line, named above the panel when there is a text."""
     if at is None:
         return
     axis.axvline(at, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
@@ -145,12 +145,12 @@ def mark_swap(axis: Any, at: float | None, text: str = "") -> None:
             text,
             (at, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(4, -3),
+            xytext=(0, 3),
             textcoords="offset points",
-            va="top",
-            fontsize=8.5,
+            ha="center",
+            va="bottom",
+            fontsize=9,
             color=INK,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
         )
 
 

@@ -115,7 +115,7 @@ def estimates(story: Story) -> Drawing | None:
             axis.set_ylabel(f"${symbol}$ (%)")
             known = [] if truth is None else [truth[column]]
             axis.set_ylim(*_friction_limits(np.concatenate([value, ends.ravel(), known])))
-            axis.set_xlim(0.0, time(record.time[-1]))
+            axis.set_xlim(0.0, 1.015 * time(record.time[-1]))
             if row == len(record.valves) - 1:
                 axis.set_xlabel(time.label)
     handles, labels = axes[0, 0].get_legend_handles_labels()
@@ -187,7 +187,7 @@ def rounds(story: Story) -> Drawing | None:
         for label, colour, values in parts:
             axis.plot(at, values[:, j], color=colour, linewidth=1.0, label=label)
         # Set-point moves make errors far larger than the cycle: they may leave the panel.
-        reach = 1.3 * float(np.quantile(np.abs(parts[0][2][:, j]), 0.96))
+        reach = 1.3 * float(np.quantile(np.abs(parts[0][2][:, j]), 0.96)) or 1.0
         axis.set_ylim(-reach, reach)
         axis.set_title(name)
         axis.set_ylabel(f"PV − SP{_unit(story, name)}")
@@ -244,7 +244,9 @@ def _draw_modes(axis: Any, story: Story, time: TimeAxis) -> None:
             axis.axvline(time(at), color=GREY, linewidth=1.2)
         else:
             stretches.append((change.mode, at))
-    ends = [start for _, start in stretches[1:]] + [end]
+    if not stretches:
+        axis.text(0.0, 0.46, " not recorded", va="center", fontsize=9, color=GREY)
+    ends = [*(start for _, start in stretches), end][1:]
     for (mode, start), stop in zip(stretches, ends, strict=True):
         axis.axvspan(time(start), time(stop), color=MODE_COLOURS.get(mode, "#EEEEEE"), zorder=0)
         if stop - start > 0.06 * end:

@@ -50,6 +50,7 @@ th, td { padding: 6px 14px 6px 0; border-bottom: 1px solid var(--line); text-ali
   vertical-align: baseline; white-space: nowrap; }
 th { color: var(--soft); font-weight: 600; border-bottom-width: 2px; }
 td.text, th.text { text-align: left; }
+td.text { white-space: normal; }
 figure { margin: 26px 0; }
 figure img { display: block; width: 100%; height: auto; background: #ffffff;
   border: 1px solid var(--line); border-radius: 8px; padding: 10px; }

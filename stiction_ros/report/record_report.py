@@ -161,6 +161,7 @@ def _curves(record: Record, identification: Identification) -> Drawing:
         axis.set_title(name)
         axis.set_xlabel("OP u (%)")
         axis.set_aspect("equal", adjustable="box")
+        axis.locator_params(nbins=6)
         legend(axis)
     axes[0, 0].set_ylabel("stem χ̂ (%)")
     caption = (

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stiction_ros import __version__
+from stiction_ros.records.run_log import ModeChange
 from stiction_ros.report.drawing import Drawing
 from stiction_ros.report.page import (
     Cell,
@@ -105,10 +106,29 @@ def findings(story: Story) -> list[str]:
             f"After {duration(story.swap_time)} the controller changed from unaware to "
             f"{swap.mode} between two samples{with_known}."
         )
-    if found.cycle is not None and found.status is not PhaseStatus.NO_CYCLE:
+        lines += _later_changes(story, swap)
+    elif story.log.modes:
+        lines.append(f"The controller stayed {story.log.modes[-1].mode} throughout.")
+    if found.cycle is not None and found.status is PhaseStatus.OK:
         period = duration(found.cycle.period * story.record.sample_time)
-        if found.status is PhaseStatus.OK:
-            lines.append(f"Before, the loop cycled with a period of {period}. {_changes(story)}")
+        lines.append(f"Before, the loop cycled with a period of {period}. {_changes(story)}")
+    return lines
+
+
+def _later_changes(story: Story, swap: ModeChange) -> list[str]:
+    """Tell of changes of mode after the swap, such as a roll-back, and of new friction."""
+    lines, mode, renewed = [], swap.mode, 0
+    for change in story.log.modes:
+        if change.stamp <= swap.stamp:
+            continue
+        if change.mode == mode:
+            renewed += 1
+            continue
+        at, mode = duration(story.log.seconds(change.stamp)), change.mode
+        lines.append(f"After {at} it changed to {mode}: {change.reason}.")
+    if renewed:
+        times = {1: "once", 2: "twice"}.get(renewed, f"{renewed} times")
+        lines.append(f"Since the swap it has taken over new friction values {times}.")
     return lines
 
 
@@ -173,7 +193,8 @@ def process_table(outputs: Sequence[Mapping[str, Any]], sample_time: float) -> s
 
 def _trouble(story: Story) -> str:
     found = story.phases
-    if found.status is PhaseStatus.OK:
+    sticky = any(v["verdict"] == "sticky" for v in story.identified.get("valves", []))
+    if found.status is PhaseStatus.OK or (story.log.swap is None and not sticky):
         return ""
     return f'<p class="warn">No comparison of before and after: {text(found.reason)}.</p>'
 
@@ -308,6 +329,8 @@ def _fits(story: Story) -> str:
 
 def _messages(story: Story) -> str:
     counts = messages(story.log.published, story.log.recorded)
+    if not counts:
+        return ""
     rows: list[list[Cell]] = [
         [topic, count(found["published"]), count(found["recorded"])]
         for topic, found in counts.items()
