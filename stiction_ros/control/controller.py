@@ -113,8 +113,8 @@ class MpcController:
         """Take over from another controller of the same loop without a stop.
 
         The valve models are replayed over the whole past OP, which finds the stem exactly
-        after one move that slips wherever the stem was before; the observer is restarted on the last ``hand_over_samples`` samples
-        with these stems as input.
+        after one move that slips wherever the stem was before; the observer is restarted on
+        the last ``hand_over_samples`` samples with these stems as input.
         """
         stems = np.array(history.op, dtype=float)
         for j, friction in enumerate(self.frictions):

@@ -12,7 +12,6 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
-
 # With more valves than outputs the curvature is as good as singular: proximal steps then
 # find the same optimum where one plain solve gives up.
 PROXIMAL = 1e-5
