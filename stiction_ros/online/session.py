@@ -21,9 +21,20 @@ from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, 
 from stiction_ros.loop.reading import Section, load_yaml
 from stiction_ros.online.live_controller import LiveController, LiveControllerSettings, ModeChange
 from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
+from stiction_ros.records import Record
 
-CONTROLLER_NODE_KEYS = ("model", "pace", "wait_for", "fit_timeout", "autostart")
-ESTIMATOR_NODE_KEYS = ("loop", "wait_for", "autostart", "sample_time")
+# Parameters that belong to the nodes themselves: the core only knows their names.
+_EVERY_NODE = ("autostart", "wait_for")
+PLANT_NODE_KEYS = (
+    *_EVERY_NODE,
+    *("model", "set_points", "seed", "samples", "pace", "speed", "start_time"),
+)
+CONTROLLER_NODE_KEYS = (
+    *_EVERY_NODE,
+    *("model", "pace", "sp_source", "fit_timeout", "prediction_points"),
+)
+ESTIMATOR_NODE_KEYS = (*_EVERY_NODE, "loop", "sample_time")
+RECORDER_NODE_KEYS = (*_EVERY_NODE, "directory", "topics", "compression")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,16 +81,34 @@ class Scenario:
         controlled = Section(nodes["controller"], f"{path}: controller")
         model = LoopModel.load(path.parent / plant.text("model"))
         points = SetPoints.load(path.parent / plant.text("set_points"), model.outputs)
+        for name, known in (("plant", PLANT_NODE_KEYS), ("recorder", RECORDER_NODE_KEYS)):
+            for key in nodes.get(name, {}):
+                if key not in known:
+                    raise InputError(
+                        f"unknown key {key!r}",
+                        where=f"{path}: {name}",
+                        fix=f"known keys: {', '.join(known)}",
+                    )
+        process = LoopModel.load(path.parent / controlled.text("model"))
+        controller = _settings(
+            LiveControllerSettings, nodes["controller"], CONTROLLER_NODE_KEYS, path
+        )
+        estimator = _settings(EstimatorSettings, nodes["estimator"], ESTIMATOR_NODE_KEYS, path)
+        try:
+            controller.design(process)
+            estimator.options()
+        except InputError as error:
+            raise error.within(str(path)) from None
         return cls(
             path.stem.split(".")[0],
             nodes,
             model,
-            LoopModel.load(path.parent / controlled.text("model")),
+            process,
             points,
             plant.integer("seed", 0),
             plant.integer("samples", low=1),
-            _settings(LiveControllerSettings, nodes["controller"], CONTROLLER_NODE_KEYS, path),
-            _settings(EstimatorSettings, nodes["estimator"], ESTIMATOR_NODE_KEYS, path),
+            controller,
+            estimator,
         )
 
 
@@ -132,13 +161,19 @@ class _Loop:
         if self.estimator is not None:
             record = self.estimator.add(self._sample, result.op, measurement.pv)
             if record is not None:
-                found = fit(record, self.estimator.settings.options())
-                update = self.estimator.conclude(self._sample, found)
-                self.fits.append(update)
-                if update.loop_model is not None:
-                    self.controller.offer(update.loop_model, self._sample + self._latency)
+                self._fit(self.estimator, record)
         self._sample += 1
         return result.op
+
+    def _fit(self, estimator: LiveEstimator, record: Record) -> None:
+        try:
+            found = fit(record, estimator.settings.options())
+        except InputError:
+            return  # a window that cannot be used changes nothing, as in the node
+        update = estimator.conclude(self._sample, found)
+        self.fits.append(update)
+        if update.loop_model is not None:
+            self.controller.offer(update.loop_model, self._sample + self._latency)
 
 
 def run_live(
