@@ -114,8 +114,7 @@ class MpcController:
 
         The valve models are replayed over the whole past OP, which finds the stem exactly
         after one move that slips wherever the stem was before; the observer is restarted on
-        the last ``hand_over_samples`` samples
-        with these stems as input.
+        the last ``hand_over_samples`` samples with these stems as input.
         """
         stems = np.array(history.op, dtype=float)
         for j, friction in enumerate(self.frictions):

@@ -25,6 +25,8 @@ from stiction_ros.processes import LinearModel
 # Samples between two opposite jumps, by the number of sticky valves: patterns multiply.
 SECOND_JUMPS = {1: (1, 2, 3, 5, 8), 2: (1, 2, 5), 3: (2,)}
 
+LEAST_MARGIN = 1e-4  # %; by (4) an error of exactly f_S does not slip
+
 
 @dataclasses.dataclass(frozen=True)
 class JumpPattern:
@@ -165,7 +167,8 @@ class _Problem:
                     rows += [(first + i, first + i - 1) for i in range(1, cost.horizon)]
                 continue
             pattern = next(remaining)
-            least = friction.jump + tuning.jump_margin * friction.static_friction
+            margin = tuning.jump_margin * friction.static_friction
+            least = friction.jump + max(margin, LEAST_MARGIN)
             if pattern.direction == 0:
                 self._stays.append(j)
                 continue

@@ -31,6 +31,7 @@ class EstimatorNode(ManagedNode):
         self._worker: FitWorker | None = None
 
     def configure(self) -> None:
+        self.settings.options()  # refuses what no fit can use
         self._step = round(self.settings.sample_time * SECOND)
         self.live: LiveEstimator | None = None
         self._valves: tuple[str, ...] = ()
@@ -53,6 +54,11 @@ class EstimatorNode(ManagedNode):
 
     def hardware(self) -> str:
         return str(self.settings.loop)
+
+    def retune(self, settings: Any) -> None:
+        settings.options()
+        if self.live is not None:
+            self.live.retune(settings)
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         keys = [("sample", self._sample), ("fits", self._fits), ("failed_fits", self._failed)]

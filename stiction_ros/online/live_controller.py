@@ -51,6 +51,16 @@ class ModeChange:
     model: str
 
 
+@dataclasses.dataclass(frozen=True)
+class _Prepared:
+    """A controller that takes over before sample ``at``, and the model whose valves it knows."""
+
+    at: int
+    controller: MpcController
+    reason: str
+    model: LoopModel
+
+
 class LiveController:
     """One controller at a time, and a prepared one that takes over between two samples.
 
@@ -72,10 +82,11 @@ class LiveController:
         self._op: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
         self._pv: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
         self._dv: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
-        self._prepared: tuple[int, MpcController, str, LoopModel] | None = None
+        self._retuned: _Prepared | None = None
+        self._offered: _Prepared | None = None
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
-        self._fallback = self._controller
+        self._fallback = self._controller, model
         self.changes: list[ModeChange] = [ModeChange(0, self._controller.mode, "start", model.name)]
 
     @property
@@ -99,16 +110,27 @@ class LiveController:
         Returns:
             Why nothing was prepared, or an empty text.
         """
-        self._known = model
         try:
-            design = self._design
-            if self.settings.adopt_process:
-                design = self.settings.design(model)
-            controller = self._build(design, model, self.settings.mode)
+            self._offered = self._prepare_offer(model, at, self.settings, self._design)
         except InputError as error:
             return str(error)
-        self._prepared = (at, controller, "friction identified", model)
         return ""
+
+    def _prepare_offer(
+        self, model: LoopModel, at: int, settings: LiveControllerSettings, design: ControlDesign
+    ) -> _Prepared:
+        for name in self.model.valve_names:
+            if name not in model.valve_names:
+                raise InputError(f"says nothing of valve {name}", where=model.name)
+        if settings.adopt_process:
+            if (model.valve_names, model.outputs) != (self.model.valve_names, self.model.outputs):
+                raise InputError("is the process of another loop", where=model.name)
+            adopted = settings.design(model)
+            # What is identified knows no limits: those of the valves stay.
+            limits = dataclasses.replace(adopted.limits, stem=design.limits.stem)
+            design = dataclasses.replace(adopted, limits=limits)
+        controller = self._build(design, model, settings.mode)
+        return _Prepared(at, controller, "friction identified", model)
 
     def retune(self, settings: LiveControllerSettings) -> None:
         """Change settings from the next sample on.
@@ -118,19 +140,22 @@ class LiveController:
         """
         design = settings.design(self.model)
         controller = self._build(design, self._known, settings.mode)
+        waiting = self._offered
+        if waiting is not None:
+            self._offered = self._prepare_offer(waiting.model, waiting.at, settings, design)
         self.settings, self._design = settings, design
         self._watch.rule = settings
-        self._prepared = (self._sample, controller, "settings changed", self._known)
+        self._retuned = _Prepared(self._sample, controller, "settings changed", self._known)
 
     def step(self, pv: FloatArray, sp: FloatArray, dv: FloatArray | None = None) -> StepResult:
         """Return what to apply at the present sample; PV and set-points of shape (p,)."""
         upset = np.zeros(self._design.model.e.shape[1]) if dv is None else dv
-        self._commit(pv)
+        self._commit_what_is_due()
         applied = self._op[-1] if self._op else np.array(self.model.stem_start)
         result = self._controller.step(pv, sp, upset, applied)
         self._op.append(result.op)
         self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else 0.0))
-        self._dv.append(upset)
+        self._dv.append(np.where(np.isfinite(upset), upset, 0.0))
         self._sample += 1
         self._watch.add(pv, sp, result.status is StepStatus.HELD)
         reason = self._watch.verdict()
@@ -138,26 +163,34 @@ class LiveController:
             self._roll_back(reason)
         return result
 
-    def _commit(self, pv: FloatArray) -> None:
-        if self._prepared is None or self._prepared[0] > self._sample:
-            return
-        _, controller, reason, model = self._prepared
-        self._prepared = None
-        before = self._controller
+    def _commit_what_is_due(self) -> None:
+        if self._retuned is not None:
+            prepared, self._retuned = self._retuned, None
+            before = self._controller.mode
+            self._commit(prepared)
+            if self._controller.mode is not before:
+                self._watch.stop()  # a mode that the user has chosen is not judged
+        if self._offered is not None and self._offered.at <= self._sample:
+            prepared, self._offered = self._offered, None
+            before_offer = self._controller, self._known
+            self._commit(prepared)
+            if self._controller.mode is not before_offer[0].mode:
+                self._fallback = before_offer
+                self._watch.begin()
+
+    def _commit(self, prepared: _Prepared) -> None:
+        controller = prepared.controller
         if self._op:
             controller.take_over(self._history())
-        self._controller = controller
-        self.changes.append(ModeChange(self._sample, controller.mode, reason, model.name))
-        if controller.mode is not before.mode:
-            self._fallback = before
-            self._watch.begin()
+        self._controller, self._known = controller, prepared.model
+        change = ModeChange(self._sample, controller.mode, prepared.reason, prepared.model.name)
+        self.changes.append(change)
 
     def _roll_back(self, reason: str) -> None:
         """Return to the mode before, on the friction known then, from the next sample on."""
-        before = self._fallback
+        before, known = self._fallback
         controller = MpcController(self._design, before.mode, before.frictions)
-        self._prepared = (self._sample, controller, f"rolled back: {reason}", self._known)
-        self._commit(self._pv[-1])
+        self._commit(_Prepared(self._sample, controller, f"rolled back: {reason}", known))
         self._watch.stop()
 
     def _history(self) -> History:

@@ -78,7 +78,12 @@ class LiveEstimator:
         outputs: Sequence[str],
         sample_time: float,
     ) -> None:
-        """Start with an empty window."""
+        """Start with an empty window.
+
+        Raises:
+            InputError: settings that no fit can use.
+        """
+        settings.options()
         self.settings = settings
         self._loop = loop
         self._valves, self._outputs = tuple(valves), tuple(outputs)
@@ -87,6 +92,18 @@ class LiveEstimator:
         self._op: deque[FloatArray] = deque(maxlen=settings.window)
         self._pv: deque[FloatArray] = deque(maxlen=settings.window)
         self._published: dict[str, Any] | None = None
+
+    def retune(self, settings: EstimatorSettings) -> None:
+        """Change settings from the next sample on; window and trust are kept.
+
+        Raises:
+            InputError: settings that no fit can use; the old ones stay in force.
+        """
+        settings.options()
+        self.settings = settings
+        self._trust.retune(settings)
+        self._op = deque(self._op, maxlen=settings.window)
+        self._pv = deque(self._pv, maxlen=settings.window)
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
         """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due."""

@@ -27,6 +27,7 @@ from stiction_ros.online.node_settings import (
     PlantNodeSettings,
     RecorderNodeSettings,
 )
+from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 
 NODE_SETTINGS: Mapping[str, type[NodeSettings]] = {
@@ -91,6 +92,11 @@ class Scenario:
                 where=f"{path}: controller: {controller.model}",
                 fix=f"use {', '.join(model.valve_names)} and {', '.join(model.outputs)}",
             )
+        try:
+            controller.design(process)
+            checked["estimator"].options()
+        except InputError as error:
+            raise error.within(str(path)) from None
         return cls(
             path.name.split(".")[0],
             path,
@@ -149,13 +155,19 @@ class _Loop:
         if self.estimator is not None:
             record = self.estimator.add(self._sample, result.op, measurement.pv)
             if record is not None:
-                found = fit(record, self.estimator.settings.options())
-                update = self.estimator.conclude(self._sample, found)
-                self.fits.append(update)
-                if update.loop_model is not None:
-                    self.controller.offer(update.loop_model, self._sample + self._latency)
+                self._fit(self.estimator, record)
         self._sample += 1
         return result.op
+
+    def _fit(self, estimator: LiveEstimator, record: Record) -> None:
+        try:
+            found = fit(record, estimator.settings.options())
+        except InputError:
+            return  # a window that cannot be used changes nothing, as in the node
+        update = estimator.conclude(self._sample, found)
+        self.fits.append(update)
+        if update.loop_model is not None:
+            self.controller.offer(update.loop_model, self._sample + self._latency)
 
 
 def run_live(

@@ -58,6 +58,7 @@ class ValveTrust:
         self._pending: TrustedFriction | None = None
         self._sticky_windows = 0
         self._disjoint_windows = 0
+        self._disjoint_verdict: VerdictKind | None = None
 
     def update(self, estimate: ValveEstimate) -> TrustedFriction | None:
         """Take in the estimate of one more window and return what is trusted now."""
@@ -87,6 +88,8 @@ class ValveTrust:
         if both is not None:
             self.trusted, self._disjoint_windows = both, 0
             return
+        if verdict is not self._disjoint_verdict:
+            self._disjoint_windows, self._disjoint_verdict = 0, verdict
         self._disjoint_windows += 1
         if self._disjoint_windows < self.rule.contradictions:
             return
@@ -103,6 +106,11 @@ class Trust:
     def __init__(self, valves: Sequence[str], rule: TrustRule) -> None:
         """Start without trust in any of ``valves``."""
         self._valves = {name: ValveTrust(rule) for name in valves}
+
+    def retune(self, rule: TrustRule) -> None:
+        """Judge the next windows by ``rule``; what is trusted stays."""
+        for valve in self._valves.values():
+            valve.rule = rule
 
     def update(self, estimates: Sequence[ValveEstimate]) -> Mapping[str, TrustedFriction]:
         """Take in one fit and return the trusted friction by valve."""

@@ -40,7 +40,9 @@ class Watch:
         self.active = False
 
     def add(self, pv: FloatArray, sp: FloatArray, failed: bool) -> None:
-        """Take in one sample."""
+        """Take in one sample; one without a measurement says nothing of the controller."""
+        if not (np.isfinite(pv).all() and np.isfinite(sp).all()):
+            return
         if self._last_sp is not None and not np.array_equal(sp, self._last_sp):
             self._since_move = 0
         self._last_sp = sp

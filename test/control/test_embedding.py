@@ -163,12 +163,14 @@ def test_a_valve_by_hes_law_follows_the_whole_plan(
         assert stem == pytest.approx(wanted, abs=1e-6)
 
 
-@given(models(valves=1), frictions, st.floats(-0.3, 0.3), st.floats(0.0, 100.0), st.integers(0, 99))
+@given(
+    models(valves=1), frictions, st.floats(-0.3, 0.29), st.floats(0.0, 100.0), st.integers(0, 99)
+)
 @settings(deadline=None)
 def test_the_margin_covers_friction_that_is_a_little_higher(
     model: LinearModel, friction: HeStiction, off: float, goal: float, seed: int
 ) -> None:
-    """With a margin of 0.3 f_S the first slip happens for f_S up to 30 % higher."""
+    """With a margin of 0.3 f_S the first slip happens for f_S less than 30 % higher."""
     true = HeStiction(friction.static_friction * (1.0 + off), 0.0)
     target = target_at(model, np.array([goal]))
     plan = EmbeddingMpc(model, weights_for(model, 9), limits_for(model), (friction,), TUNING).plan(
@@ -177,6 +179,21 @@ def test_the_margin_covers_friction_that_is_a_little_higher(
     assert plan is not None
     slips = abs(plan.stem[0, 0] - 50.0) > 1e-9
     assert (true.step(50.0, plan.op[0])[1] != 50.0) == slips
+
+
+@given(frictions, st.floats(0.0, 100.0), st.floats(0.0, 100.0))
+@settings(deadline=None)
+def test_without_a_margin_the_smallest_jump_still_slips(
+    friction: HeStiction, last: float, goal: float
+) -> None:
+    model = first_order()
+    target = target_at(model, np.array([goal]))
+    mpc = EmbeddingMpc(
+        model, weights_for(model, 9), limits_for(model), (friction,), EmbeddingTuning(0.0, 0.0)
+    )
+    plan = mpc.plan(target.state, target, np.array([last]))
+    assert plan is not None
+    assert friction.step(last, plan.op[0])[1] == pytest.approx(plan.stem[0, 0], abs=1e-6)
 
 
 def test_a_valve_at_its_end_can_only_go_back() -> None:

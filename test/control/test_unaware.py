@@ -43,7 +43,7 @@ def uncondensed(
             x[:, i + 1] == model.a @ x[:, i] + model.b @ (u[:, i] - model.stem0) + model.constant
         )
         for j in range(m):
-            problem.subject_to(problem.bounded(*limits.stem[j], u[j, i]))
+            problem.subject_to(problem.bounded(limits.stem[j, 0], u[j, i], limits.stem[j, 1]))
             if np.isfinite(limits.move[j]):
                 problem.subject_to(problem.bounded(-limits.move[j], move[j], limits.move[j]))
     z = x[:, horizon] - target.state

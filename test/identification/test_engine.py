@@ -3,9 +3,9 @@
 import dataclasses
 import json
 
-import simulated_loops as loops
 import numpy as np
 import pytest
+import simulated_loops as loops
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, IdentificationOptions, VerdictKind, identify

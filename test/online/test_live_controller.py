@@ -1,0 +1,346 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from stiction_ros.config_files import find_config
+from stiction_ros.control import ControlMode, StepStatus
+from stiction_ros.effects import HeStiction
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel, Plant, SetPoints
+from stiction_ros.online.live_controller import (
+    LiveController,
+    LiveControllerSettings,
+    frictions_of,
+)
+
+PLANT = LoopModel.load(find_config("example1.loop.yaml"))
+PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
+MOVES = SetPoints.load(find_config("siso.set_points.yaml"), ("PV1",))
+TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
+SETTINGS = LiveControllerSettings(
+    horizon=40,
+    move_weights=(0.1,),
+    embedding_move_weights=(0.01,),
+    state_noise=0.01,
+    disturbance_noise=(1e-4,),
+    measurement_noise=(1e-4,),
+    watch_samples=0,
+)
+KNOWN = PROCESS.with_valve_effects({"V1": [HeStiction(5.0, 2.0)]})
+
+
+def settings(**changes: object) -> LiveControllerSettings:
+    return dataclasses.replace(SETTINGS, **changes)  # type: ignore[arg-type]
+
+
+class Run:
+    """The sticky loop of Example 1 under a live controller."""
+
+    def __init__(self, live: LiveController, seed: int = 1) -> None:
+        self.live, self.plant = live, Plant(PLANT, seed)
+        self.op: list[float] = []
+        self.error: list[float] = []
+
+    def go(self, samples: int) -> None:
+        for _ in range(samples):
+            measured = self.plant.measure()
+            sp = MOVES.at(measured.time)
+            op = self.live.step(measured.pv, sp).op
+            self.plant.apply(op)
+            self.op.append(float(op[0]))
+            self.error.append(abs(float(measured.pv_clean[0] - sp[0])))
+
+
+def modes(live: LiveController) -> list[tuple[int, str]]:
+    return [(change.sample, change.mode.value) for change in live.changes]
+
+
+def test_it_starts_unaware_where_no_friction_is_known() -> None:
+    live = LiveController(SETTINGS, PROCESS)
+    assert (live.mode, live.frictions) == (ControlMode.UNAWARE, (None,))
+    assert modes(live) == [(0, "unaware")]
+
+
+def test_it_starts_aware_of_the_friction_in_its_own_model() -> None:
+    live = LiveController(SETTINGS, PLANT)
+    assert (live.mode, live.frictions) == (ControlMode.EMBEDDING, (HeStiction(5.0, 2.0),))
+
+
+@pytest.mark.parametrize("at", [30, 31, 57])
+def test_an_offered_model_takes_effect_at_exactly_its_sample(at: int) -> None:
+    plain, swapped = Run(LiveController(SETTINGS, PROCESS)), Run(LiveController(SETTINGS, PROCESS))
+    plain.go(80)
+    swapped.go(25)
+    assert swapped.live.offer(KNOWN, at) == ""
+    swapped.go(55)
+    assert modes(swapped.live) == [(0, "unaware"), (at, "embedding")]
+    assert swapped.op[:at] == plain.op[:at]
+    assert swapped.op[at] != plain.op[at]
+    assert swapped.live.changes[-1].reason
+
+
+def test_an_offer_for_the_past_takes_effect_now() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(40)
+    run.live.offer(KNOWN, 5)
+    run.go(1)
+    assert modes(run.live)[-1] == (40, "embedding")
+
+
+def test_a_later_offer_replaces_one_that_waits() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    other = PROCESS.with_valve_effects({"V1": [HeStiction(6.0, 1.0)]})
+    run.live.offer(KNOWN, 20)
+    run.live.offer(other, 10)
+    run.go(30)
+    assert run.live.frictions == (HeStiction(6.0, 1.0),)
+    assert modes(run.live) == [(0, "unaware"), (10, "embedding")]
+
+
+def test_an_offer_without_friction_goes_back_to_unaware() -> None:
+    run = Run(LiveController(SETTINGS, PLANT))
+    run.live.offer(PROCESS, 10)
+    run.go(20)
+    assert modes(run.live) == [(0, "embedding"), (10, "unaware")]
+
+
+def test_after_the_swap_the_limit_cycle_is_gone() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(1000)
+    run.live.offer(KNOWN, 1000)
+    run.go(1400)
+    before, after = np.array(run.error[600:850]), np.array(run.error[2150:2400])
+    assert np.mean(after) < 0.5 * np.mean(before)
+
+
+def test_the_stem_is_known_after_the_swap() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(600)
+    run.live.offer(KNOWN, 600)
+    for _ in range(60):
+        measured = run.plant.measure()
+        op = run.live.step(measured.pv, MOVES.at(measured.time)).op
+        stem = run.plant.apply(op)
+        assert run.live.observed.stem == pytest.approx(stem, abs=1e-9)
+
+
+def test_the_fixed_modes_take_no_notice_of_offers() -> None:
+    run = Run(LiveController(settings(mode="unaware"), PROCESS))
+    run.live.offer(KNOWN, 5)
+    run.go(20)
+    assert run.live.mode is ControlMode.UNAWARE
+
+
+def test_too_many_sticky_valves_are_refused_as_a_value() -> None:
+    valves = [{"name": f"V{i}", "limits": [0.0, 100.0]} for i in range(4)]
+    process = {
+        "kind": "arx",
+        "outputs": [{"name": "Y", "a": [-0.8], "b": {v["name"]: [0.1] for v in valves}}],
+    }
+    four = LoopModel.from_mapping(
+        {"loop": "four", "sample_time": 1.0, "valves": valves, "process": process}
+    )
+    live = LiveController(settings(), four)
+    sticky = four.with_valve_effects({v: [HeStiction(5.0, 2.0)] for v in four.valve_names})
+    assert "4 sticky valves" in live.offer(sticky, 0)
+    live.step(np.zeros(1), np.zeros(1))
+    assert live.mode is ControlMode.UNAWARE
+
+
+def test_a_model_of_another_loop_is_refused_as_a_value() -> None:
+    live = LiveController(settings(adopt_process=True), PROCESS)
+    assert live.offer(TANK, 0) != ""
+    assert live.step(np.array([50.0]), np.array([50.0])).status is StepStatus.SOLVED
+
+
+def test_an_adopted_process_keeps_the_limits_of_the_valves() -> None:
+    document = PROCESS.to_mapping()
+    del document["valves"][0]["limits"]
+    found = LoopModel.from_mapping(document)
+    live = LiveController(settings(adopt_process=True), PROCESS)
+    assert live.offer(found, 0) == ""
+    for _ in range(60):
+        op = live.step(np.array([50.0]), np.array([500.0])).op
+        assert 0.0 <= op[0] <= 100.0
+
+
+def test_an_adopted_process_is_the_one_that_is_controlled_by() -> None:
+    document = PROCESS.to_mapping()
+    document["process"]["outputs"][0]["b"] = {"V1": [0.1]}
+    live = LiveController(settings(adopt_process=True), PROCESS)
+    live.offer(LoopModel.from_mapping(document), 0)
+    live.step(np.array([50.0]), np.array([50.0]))
+    assert live.observed.design.model.gain != pytest.approx(PROCESS.process.linear(1.0).gain)
+
+
+# ---- watching ----------------------------------------------------------------------------------
+
+
+def watched(**changes: object) -> LiveControllerSettings:
+    return settings(watch_samples=100, watch_settle=40, adopt_process=True, **changes)
+
+
+def process_of_gain(factor: float) -> LoopModel:
+    document = PROCESS.to_mapping()
+    output = document["process"]["outputs"][0]
+    output["b"] = {"V1": [factor * b for b in output["b"]["V1"]]}
+    return LoopModel.from_mapping(document)
+
+
+# It believes the process to be three times weaker than it is, and so overdoes it.
+WORSE = process_of_gain(0.3).with_valve_effects({"V1": [HeStiction(5.0, 2.0)]})
+
+
+def test_a_controller_that_is_worse_is_rolled_back() -> None:
+    run = Run(LiveController(watched(), PROCESS))
+    run.go(350)
+    run.live.offer(WORSE, 350)
+    run.go(500)
+    assert [mode for _, mode in modes(run.live)] == ["unaware", "embedding", "unaware"]
+    assert run.live.changes[-1].reason.startswith("rolled back: ")
+    assert run.live.frictions == (None,)
+
+
+def test_a_controller_that_does_well_stays() -> None:
+    run = Run(LiveController(watched(), PROCESS))
+    run.go(1000)
+    run.live.offer(KNOWN, 1000)
+    run.go(1500)
+    assert modes(run.live) == [(0, "unaware"), (1000, "embedding")]
+
+
+def test_after_the_roll_back_the_loop_goes_on_at_the_next_sample() -> None:
+    run = Run(LiveController(watched(), PROCESS))
+    run.go(350)
+    run.live.offer(WORSE, 350)
+    while len(run.live.changes) < 3:
+        run.go(1)
+        assert len(run.op) < 1000
+    assert run.live.changes[-1].sample == len(run.op)
+    assert run.live.step(np.array([50.0]), np.array([50.0])).mode is ControlMode.UNAWARE
+
+
+def test_a_mode_that_the_user_sets_is_not_rolled_back() -> None:
+    run = Run(LiveController(watched(), PROCESS))
+    run.go(200)
+    run.live.retune(watched(mode="hold"))
+    run.go(200)
+    assert modes(run.live) == [(0, "unaware"), (200, "hold")]
+
+
+# ---- settings ----------------------------------------------------------------------------------
+
+
+def test_retuning_takes_effect_at_the_next_sample() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(60)
+    run.live.retune(settings(move_weights=(50.0,)))
+    run.go(1)
+    assert run.live.observed.design.unaware.move.tolist() == [[50.0]]
+    assert run.live.changes[-1].sample == 60
+
+
+def test_retuning_keeps_what_is_known_of_the_friction() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.live.offer(KNOWN, 10)
+    run.go(20)
+    run.live.retune(settings(horizon=30))
+    run.go(1)
+    assert run.live.mode is ControlMode.EMBEDDING
+
+
+def test_retuning_does_not_drop_an_offer_that_waits() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(10)
+    run.live.offer(KNOWN, 30)
+    run.live.retune(settings(horizon=30))
+    run.go(10)
+    assert run.live.mode is ControlMode.UNAWARE, "it took effect before its time"
+    run.go(20)
+    assert (30, "embedding") in modes(run.live)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"move_weights": (1.0, 1.0)},
+        {"pv_low": (5.0,), "pv_high": (4.0,)},
+        {"output_weights": ()},
+    ],
+)
+def test_settings_that_do_not_fit_are_refused_and_leave_the_old_ones(
+    bad: dict[str, object],
+) -> None:
+    live = LiveController(SETTINGS, PROCESS)
+    before = live.settings
+    with pytest.raises(InputError):
+        live.retune(settings(**bad))
+    assert live.settings is before
+    assert live.step(np.array([50.0]), np.array([50.0])).status is StepStatus.SOLVED
+    assert len(live.changes) == 1
+
+
+def test_settings_that_do_not_fit_the_model_are_refused_at_the_start() -> None:
+    with pytest.raises(InputError):
+        LiveController(settings(measurement_noise=(1.0, 1.0)), PROCESS)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_measurements_that_are_no_numbers_do_no_lasting_harm(first: bool) -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(0 if first else 30)
+    held = run.live.step(np.array([np.nan]), np.array([50.0]))
+    assert held.status is StepStatus.HELD
+    run.live.offer(KNOWN, 0)
+    result = run.live.step(np.array([50.0]), np.array([50.0]))
+    assert result.status is StepStatus.SOLVED
+    assert np.isfinite(run.live.observed.observer.state).all()
+
+
+def test_disturbances_that_are_no_numbers_do_not_survive_a_swap() -> None:
+    document = {
+        "loop": "ss",
+        "sample_time": 1.0,
+        "valves": [{"name": "V1", "limits": [-100.0, 100.0]}],
+        "process": {
+            "kind": "state_space",
+            "a": [[0.8]],
+            "b": [[0.2]],
+            "c": [[1.0]],
+            "e": [[0.1]],
+            "outputs": [{"name": "Y"}],
+            "measured_disturbances": ["D"],
+        },
+    }
+    model = LoopModel.from_mapping(document)
+    live = LiveController(SETTINGS, model)
+    live.step(np.zeros(1), np.zeros(1), np.zeros(1))
+    live.step(np.zeros(1), np.zeros(1), np.array([np.nan]))
+    live.offer(model.with_valve_effects({"V1": [HeStiction(5.0, 2.0)]}), 0)
+    assert live.step(np.zeros(1), np.zeros(1), np.zeros(1)).status is StepStatus.SOLVED
+
+
+def test_a_model_that_lacks_a_valve_is_refused_as_a_value() -> None:
+    document = PROCESS.to_mapping()
+    document["valves"][0]["name"] = "V7"
+    document["process"]["outputs"][0]["b"] = {"V7": [0.1]}
+    document["process"]["outputs"][0]["delay"] = {}
+    document["operating_point"] = {}
+    assert "V1" in LiveController(SETTINGS, PROCESS).offer(LoopModel.from_mapping(document), 0)
+
+
+def test_after_a_roll_back_new_settings_do_not_bring_the_worse_controller_back() -> None:
+    run = Run(LiveController(watched(), PROCESS))
+    run.go(350)
+    run.live.offer(WORSE, 350)
+    run.go(500)
+    run.live.retune(watched(horizon=30))
+    run.go(1)
+    assert run.live.mode is ControlMode.UNAWARE
+
+
+def test_frictions_are_found_by_name() -> None:
+    assert frictions_of(KNOWN, ("V0", "V1")) == (None, HeStiction(5.0, 2.0))

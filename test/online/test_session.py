@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from stiction_ros.config_files import config_directories, find_config
+from stiction_ros.control import ControlMode
+from stiction_ros.errors import InputError
+from stiction_ros.online.session import Scenario, run_live
+
+SCENARIOS = sorted(config_directories()[0].glob("*.scenario.yaml"))
+
+
+@pytest.fixture(scope="module")
+def siso() -> Scenario:
+    return Scenario.load(find_config("siso.scenario.yaml"))
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.name)
+def test_every_scenario_that_comes_along_is_read(path: Path) -> None:
+    scenario = Scenario.load(path)
+    assert scenario.name == path.name.split(".")[0]
+    assert scenario.controller.fit_first == scenario.estimator.fit_first
+    assert scenario.controller.fit_every == scenario.estimator.fit_every
+    assert scenario.controller.fit_latency == scenario.estimator.fit_latency
+    assert scenario.estimator.window >= scenario.estimator.fit_first or scenario.name == "tank"
+    assert np.isfinite(scenario.set_points.repeat)
+
+
+def quick(siso: Scenario) -> Scenario:
+    """Two fits within a run of 620 samples."""
+    changes: dict[str, Any] = {"fit_first": 400, "fit_every": 100}
+    estimator = dataclasses.replace(
+        siso.estimator, window=500, delay_low=5, delay_high=5, **changes
+    )
+    controller = dataclasses.replace(siso.controller, **changes)
+    return dataclasses.replace(siso, estimator=estimator, controller=controller)
+
+
+def test_two_runs_with_one_seed_are_equal_bit_for_bit(siso: Scenario) -> None:
+    one, two = (run_live(quick(siso), samples=620) for _ in range(2))
+    assert np.array_equal(one.run.record.op, two.run.record.op)
+    assert np.array_equal(one.run.record.pv, two.run.record.pv)
+    assert np.array_equal(one.stem_estimate, two.stem_estimate)
+    assert one.changes == two.changes
+    assert [fit.end for fit in one.fits] == [399, 499, 599]
+
+
+def test_a_seed_in_place_of_the_scenarios_gives_other_noise(siso: Scenario) -> None:
+    one, two = (run_live(siso, samples=60, seed=seed) for seed in (1, 2))
+    assert not np.array_equal(one.run.record.pv, two.run.record.pv)
+
+
+def test_a_swap_takes_effect_the_latency_after_its_window(siso: Scenario) -> None:
+    run = run_live(quick(siso), samples=620)
+    first = next(fit for fit in run.fits if fit.loop_model is not None)
+    assert run.swap is not None
+    assert run.swap.sample == first.end + siso.controller.fit_latency
+    assert run.swap.mode is ControlMode.EMBEDDING
+
+
+def test_without_identification_the_controller_stays(siso: Scenario) -> None:
+    run = run_live(siso, samples=60, identify=False)
+    assert (run.fits, run.swap) == ((), None)
+
+
+def test_ideal_valves_follow_op(siso: Scenario) -> None:
+    run = run_live(siso, samples=60, ideal_valves=True, identify=False)
+    assert run.run.record.stem is not None
+    assert np.array_equal(run.run.record.stem, run.run.record.op)
+    assert np.array_equal(run.stem_estimate, run.run.record.op)
+
+
+def test_a_window_that_cannot_be_used_does_not_end_the_run(siso: Scenario) -> None:
+    """A window of ten samples is too short for a fit; the loop must go on."""
+    changes: dict[str, Any] = {"fit_first": 10, "fit_every": 40}
+    scenario = dataclasses.replace(
+        siso,
+        estimator=dataclasses.replace(siso.estimator, **changes),
+        controller=dataclasses.replace(siso.controller, **changes),
+    )
+    run = run_live(scenario, samples=30)
+    assert len(run.run.record) == 30
+
+
+def written(tmp_path: Path, node: str, key: str, value: Any) -> Path:
+    """The siso scenario with one parameter changed, beside copies of its files."""
+    source = find_config("siso.scenario.yaml")
+    for name in ("example1.loop.yaml", "example1_process.loop.yaml", "siso.set_points.yaml"):
+        (tmp_path / name).write_text((source.parent / name).read_text())
+    document = yaml.safe_load(source.read_text())
+    document[node]["ros__parameters"][key] = value
+    path = tmp_path / "my.scenario.yaml"
+    path.write_text(yaml.safe_dump(document))
+    return path
+
+
+WRONG = [
+    ("plant", "sampels", 5),
+    ("plant", "samples", 0),
+    ("plant", "samples", "many"),
+    ("plant", "seed", -1),
+    ("plant", "model", "none.loop.yaml"),
+    ("plant", "set_points", "none.yaml"),
+    ("controller", "horizn", 5),
+    ("controller", "horizon", 0),
+    ("controller", "horizon", 5.5),
+    ("controller", "move_weights", [1.0, 1.0]),
+    ("controller", "mode", "smart"),
+    ("controller", "model", "none.loop.yaml"),
+    ("controller", "output_weights", 1.0),
+    ("estimator", "windw", 5),
+    ("estimator", "window", 1),
+    ("estimator", "delay_low", 11),
+    ("estimator", "fit_first", float("nan")),
+    ("recorder", "directry", "x"),
+]
+
+
+@pytest.mark.parametrize(("node", "key", "value"), WRONG)
+def test_a_wrong_scenario_gets_one_line_that_names_the_file(
+    node: str, key: str, value: Any, tmp_path: Path
+) -> None:
+    path = written(tmp_path, node, key, value)
+    with pytest.raises(InputError) as caught:
+        run_live(Scenario.load(path), samples=2)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert str(tmp_path) in line
+    assert key.partition("_")[0] in line or str(value) in line
+
+
+@pytest.mark.parametrize("node", ["plant", "controller", "estimator"])
+def test_a_missing_node_is_named(node: str, tmp_path: Path) -> None:
+    path = written(tmp_path, "plant", "seed", 1)
+    document = yaml.safe_load(path.read_text())
+    del document[node]
+    path.write_text(yaml.safe_dump(document))
+    with pytest.raises(InputError, match=f"lacks '{node}'; add {node}"):
+        Scenario.load(path)
+
+
+def test_a_scenario_finds_its_files_beside_itself(tmp_path: Path) -> None:
+    path = written(tmp_path, "plant", "seed", 77)
+    assert Scenario.load(path).seed == 77
+
+
+def test_a_missing_scenario_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        Scenario.load(tmp_path / "none.scenario.yaml")
