@@ -75,6 +75,11 @@ class Observer:
         self.state = np.asarray(steady, dtype=float)
         self.disturbance = pv - model.pv0 - model.c @ self.state
 
+    @property
+    def output(self) -> FloatArray:
+        """Estimated outputs, shape (p,)."""
+        return np.asarray(self.model.c @ self.state + self.model.pv0 + self.disturbance)
+
     def correct(self, pv: FloatArray) -> None:
         """Take in the measurement ``pv``, shape (p,)."""
         model = self.model

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -17,7 +16,7 @@ from stiction_ros.control import StepResult
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, trajectory, values_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.live_controller import LiveController
@@ -61,10 +60,10 @@ class ControllerNode(ManagedNode):
         sp_qos = QoSProfile(depth=100)
         if settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
-        self.inlet(JointState, "pv", self._on_pv, SIGNAL_QOS, ("plant",))
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
-        self.inlet(JointState, "dv", self._on_dv, SIGNAL_QOS)
-        self.inlet(JointState, "stiction", self._on_stiction, SIGNAL_QOS, ("estimator",))
+        self.inlet(JointState, "dv", self._on_dv, READER_QOS)
+        self.inlet(JointState, "stiction", self._on_stiction, READER_QOS, ("estimator",))
         self.inlet(String, "loop_model", self._on_model, LATCHED_QOS, ("estimator",))
 
     def configuration(self) -> dict[str, Any]:
@@ -174,18 +173,7 @@ class ControllerNode(ManagedNode):
 
     def _publish_plan(self, stamp: int, result: StepResult) -> None:
         names = (*self.model.outputs, *self.model.valve_names)
-        stem, plan = self.live.observed.stem, result.plan
-        if plan is None:
-            observer = self.live.observed.observer
-            pv = observer.model.c @ observer.state + observer.model.pv0 + observer.disturbance
-            rows, picks = np.concatenate([pv, stem])[None], np.zeros(1)
-        else:
-            last = len(plan.stem)
-            count = min(self.settings.prediction_points, last + 1)
-            picks = np.unique(np.linspace(0, last, count).round().astype(int))
-            stems = plan.stem[np.minimum(picks, last - 1)]
-            rows = np.hstack([plan.pv[picks], stems])
-            rows[0, len(self.model.outputs) :] = stem
+        rows, picks = self.live.prediction(result, self.settings.prediction_points)
         times = (picks * self.model.sample_time).tolist()
         self._prediction.publish(trajectory(stamp, names, rows, times))
 
@@ -195,17 +183,8 @@ class ControllerNode(ManagedNode):
             if self._origin is not None:
                 self.stamp = self._origin + change.sample * self._step
             self._mode.publish(String(data=change.mode.value))
-            frictions = [
-                (f"{name}.{key}", value)
-                for name, friction in zip(self.model.valve_names, self.live.frictions, strict=True)
-                if friction is not None
-                for key, value in (
-                    ("f_s", friction.static_friction),
-                    ("f_d", friction.dynamic_friction),
-                )
-            ]
             keys = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
-            self.report([("mode", change.mode.value, [*keys, *frictions])])
+            self.report([("mode", change.mode.value, [*keys, *self.live.known_friction()])])
         self._told = len(self.live.changes)
 
     def _fail(self, reason: str) -> None:

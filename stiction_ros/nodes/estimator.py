@@ -11,14 +11,14 @@ from typing import Any
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
-from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, values_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator
 from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.online.pairing import PairedSample, Pairing
 from stiction_ros.online.worker import FitWorker
 
 
@@ -32,25 +32,21 @@ class EstimatorNode(ManagedNode):
 
     def configure(self) -> None:
         self.settings.options()  # refuses what no fit can use
-        self._step = round(self.settings.sample_time * SECOND)
         self.live: LiveEstimator | None = None
         self._valves: tuple[str, ...] = ()
         self._outputs: tuple[str, ...] = ()
-        self._origin: int | None = None
+        self._pairs = Pairing(self.settings.sample_time)
         self._sample = 0
-        self._pv: dict[int, JointState] = {}
-        self._op: dict[int, JointState] = {}
-        self._last_op: FloatArray | None = None
         self._pending: deque[tuple[int, Future[Identification]]] = deque()
         self._token = ""
-        self._fits = self._failed = 0
+        self._fits = self._failed = self._missed = 0
         self._said = "no fit yet"
         self._worker = FitWorker()
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.inlet(JointState, "pv", self._on_pv, SIGNAL_QOS, ("plant",))
-        self.inlet(JointState, "op", self._on_op, SIGNAL_QOS, ("controller",))
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
+        self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
 
     def hardware(self) -> str:
         return str(self.settings.loop)
@@ -61,8 +57,13 @@ class EstimatorNode(ManagedNode):
             self.live.retune(settings)
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        keys = [("sample", self._sample), ("fits", self._fits), ("failed_fits", self._failed)]
-        return "ok", self._said, [*keys, ("running_fits", len(self._pending))]
+        keys: list[tuple[str, object]] = [
+            ("sample", self._sample),
+            ("fits", self._fits),
+            ("failed_fits", self._failed),
+        ]
+        keys += [("missed_samples", self._missed), ("running_fits", len(self._pending))]
+        return "warn" if self._missed else "ok", self._said, keys
 
     def finish(self) -> None:
         if self._worker is not None:
@@ -73,52 +74,41 @@ class EstimatorNode(ManagedNode):
     # ---- samples in ------------------------------------------------------------------------
 
     def _on_pv(self, message: JointState) -> None:
-        stamp = to_ns(message.header.stamp)
-        if self._origin is None:
-            self._origin = stamp
-            self._outputs = tuple(message.name)
-        self._pv[stamp] = message
-        self._pair()
+        self._outputs = self._outputs or tuple(message.name)
+        pv = values_of(message, self._outputs)
+        if pv is not None:
+            self._take(self._pairs.add_pv(to_ns(message.header.stamp), pv))
 
     def _on_op(self, message: JointState) -> None:
-        if not self._valves:
-            self._valves = tuple(message.name)
-        self._op[to_ns(message.header.stamp)] = message
-        self._pair()
+        self._valves = self._valves or tuple(message.name)
+        op = values_of(message, self._valves)
+        if op is not None:
+            self._take(self._pairs.add_op(to_ns(message.header.stamp), op))
 
-    def _pair(self) -> None:
-        """Take every sample whose pv and op are both there, oldest first."""
-        while self._pv and self._op:
-            stamp = min(self._pv)
-            op = None
-            if stamp in self._op:
-                op = values_of(self._op.pop(stamp), self._valves)
-            elif min(self._op) < stamp:
-                del self._op[min(self._op)]
-                continue
-            pv = values_of(self._pv.pop(stamp), self._outputs)
-            op = self._last_op if op is None else op  # a sample without op was held
-            if pv is None or op is None:
-                continue
-            self._last_op = op
-            self._add(stamp, op, pv)
+    def _take(self, samples: list[PairedSample]) -> None:
+        for found in samples:
+            if self.live is None:
+                settings = self.settings
+                names = (settings.loop, self._valves, self._outputs)
+                self.live = LiveEstimator(settings, *names, settings.sample_time)
+            if found.missed:
+                self._skip(found)
+            self.stamp, self._sample = found.stamp, found.sample + 1
+            record = self.live.add(found.sample, found.op, found.pv)
+            if record is not None and self._worker is not None:
+                future = self._worker.submit(record, self.live.settings.options())
+                self._pending.append((found.sample, future))
+                future.add_done_callback(lambda _future: self._done.trigger())
 
-    def _add(self, stamp: int, op: FloatArray, pv: FloatArray) -> None:
-        if self.live is None:
-            self.live = LiveEstimator(
-                self.settings,
-                self.settings.loop,
-                self._valves,
-                self._outputs,
-                self.settings.sample_time,
-            )
-        self.stamp = stamp
-        record = self.live.add(self._sample, op, pv)
-        if record is not None and self._worker is not None:
-            future = self._worker.submit(record, self.live.settings.options())
-            self._pending.append((self._sample, future))
-            future.add_done_callback(lambda _future: self._done.trigger())
-        self._sample += 1
+    def _skip(self, found: PairedSample) -> None:
+        """Pass over samples that never came: no window may hold them."""
+        assert self.live is not None
+        self.live.restart()
+        self._missed += found.missed
+        self.get_logger().warning(f"{found.missed} samples missed before sample {found.sample}")
+        for sample in range(found.sample - found.missed, found.sample):
+            if self.settings.due(sample):
+                self._publish(self._pairs.stamp_of(sample), [], [])
 
     # ---- fits out --------------------------------------------------------------------------
 
@@ -126,9 +116,9 @@ class EstimatorNode(ManagedNode):
         """Publish every fit that is done, in order."""
         while self._pending and self._pending[0][1].done():
             end, future = self._pending.popleft()
-            if future.cancelled() or self.live is None or self._origin is None:
+            if future.cancelled() or self.live is None:
                 continue
-            stamp = self._origin + end * self._step
+            stamp = self._pairs.stamp_of(end)
             try:
                 found = future.result()
             except InputError as error:
@@ -141,7 +131,9 @@ class EstimatorNode(ManagedNode):
 
     def _announce(self, stamp: int, update: FitUpdate) -> None:
         if update.loop_model is not None:
-            valid_from = stamp + self.settings.fit_latency * self._step
+            valid_from = stamp + self.settings.fit_latency * round(
+                self.settings.sample_time * SECOND
+            )
             self._token = str(valid_from)
             text = update.loop_model.to_yaml(valid_from=valid_from)
             self._model.publish(String(data=text))

@@ -21,6 +21,8 @@ from stiction_ros.nodes import parameters
 from stiction_ros.nodes.messages import status, to_stamp
 
 SIGNAL_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+# What waits for a process that is busy for a moment; writers keep SIGNAL_QOS.
+READER_QOS = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED_QOS = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,

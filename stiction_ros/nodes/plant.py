@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints
-from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.managed import READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.node_settings import PlantNodeSettings
@@ -49,7 +49,7 @@ class PlantNode(ManagedNode):
         self._dv = None
         if self.model.process.measured_disturbances:
             self._dv = self.outlet(JointState, "dv", SIGNAL_QOS, ("controller",))
-        self.inlet(JointState, "op", self._on_op, SIGNAL_QOS, ("controller",))
+        self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
 
     def configuration(self) -> dict[str, Any]:
         return {"seed": self.settings.seed, "model": self.model.to_mapping()}

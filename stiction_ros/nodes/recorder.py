@@ -12,7 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.managed import ManagedNode
+from stiction_ros.nodes.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.node_settings import RecorderNodeSettings
@@ -21,7 +21,6 @@ from stiction_ros.records.bag_writer import BagWriter
 from stiction_ros.records.message_definitions import definition
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
-READER_DEPTH = 5000  # messages kept by the reader while the process is busy
 _CLOCK_BYTES = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
 
 
@@ -93,7 +92,7 @@ class RecorderNode(ManagedNode):
         reliable = all(p.reliability is ReliabilityPolicy.RELIABLE for p in profiles)
         latched = all(p.durability is DurabilityPolicy.TRANSIENT_LOCAL for p in profiles)
         qos = QoSProfile(
-            depth=READER_DEPTH,
+            depth=READER_QOS.depth,
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )

@@ -99,6 +99,15 @@ class LiveController:
         """Friction that the controller in force believes in, per valve."""
         return self._controller.frictions
 
+    def known_friction(self) -> list[tuple[str, float]]:
+        """Return the friction in force as pairs such as ``("V1.f_s", 8.0)``, in %."""
+        return [
+            (f"{name}.{entry.key}", getattr(friction, entry.attribute))
+            for name, friction in zip(self.model.valve_names, self.frictions, strict=True)
+            if friction is not None
+            for entry in friction.parameters()
+        ]
+
     @property
     def observed(self) -> MpcController:
         """The controller in force, for its observer and its stem estimates."""
@@ -177,6 +186,22 @@ class LiveController:
             if self._controller.mode is not before_offer[0].mode:
                 self._fallback = before_offer
                 self._watch.begin()
+
+    def prediction(self, result: StepResult, points: int) -> tuple[FloatArray, FloatArray]:
+        """Return the plan of the last step, thinned for a message.
+
+        Returns:
+            Rows (PV, stem), shape (K, p + m), and the samples ahead that they stand for,
+            shape (K,). The first row is the present estimate; without a plan it is alone.
+        """
+        stem, plan = self._controller.stem, result.plan
+        if plan is None:
+            return np.concatenate([self._controller.observer.output, stem])[None], np.zeros(1)
+        last = len(plan.stem)
+        picks = np.unique(np.linspace(0, last, min(points, last + 1)).round().astype(int))
+        rows = np.hstack([plan.pv[picks], plan.stem[np.minimum(picks, last - 1)]])
+        rows[0, plan.pv.shape[1] :] = stem
+        return rows, picks
 
     def _commit(self, prepared: _Prepared) -> None:
         controller = prepared.controller

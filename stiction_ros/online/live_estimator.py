@@ -121,6 +121,11 @@ class LiveEstimator:
             start=(sample + 1 - len(self._op)) * self._sample_time,
         )
 
+    def restart(self) -> None:
+        """Empty the window, as after samples that were missed; trust is kept."""
+        self._op.clear()
+        self._pv.clear()
+
     def conclude(self, end: int, found: Identification) -> FitUpdate:
         """Apply the rule of trust to the fit of the window that ends at sample ``end``."""
         trusted = dict(self._trust.update(found.valves))

@@ -15,12 +15,14 @@ class WatchRule:
     """A new controller must not be worse than the one it replaced.
 
     After a swap the mean absolute error of each output over ``watch_samples`` samples is held
-    against the same figure before the swap. Samples within ``watch_settle`` of a set-point
-    move count on neither side. More than ``watch_ratio`` times the error, or more than
-    ``watch_failures`` failed steps, rolls the controller back.
+    against the mean over up to ``watch_reference`` samples before it: long enough for several
+    limit cycles, in which a stuck valve may rest near the set-point for a while. Samples within
+    ``watch_settle`` of a set-point move count on neither side. More than ``watch_ratio`` times
+    the error, or more than ``watch_failures`` failed steps, rolls the controller back.
     """
 
     watch_samples: int = setting(60, "samples judged after a swap; 0 never judges", low=0)
+    watch_reference: int = setting(1000, "samples before a swap to compare with", low=1)
     watch_settle: int = setting(30, "samples left out after a set-point move", low=0)
     watch_ratio: float = setting(1.5, "largest tolerated ratio of mean errors", low=1.0)
     watch_failures: int = setting(5, "failed steps tolerated while watching", low=0)
@@ -50,7 +52,7 @@ class Watch:
         if self._since_move > self.rule.watch_settle:
             self._recent.append(np.abs(pv - sp))
             if not self.active:
-                del self._recent[: -max(self.rule.watch_samples, 1)]
+                del self._recent[: -self.rule.watch_reference]
         if self.active and failed:
             self._failures += 1
 
