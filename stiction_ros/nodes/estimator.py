@@ -75,9 +75,18 @@ class EstimatorNode(ManagedNode):
         return "ok", self._said, [*keys, ("running_fits", len(self._pending))]
 
     def finish(self) -> None:
+        self._end_worker()
+        super().finish()
+
+    def on_cleanup(self, state: Any) -> Any:
+        self._end_worker()
+        self.destroy_guard_condition(self._done)
+        return super().on_cleanup(state)
+
+    def _end_worker(self) -> None:
         if self._worker is not None:
             self._worker.close()
-        super().finish()
+            self._worker = None
 
     # ---- samples in ------------------------------------------------------------------------
 

@@ -59,6 +59,8 @@ class ManagedNode(LifecycleNode):
         self.stamp = 0
         self.outlets: dict[str, Outlet] = {}
         self._linked = False
+        self._link_timer: Any = None
+        self._tunable = False
         parameters.declare(self, settings)
         self.settings = settings()
 
@@ -80,7 +82,7 @@ class ManagedNode(LifecycleNode):
         return self._guarded(self._activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.running = False
+        self._stop()
         self.deactivate()
         return super().on_deactivate(state)
 
@@ -119,6 +121,7 @@ class ManagedNode(LifecycleNode):
         self._beat = self.create_timer(1.0, self._each_second)
         self.configure()
         self.add_on_set_parameters_callback(self._on_set)
+        self._tunable = True
         document = {
             "node": self.get_fully_qualified_name(),
             "version": __version__,
@@ -132,8 +135,17 @@ class ManagedNode(LifecycleNode):
         self.activate()
         self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
 
+    def _stop(self) -> None:
+        self.running = self._linked = False
+        if self._link_timer is not None:
+            self.destroy_timer(self._link_timer)
+            self._link_timer = None
+
     def _tear_down(self) -> None:
-        self.remove_on_set_parameters_callback(self._on_set)
+        self._stop()
+        if self._tunable:
+            self.remove_on_set_parameters_callback(self._on_set)
+            self._tunable = False
         self.destroy_timer(self._beat)
         for subscription in list(self.subscriptions):
             self.destroy_subscription(subscription)
@@ -142,6 +154,7 @@ class ManagedNode(LifecycleNode):
         self.outlets = {}
 
     def _guarded(self, action: Any) -> TransitionCallbackReturn:
+        self.failure = ""
         try:
             action()
         except InputError as error:
@@ -178,7 +191,7 @@ class ManagedNode(LifecycleNode):
                 return
         if not wanted <= heard:
             return
-        self.destroy_timer(self._link_timer)
+        self._stop()
         self._linked = self.running = True
         self.report()
         self.linked()
