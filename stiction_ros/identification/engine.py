@@ -12,6 +12,14 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction_grid import find_law
 from stiction_ros.identification.intervals import FrictionIntervals, friction_intervals
+from stiction_ros.identification.models import (
+    Data,
+    Model,
+    linear_model,
+    neighbouring_delays,
+    refit,
+    stem_of,
+)
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders, OutputFit
 from stiction_ros.identification.results import (
@@ -21,15 +29,7 @@ from stiction_ros.identification.results import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.search import (
-    Data,
-    Model,
-    linear_model,
-    neighbouring_delays,
-    refit,
-    search,
-    stem_of,
-)
+from stiction_ros.identification.search import search
 from stiction_ros.identification.verdict import evidence, judge
 from stiction_ros.records.record import Record
 
@@ -104,6 +104,7 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
         limit=limit,
         delay=options.delay,
         min_moves=options.min_moves,
+        resolution=options.resolution,
     )
 
 
@@ -152,9 +153,11 @@ def linear_rivals(
         raised = dataclasses.replace(
             orders, output=orders.output + extra, input=orders.input + extra
         )
-        rivals.append(linear_model(data, raised, freed))
-        own = dataclasses.replace(freed, delays=linear.delays)
-        rivals.append(refit(data, own, raised, warm=False))
+        rival = linear_model(data, raised, freed)
+        rivals.append(rival)
+        if rival.delays != linear.delays:
+            own = dataclasses.replace(freed, delays=linear.delays)
+            rivals.append(refit(data, own, raised, warm=False))
     return rivals
 
 

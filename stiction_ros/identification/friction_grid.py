@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.effects import BEHAVIOURS
+from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
 from stiction_ros.errors import InputError
+
+LAWS: dict[str, type[SimulatesGrid]] = {"he": HeStiction}
 
 
 def find_law(name: str) -> type[SimulatesGrid]:
@@ -15,16 +17,11 @@ def find_law(name: str) -> type[SimulatesGrid]:
     Raises:
         InputError: no such law.
     """
-    laws = {
-        str(kind.law): kind
-        for kind in BEHAVIOURS
-        if kind.effect == "stiction" and hasattr(kind, "simulate_grid") and kind.law == "he"
-    }
-    if name not in laws:
+    if name not in LAWS:
         raise InputError(
-            f"unknown friction law {name!r}", where="law", fix=f"known laws: {', '.join(laws)}"
+            f"unknown friction law {name!r}", where="law", fix=f"known laws: {', '.join(LAWS)}"
         )
-    return laws[name]
+    return LAWS[name]
 
 
 def triangle(limit: float, steps: int, first: int = 1) -> FloatArray:

@@ -9,8 +9,8 @@ from scipy.stats import chi2
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import around, coarse_grid
+from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.search import Data, Model, ValveScan, scan_valve
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +48,7 @@ def friction_intervals(
         grids.append(around(centre[None, :], step, limit))
         step /= 3.0
     scan = scan_valve(data, model, orders, valve, np.vstack(grids), float(model.start[valve]))
+    scan = _without_standstill(data, model, orders, valve, scan, threshold)
     for _ in range(2):
         best = int(scan.loss.argmin())
         middle = _pattern_middle(scan, best, limit)
@@ -69,7 +70,7 @@ def friction_intervals(
         estimate = 0.5 * (best_band[0] + best_band[1])
         probe = _line(estimate, float(scan.grid[best, 1]), limit)
         middle_scan = scan_valve(data, model, orders, valve, probe, float(model.start[valve]))
-    deadband = scan.grid[:, 0] == scan.grid[:, 1]
+    deadband = (scan.grid[:, 0] == scan.grid[:, 1]) & np.isfinite(scan.loss)
     return FrictionIntervals(
         static=static,
         dynamic=_dynamic_interval(scan, floor, threshold),
@@ -78,6 +79,32 @@ def friction_intervals(
         zero_loss=float(scan.loss[0]) - floor,
         deadband_loss=float(scan.loss[deadband].min()) - floor,
     )
+
+
+def _without_standstill(
+    data: Data, model: Model, orders: Orders, valve: int, scan: ValveScan, threshold: float
+) -> ValveScan:
+    """Drop rows in which the stem hardly moves unless the exact fit does not reject them."""
+    still = (scan.moves < data.min_moves) & (np.arange(len(scan.loss)) > 0)
+    if not still.any():
+        return scan
+    index = int(np.where(still, scan.loss, np.inf).argmin())
+    exact = with_valve(
+        data,
+        model,
+        orders,
+        valve,
+        scan.grid[index],
+        float(model.start[valve]),
+        scan.delays[index],
+        warm=False,
+    )
+    loss = scan.loss.copy()
+    if exact.loss > model.loss + threshold:
+        loss[still] = np.inf
+    else:
+        loss[still] = np.maximum(loss[still], loss[~still].min())
+    return dataclasses.replace(scan, loss=loss)
 
 
 def _deadbands(limit: float) -> FloatArray:
@@ -114,7 +141,7 @@ def _dynamic_interval(scan: ValveScan, floor: float, threshold: float) -> tuple[
     dynamic, excess = scan.grid[order, 1], scan.loss[order] - floor
     values, groups = np.unique(dynamic, return_inverse=True)
     profile = np.full(len(values), np.inf)
-    np.minimum.at(profile, groups, excess)
+    np.minimum.at(profile, groups, np.minimum(excess, 1e12))
     inside = np.flatnonzero(profile <= threshold)
     low, high = float(values[inside[0]]), float(values[inside[-1]])
     if inside[0] > 0:

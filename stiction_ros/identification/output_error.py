@@ -6,6 +6,9 @@ r"""Free-run fit of one output with autoregressive noise.
 A, B and D as in (8a), (8b); D is monic of order p. Noise added to PV is D = 1, noise inside the
 ARX equation (9) is D = A, so both placements lie in the model. Everything linear (B, c and n_a
 terms of the unknown initial state) is eliminated; Gauss-Newton runs over A and D only.
+
+A noise model with a root near one makes the level of the free run invisible. So the criterion
+is n log(Σε²/n) + n κ Σw²/Σy² with a small κ: where the free run is good it changes nothing.
 """
 
 from __future__ import annotations
@@ -13,12 +16,15 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
 
 MAX_RADIUS = 0.9995
+FREE_RUN_WEIGHT = 0.02
+THIN = 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +55,7 @@ class OutputFit:
         b: shape (m, n_b).
         constant: c.
         noise: monic polynomial D, shape (p + 1,).
-        loss: n log(sum of squared innovations / n).
+        loss: the criterion, n log(Σε²/n) + n κ Σw²/Σy².
         energy: sum of squared innovations.
         count: n, number of innovations.
         free_run: simulated output from sample k_0 − p on.
@@ -112,6 +118,7 @@ class _Problem:
     ) -> None:
         self.y, self.orders, self.delays = y, orders, delays
         self.begin = orders.first - orders.noise
+        self.energy = max(float(y[orders.first :] @ y[orders.first :]), 1e-300)
         self.signals = np.zeros((len(stems) + 2, len(y)))
         self.signals[: len(stems)] = stems
         self.signals[-2] = 1.0
@@ -131,14 +138,23 @@ class _Problem:
     def _input_lags(self) -> range:
         return range(1, self.orders.input + 1)
 
-    def evaluate(self, a: FloatArray, noise: FloatArray) -> _Point:
-        """Return the variable-projection solution at (A, D)."""
+    def evaluate(self, a: FloatArray, noise: FloatArray, weight: float = 0.0) -> _Point:
+        """Return the variable-projection solution at (A, D).
+
+        Args:
+            weight: price of Σw², on every ``THIN``-th sample; 0 for innovations only.
+        """
+        factor = float(np.sqrt(THIN * weight))
         p = self.orders.noise
         plain = self.columns(lfilter([1.0], a, self.signals, axis=1))
         scale = np.sqrt(np.einsum("ij,ij->j", plain, plain)) + 1e-300
         plain /= scale
         whitened = lfilter(noise, [1.0], plain, axis=0)[p:]
         target = lfilter(noise, [1.0], self.y[self.begin :])[p:]
+        count = len(target)
+        if weight > 0.0:
+            whitened = np.vstack([whitened, factor * plain[p::THIN]])
+            target = np.concatenate([target, factor * self.y[self.begin + p :: THIN]])
         q, r = np.linalg.qr(whitened)
         diagonal = np.abs(np.diag(r))
         keep = diagonal > 1e-9 * max(float(diagonal.max()), 1e-300)
@@ -147,7 +163,7 @@ class _Problem:
             q, r = np.linalg.qr(whitened[:, keep])
         theta = solve_triangular(r, q.T @ target)
         residual = target - q @ (q.T @ target)
-        return _Point(a, noise, theta / scale, keep, q, plain @ theta, residual)
+        return _Point(a, noise, theta / scale, keep, q, plain @ theta, residual, count, factor)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,10 +171,16 @@ class _Point:
     a: FloatArray
     noise: FloatArray
     theta: FloatArray
-    keep: FloatArray
+    keep: NDArray[np.bool_]
     q: FloatArray
     free_run: FloatArray
     residual: FloatArray
+    count: int
+    factor: float
+
+    @property
+    def innovations(self) -> FloatArray:
+        return self.residual[: self.count]
 
     @property
     def energy(self) -> float:
@@ -185,20 +207,25 @@ def _jacobian(problem: _Problem, point: _Point) -> FloatArray:
     count = len(problem.y) - problem.begin
     # dŷ/da_i = −q^-i ŷ/A; what started before `begin` lies in the span of the initial terms.
     slope = lfilter([1.0], point.a, point.free_run)
-    blocks = []
+    jacobian = np.zeros((len(point.residual), orders.output + p), order="F")
     for i in range(1, orders.output + 1):
         shifted = np.concatenate([np.zeros(i), slope[: count - i]])
-        blocks.append(lfilter(point.noise, [1.0], shifted)[p:])
+        jacobian[: point.count, i - 1] = lfilter(point.noise, [1.0], shifted)[p:]
+        if point.factor > 0.0:
+            jacobian[point.count :, i - 1] = point.factor * shifted[p::THIN]
     w = problem.y[problem.begin :] - point.free_run
-    blocks += [w[p - i : count - i] for i in range(1, p + 1)]
-    jacobian = np.stack(blocks, axis=1)
-    return jacobian - point.q @ (point.q.T @ jacobian)
+    for i in range(1, p + 1):
+        jacobian[: point.count, orders.output + i - 1] = w[p - i : count - i]
+    return np.asarray(jacobian - point.q @ (point.q.T @ jacobian))
 
 
 def _descend(problem: _Problem, point: _Point, max_iterations: int) -> tuple[_Point, bool]:
-    """Levenberg-Marquardt over (a, d) from ``point``."""
+    """Levenberg-Marquardt over (a, d) from ``point``, Σw² priced by its innovations."""
     na = problem.orders.output
     damping = 1e-3
+    innovations = point.innovations
+    weight = FREE_RUN_WEIGHT * float(innovations @ innovations) / problem.energy
+    point = problem.evaluate(point.a, point.noise, weight)
     for _ in range(max_iterations):
         jacobian = _jacobian(problem, point)
         scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
@@ -213,7 +240,7 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int) -> tuple[_Po
             noise = point.noise.copy()
             noise[1:] += step[na:]
             if np.abs(np.roots(a)).max(initial=0.0) < MAX_RADIUS:
-                candidate = problem.evaluate(a, noise)
+                candidate = problem.evaluate(a, noise, weight)
                 if candidate.energy < point.energy:
                     improved = True
                     break
@@ -222,7 +249,7 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int) -> tuple[_Po
             return point, True
         gain = 1.0 - candidate.energy / point.energy
         point, damping = candidate, max(damping / 10.0, 1e-9)
-        if gain * len(point.residual) < 1e-3:
+        if gain * point.count < 1e-3:
             return point, True
     return point, False
 
@@ -257,9 +284,12 @@ def fit_output(
         refined = _steiglitz_mcbride(problem, white)
         noise = ar_fit(y[problem.begin :] - refined.free_run, orders.noise)
         starts = [problem.evaluate(a, padded), problem.evaluate(refined.a, noise)]
-    results = [_descend(problem, point, max_iterations) for point in starts]
-    point, converged = min(results, key=lambda result: result[0].energy)
-    return _finished(problem, point, converged)
+    results = []
+    for point in starts:
+        # Twice: the second time Σw² is priced by the innovations of a good model.
+        point, _ = _descend(problem, point, max_iterations)
+        results.append(_finished(problem, *_descend(problem, point, max_iterations)))
+    return min(results, key=lambda fit: fit.loss)
 
 
 def _steiglitz_mcbride(problem: _Problem, point: _Point, iterations: int = 4) -> _Point:
@@ -278,8 +308,11 @@ def _finished(problem: _Problem, point: _Point, converged: bool) -> OutputFit:
     orders, valves = problem.orders, len(problem.delays)
     theta = np.zeros(len(point.keep))
     theta[point.keep] = point.theta
-    count = len(point.residual)
-    energy = max(point.energy, 1e-300)
+    innovations = point.innovations
+    count = point.count
+    energy = max(float(innovations @ innovations), 1e-300)
+    w = problem.y[problem.orders.first :] - point.free_run[problem.orders.noise :]
+    penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
     return OutputFit(
         orders=orders,
         delays=problem.delays,
@@ -287,10 +320,10 @@ def _finished(problem: _Problem, point: _Point, converged: bool) -> OutputFit:
         b=theta[: valves * orders.input].reshape(valves, orders.input),
         constant=float(theta[valves * orders.input]),
         noise=point.noise,
-        loss=count * float(np.log(energy / count)),
+        loss=count * (float(np.log(energy / count)) + penalty),
         energy=energy,
         count=count,
         free_run=point.free_run,
-        innovations=point.residual,
+        innovations=innovations,
         converged=converged,
     )

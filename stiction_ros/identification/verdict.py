@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.models import Data, Model
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import VerdictKind
-from stiction_ros.identification.search import Data, Model
 
 
 def evidence(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -21,30 +20,8 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, trajectory, values_of
 from stiction_ros.nodes.runner import run
-from stiction_ros.nodes.shared import NodeSettings
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings
-from stiction_ros.settings import setting
-
-
-@dataclasses.dataclass(frozen=True)
-class ControllerSettings(LiveControllerSettings, NodeSettings):
-    """The live controller's settings and what belongs to the node."""
-
-    model: str = setting("", "loop model file the controller is built from", fixed=True)
-    pace: str = setting(
-        "lockstep",
-        "lockstep holds op until an awaited fit is there; realtime does not",
-        choices=("lockstep", "realtime"),
-        fixed=True,
-    )
-    sp_source: str = setting(
-        "schedule",
-        "schedule: sp comes with every pv; external: the last sp (transient local) holds",
-        choices=("schedule", "external"),
-        fixed=True,
-    )
-    fit_timeout: float = setting(120.0, "s to wait for an awaited fit", low=0.1, high=1e5)
-    prediction_points: int = setting(11, "points of the published plan", low=1, high=1001)
+from stiction_ros.online.live_controller import LiveController
+from stiction_ros.online.node_settings import ControllerNodeSettings
 
 
 class ControllerNode(ManagedNode):
@@ -52,7 +29,7 @@ class ControllerNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``controller``; ``kwargs`` go to the ROS node."""
-        super().__init__("controller", ControllerSettings, **kwargs)
+        super().__init__("controller", ControllerNodeSettings, **kwargs)
         self._wall = RosClock(clock_type=ClockType.STEADY_TIME)
 
     def configure(self) -> None:
@@ -85,11 +62,11 @@ class ControllerNode(ManagedNode):
         sp_qos = QoSProfile(depth=100)
         if settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
-        self.create_subscription(JointState, "pv", self._on_pv, SIGNAL_QOS)
-        self.create_subscription(JointState, "sp", self._on_sp, sp_qos)
-        self.create_subscription(JointState, "dv", self._on_dv, SIGNAL_QOS)
-        self.create_subscription(JointState, "stiction", self._on_stiction, SIGNAL_QOS)
-        self.create_subscription(String, "loop_model", self._on_model, LATCHED_QOS)
+        self.inlet(JointState, "pv", self._on_pv, SIGNAL_QOS, ("plant",))
+        self.inlet(JointState, "sp", self._on_sp, sp_qos)
+        self.inlet(JointState, "dv", self._on_dv, SIGNAL_QOS)
+        self.inlet(JointState, "stiction", self._on_stiction, SIGNAL_QOS, ("estimator",))
+        self.inlet(String, "loop_model", self._on_model, LATCHED_QOS, ("estimator",))
 
     def configuration(self) -> dict[str, Any]:
         return {"model": self.model.to_mapping()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections import deque
@@ -18,18 +17,9 @@ from stiction_ros.identification import Identification
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, values_of
 from stiction_ros.nodes.runner import run
-from stiction_ros.nodes.shared import NodeSettings
-from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator
+from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator
+from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.worker import FitWorker
-from stiction_ros.settings import setting
-
-
-@dataclasses.dataclass(frozen=True)
-class EstimatorNodeSettings(EstimatorSettings, NodeSettings):
-    """The live estimator's settings and what belongs to the node."""
-
-    loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
-    sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
 
 
 class EstimatorNode(ManagedNode):
@@ -59,8 +49,8 @@ class EstimatorNode(ManagedNode):
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.create_subscription(JointState, "pv", self._on_pv, SIGNAL_QOS)
-        self.create_subscription(JointState, "op", self._on_op, SIGNAL_QOS)
+        self.inlet(JointState, "pv", self._on_pv, SIGNAL_QOS, ("plant",))
+        self.inlet(JointState, "op", self._on_op, SIGNAL_QOS, ("controller",))
 
     def hardware(self) -> str:
         return str(self.settings.loop)
@@ -87,6 +77,7 @@ class EstimatorNode(ManagedNode):
         if self._worker is not None:
             self._worker.close()
             self._worker = None
+            self._collect()
 
     # ---- samples in ------------------------------------------------------------------------
 

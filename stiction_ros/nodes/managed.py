@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,6 +12,7 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
 from stiction_ros import __version__
@@ -58,9 +60,9 @@ class ManagedNode(LifecycleNode):
         self.running = False
         self.stamp = 0
         self.outlets: dict[str, Outlet] = {}
-        self._linked = False
+        self._inlets: list[tuple[str, Subscription, tuple[str, ...]]] = []
+        self._ready = self._linked = self._tunable = False
         self._link_timer: Any = None
-        self._tunable = False
         parameters.declare(self, settings)
         self.settings = settings()
 
@@ -91,7 +93,7 @@ class ManagedNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.running = False
+        self._stop()
         self.finished = True
         return TransitionCallbackReturn.SUCCESS
 
@@ -115,34 +117,28 @@ class ManagedNode(LifecycleNode):
             outlet.publisher.wait_for_all_acked(Duration(seconds=2.0))
 
     def _configure(self) -> None:
+        parameters.refuse_unknown(self)
         self.settings = parameters.read(self, self.settings_class)
         self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
-        self._config = self.outlet(String, "~/config", LATCHED_QOS)
         self._beat = self.create_timer(1.0, self._each_second)
         self.configure()
         self.add_on_set_parameters_callback(self._on_set)
         self._tunable = True
-        document = {
-            "node": self.get_fully_qualified_name(),
-            "version": __version__,
-            "parameters": parameters.as_mapping(self.settings),
-        }
-        text = yaml.safe_dump(document | self.configuration(), sort_keys=False)
-        self._config.publish(String(data=text))
 
     def _activate(self) -> None:
-        self._linked = False
+        self._ready = self._linked = False
         self.activate()
         self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
 
     def _stop(self) -> None:
-        self.running = self._linked = False
+        self.running = False
         if self._link_timer is not None:
             self.destroy_timer(self._link_timer)
             self._link_timer = None
 
     def _tear_down(self) -> None:
         self._stop()
+        self._linked = False
         if self._tunable:
             self.remove_on_set_parameters_callback(self._on_set)
             self._tunable = False
@@ -151,7 +147,7 @@ class ManagedNode(LifecycleNode):
             self.destroy_subscription(subscription)
         for outlet in self.outlets.values():
             self.destroy_publisher(outlet.publisher)
-        self.outlets = {}
+        self.outlets, self._inlets = {}, []
 
     def _guarded(self, action: Any) -> TransitionCallbackReturn:
         self.failure = ""
@@ -163,6 +159,10 @@ class ManagedNode(LifecycleNode):
             if self.outlets:
                 self._tear_down()
             return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it without a word
+            self.failure = f"internal error: {error!r}"
+            self.get_logger().error(traceback.format_exc())
+            return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
     # ---- topics ----------------------------------------------------------------------------
@@ -175,26 +175,62 @@ class ManagedNode(LifecycleNode):
         self.outlets[topic] = Outlet(publisher, (*readers, "recorder"))
         return self.outlets[topic]
 
+    def inlet(
+        self, kind: Any, topic: str, take: Any, qos: QoSProfile, writers: tuple[str, ...] = ()
+    ) -> None:
+        """Subscribe; ``writers`` are the nodes whose first message must not be missed."""
+        subscription = self.create_subscription(kind, topic, take, qos)
+        self._inlets.append((topic, subscription, writers))
+
     def linked(self) -> None:
-        """Called once when every node of ``wait_for`` has matched."""
+        """Called once when every node of ``wait_for`` has matched, in both directions."""
 
     def _look_for_peers(self) -> None:
+        """Become ready when all writers have matched; begin when all peers are ready.
+
+        A reader of a volatile topic misses what is sent before it has matched the writer,
+        also when the writer has matched it already. So each node looks at its own readers
+        first and then says that it is ready by announcing ``~/config``.
+        """
         wanted = {name for name in self.settings.wait_for if name}
-        heard = set()
-        for topic, outlet in self.outlets.items():
-            found = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))
-            names = {info.node_name for info in found}
-            heard |= names
-            if not wanted.intersection(outlet.readers) <= names:
+        if not self._ready:
+            if not all(self._hears(*inlet, wanted) for inlet in self._inlets):
                 return
-            if outlet.publisher.get_subscription_count() < len(found):
+            if "~/config" not in self.outlets:  # it is there already after a pause
+                self._announce_configuration()
+            self._ready = True
+        namespace = self.get_namespace().rstrip("/")
+        for name in wanted:
+            announced = self.get_publishers_info_by_topic(f"{namespace}/{name}/config")
+            if all(info.node_name != name for info in announced):
                 return
-        if not wanted <= heard:
-            return
-        self._stop()
-        self._linked = self.running = True
-        self.report()
-        self.linked()
+        if all(self._is_heard(topic, outlet, wanted) for topic, outlet in self.outlets.items()):
+            self._stop()
+            self._linked = self.running = True
+            self.report()
+            self.linked()
+
+    def _hears(
+        self, topic: str, inlet: Subscription, writers: tuple[str, ...], wanted: set[str]
+    ) -> bool:
+        found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
+        names = {info.node_name for info in found}
+        return wanted.intersection(writers) <= names and inlet.get_publisher_count() >= len(found)
+
+    def _is_heard(self, topic: str, outlet: Outlet, wanted: set[str]) -> bool:
+        found = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))
+        names = {info.node_name for info in found}
+        matched = outlet.publisher.get_subscription_count()
+        return wanted.intersection(outlet.readers) <= names and matched >= len(found)
+
+    def _announce_configuration(self) -> None:
+        document = {
+            "node": self.get_fully_qualified_name(),
+            "version": __version__,
+            "parameters": parameters.as_mapping(self.settings),
+        }
+        text = yaml.safe_dump(document | self.configuration(), sort_keys=False)
+        self.outlet(String, "~/config", LATCHED_QOS).publish(String(data=text))
 
     # ---- parameters ------------------------------------------------------------------------
 

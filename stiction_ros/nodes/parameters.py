@@ -42,11 +42,26 @@ def read(node: Node, cls: type[Any], changed: dict[str, Any] | None = None) -> A
     """
     values = {}
     for entry in settings_of(cls):
-        value = node.get_parameter(entry.name).value
+        value = node.get_parameter_or(entry.name).value
+        if value is None:  # an empty list in a parameter file has no type
+            value = entry.default
         if changed is not None and entry.name in changed:
             value = changed[entry.name]
         values[entry.name] = check(entry, value, node.get_name())
     return cls(**values)
+
+
+def refuse_unknown(node: Node) -> None:
+    """Raise InputError for a given parameter that the node does not have.
+
+    rclpy itself passes over it without a word.
+    """
+    for name in node._parameter_overrides:  # there is no public way to these names
+        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
+            known = ", ".join(sorted(node.get_parameters_by_prefix("")))
+            raise InputError(
+                f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
+            )
 
 
 def refusal(error: InputError) -> SetParametersResult:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -15,28 +14,7 @@ from stiction_ros.loop import LoopModel, Plant, SetPoints
 from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.runner import run
-from stiction_ros.nodes.shared import NodeSettings
-from stiction_ros.settings import setting
-
-
-@dataclasses.dataclass(frozen=True)
-class PlantSettings(NodeSettings):
-    """What the plant simulates, how long and how fast."""
-
-    model: str = setting("", "loop model file, *.loop.yaml", fixed=True)
-    set_points: str = setting(
-        "", "set-point schedule file; empty when sp comes from elsewhere", fixed=True
-    )
-    seed: int = setting(0, "seed of the noise", low=0, fixed=True)
-    samples: int = setting(0, "samples to run; 0 runs until stopped", low=0, fixed=True)
-    pace: str = setting(
-        "lockstep",
-        "lockstep waits for the op of each sample; realtime does not",
-        choices=("lockstep", "realtime"),
-        fixed=True,
-    )
-    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
-    start_time: float = setting(1.0, "simulated time of the first sample, s", low=0.0, fixed=True)
+from stiction_ros.online.node_settings import PlantNodeSettings
 
 
 class PlantNode(ManagedNode):
@@ -44,7 +22,7 @@ class PlantNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``plant``; ``kwargs`` go to the ROS node."""
-        super().__init__("plant", PlantSettings, **kwargs)
+        super().__init__("plant", PlantNodeSettings, **kwargs)
         self._pacer: Any = None
 
     def configure(self) -> None:
@@ -61,6 +39,7 @@ class PlantNode(ManagedNode):
         self._step = round(self.model.sample_time * SECOND)
         self._start = round(settings.start_time * SECOND)
         self.stamp = self._start
+        self._every = -(-settings.samples // 100)  # a hundred lines of progress
         self._clock_out = self.outlet(Clock, "/clock", SIGNAL_QOS)
         self._pv = self.outlet(JointState, "pv", SIGNAL_QOS, ("controller", "estimator"))
         self._sp = None
@@ -70,7 +49,7 @@ class PlantNode(ManagedNode):
         self._dv = None
         if self.model.process.measured_disturbances:
             self._dv = self.outlet(JointState, "dv", SIGNAL_QOS, ("controller",))
-        self.create_subscription(JointState, "op", self._on_op, SIGNAL_QOS)
+        self.inlet(JointState, "op", self._on_op, SIGNAL_QOS, ("controller",))
 
     def configuration(self) -> dict[str, Any]:
         return {"seed": self.settings.seed, "model": self.model.to_mapping()}
@@ -118,8 +97,10 @@ class PlantNode(ManagedNode):
         self.stamp = self._start + self.plant.sample * self._step
         if self.plant.sample == self.settings.samples:
             self.running, self.finished = False, True
-            return
-        self._show()
+        else:
+            self._show()
+        if self._every and self.plant.sample % self._every == 0:
+            self.get_logger().info(f"sample {self.plant.sample} of {self.settings.samples}")
 
     def _show(self) -> None:
         measured = self.plant.measure()

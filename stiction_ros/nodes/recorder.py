@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import re
 import struct
@@ -16,28 +15,14 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes.managed import ManagedNode
 from stiction_ros.nodes.messages import SECOND
 from stiction_ros.nodes.runner import run
-from stiction_ros.nodes.shared import NodeSettings
+from stiction_ros.online.node_settings import RecorderNodeSettings
 from stiction_ros.records.bag_metadata import Qos
 from stiction_ros.records.bag_writer import BagWriter
 from stiction_ros.records.message_definitions import definition
-from stiction_ros.settings import setting
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
 READER_DEPTH = 5000  # messages kept by the reader while the process is busy
 _CLOCK_BYTES = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
-
-
-@dataclasses.dataclass(frozen=True)
-class RecorderSettings(NodeSettings):
-    """What is recorded, and where."""
-
-    directory: str = setting("bag", "the bag, a directory that holds nothing yet", fixed=True)
-    topics: str = setting(
-        ".*", "regular expression of the full names of the topics to record", fixed=True
-    )
-    compression: str = setting(
-        "zstd", "of the finished bag", choices=("zstd", "lz4", "none"), fixed=True
-    )
 
 
 class RecorderNode(ManagedNode):
@@ -45,7 +30,7 @@ class RecorderNode(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``recorder``; ``kwargs`` go to the ROS node."""
-        super().__init__("recorder", RecorderSettings, **kwargs)
+        super().__init__("recorder", RecorderNodeSettings, **kwargs)
         self.writer: BagWriter | None = None
 
     def configure(self) -> None:

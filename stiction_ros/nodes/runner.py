@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -12,6 +13,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from stiction_ros.nodes.managed import ManagedNode
+from stiction_ros.orphans import DIE_WITH_PARENT, die_with_parent
 
 HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r FROM:=TO ...]]
 
@@ -33,6 +35,8 @@ def run(
     if "-h" in arguments[1:] or "--help" in arguments[1:]:
         print(HELP.format(name=name, description=description), end="")
         return 0
+    if os.environ.get(DIE_WITH_PARENT):
+        die_with_parent(signal.SIGTERM)
     stop: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: stop.append(received))
@@ -49,7 +53,6 @@ def run(
         if node.get_parameter("autostart").value:
             node.start()
         if node.failure:
-            print(f"{name}: {node.failure}", file=sys.stderr)
             return 2
         try:
             while not stop and not node.finished:

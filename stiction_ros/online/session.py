@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros import settings as settings_module
 from stiction_ros.control import ControlMode
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -21,20 +20,22 @@ from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, 
 from stiction_ros.loop.reading import Section, load_yaml
 from stiction_ros.online.live_controller import LiveController, LiveControllerSettings, ModeChange
 from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
+from stiction_ros.online.node_settings import (
+    ControllerNodeSettings,
+    EstimatorNodeSettings,
+    NodeSettings,
+    PlantNodeSettings,
+    RecorderNodeSettings,
+)
 from stiction_ros.records import Record
+from stiction_ros.settings import from_mapping as settings_from_mapping
 
-# Parameters that belong to the nodes themselves: the core only knows their names.
-_EVERY_NODE = ("autostart", "wait_for")
-PLANT_NODE_KEYS = (
-    *_EVERY_NODE,
-    *("model", "set_points", "seed", "samples", "pace", "speed", "start_time"),
-)
-CONTROLLER_NODE_KEYS = (
-    *_EVERY_NODE,
-    *("model", "pace", "sp_source", "fit_timeout", "prediction_points"),
-)
-ESTIMATOR_NODE_KEYS = (*_EVERY_NODE, "loop", "sample_time")
-RECORDER_NODE_KEYS = (*_EVERY_NODE, "directory", "topics", "compression")
+NODE_SETTINGS: Mapping[str, type[NodeSettings]] = {
+    "plant": PlantNodeSettings,
+    "controller": ControllerNodeSettings,
+    "estimator": EstimatorNodeSettings,
+    "recorder": RecorderNodeSettings,
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Scenario:
 
     Attributes:
         name: stem of the file.
+        path: the file.
         nodes: parameters by node name, as written.
         plant, process: the simulated loop, and the model that the controller is built from.
         set_points: schedule.
@@ -51,6 +53,7 @@ class Scenario:
     """
 
     name: str
+    path: Path
     nodes: Mapping[str, Mapping[str, Any]]
     plant: LoopModel
     process: LoopModel
@@ -71,50 +74,41 @@ class Scenario:
         """
         path = Path(path)
         top = Section(load_yaml(path), str(path))
-        nodes = {}
-        for name in top.values:
-            nodes[str(name)] = dict(top.section(str(name)).section("ros__parameters").values)
-        for needed in ("plant", "controller", "estimator"):
-            if needed not in nodes:
-                raise InputError(f"lacks the node {needed!r}", where=str(path))
-        plant = Section(nodes["plant"], f"{path}: plant")
-        controlled = Section(nodes["controller"], f"{path}: controller")
-        model = LoopModel.load(path.parent / plant.text("model"))
-        points = SetPoints.load(path.parent / plant.text("set_points"), model.outputs)
-        for name, known in (("plant", PLANT_NODE_KEYS), ("recorder", RECORDER_NODE_KEYS)):
-            for key in nodes.get(name, {}):
-                if key not in known:
-                    raise InputError(
-                        f"unknown key {key!r}",
-                        where=f"{path}: {name}",
-                        fix=f"known keys: {', '.join(known)}",
-                    )
-        process = LoopModel.load(path.parent / controlled.text("model"))
-        controller = _settings(
-            LiveControllerSettings, nodes["controller"], CONTROLLER_NODE_KEYS, path
-        )
-        estimator = _settings(EstimatorSettings, nodes["estimator"], ESTIMATOR_NODE_KEYS, path)
+        nodes: dict[str, dict[str, Any]] = {}
+        checked: dict[str, Any] = {}
+        for name, cls_of_node in NODE_SETTINGS.items():
+            values = top.section(name).section("ros__parameters").values
+            nodes[name] = dict(values)
+            checked[name] = settings_from_mapping(cls_of_node, values, f"{path}: {name}")
+        top.finish()
+        plant, controller = checked["plant"], checked["controller"]
+        if plant.samples < 1 or not plant.set_points:
+            raise InputError("a scenario needs samples ≥ 1 and set_points", where=f"{path}: plant")
+        model = LoopModel.load(path.parent / plant.model)
+        process = LoopModel.load(path.parent / controller.model)
+        if (process.valve_names, process.outputs) != (model.valve_names, model.outputs):
+            raise InputError(
+                "names other valves or outputs than the plant's model",
+                where=f"{path}: controller: {controller.model}",
+                fix=f"use {', '.join(model.valve_names)} and {', '.join(model.outputs)}",
+            )
         try:
             controller.design(process)
-            estimator.options()
+            checked["estimator"].options()
         except InputError as error:
             raise error.within(str(path)) from None
         return cls(
-            path.stem.split(".")[0],
+            path.name.split(".")[0],
+            path,
             nodes,
             model,
             process,
-            points,
-            plant.integer("seed", 0),
-            plant.integer("samples", low=1),
+            SetPoints.load(path.parent / plant.set_points, model.outputs),
+            plant.seed,
+            plant.samples,
             controller,
-            estimator,
+            checked["estimator"],
         )
-
-
-def _settings(cls: type[Any], values: Mapping[str, Any], apart: tuple[str, ...], path: Path) -> Any:
-    own = {key: value for key, value in values.items() if key not in apart}
-    return settings_module.from_mapping(cls, own, str(path))
 
 
 @dataclasses.dataclass(frozen=True)

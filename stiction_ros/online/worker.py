@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import ctypes
 import multiprocessing
 import os
 import signal
-import sys
 from concurrent.futures import Future, ProcessPoolExecutor
 
 from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.online.live_estimator import fit
+from stiction_ros.orphans import die_with_parent
 from stiction_ros.records import Record
-
-_PR_SET_PDEATHSIG = 1
 
 
 class FitWorker:
@@ -40,6 +37,4 @@ class FitWorker:
 def _settle() -> None:
     """Prepare the worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        # The kernel ends the worker when its parent dies, however that happens.
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent(signal.SIGKILL)

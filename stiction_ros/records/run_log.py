@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records.bag_messages import (
     BagMessage,
     MessageDecoder,
@@ -21,6 +26,7 @@ from stiction_ros.records.record import Record
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _STRING = "std_msgs/msg/String"
 _CLOCK = "rosgraph_msgs/msg/Clock"
+_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,12 +57,29 @@ class ModeChange:
         mode: ``unaware``, ``embedding``, ``inversion`` or ``hold``.
         model: of the valves that it works with, as the controller names it.
         reason: why it changed.
+        frictions: what it takes for the friction of its valves, by ``V1.f_s``, %.
     """
 
     stamp: int
     mode: str
     model: str = ""
     reason: str = ""
+    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """One fit of the estimator.
+
+    Attributes:
+        stamp: end of the window, ns.
+        identification: the mapping of ``identify --json`` without ``record``.
+        trusted: friction trusted after this fit, by ``V1.f_s``, %.
+    """
+
+    stamp: int
+    identification: Mapping[str, Any]
+    trusted: Mapping[str, float]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,13 +99,17 @@ class RunLog:
         record: the loop's signals.
         start: stamp of the record's first sample, ns.
         estimates: in the order they came.
-        modes: every change of mode or model, the mode at the start first.
+        modes: every change of mode, model or friction, the mode at the start first.
         loop_models: the YAML texts on ``loop_model``.
         configs: what the nodes published on ``~/config``.
         clock: the simulated times on ``/clock``, ns.
         recorded: messages in the bag by topic.
         published: messages by topic as the nodes counted them in ``/diagnostics``.
         notes: what was left out while reading, one sentence each.
+        fits: in the order of their windows.
+        stem_estimate: the controller's estimate of the stem positions at the record's
+            samples, shape (N, m), %, NaN where none was published; None when there is none.
+        wall_seconds: from the first to the last publication, on the publishers' clock.
     """
 
     record: Record
@@ -95,6 +122,9 @@ class RunLog:
     recorded: Mapping[str, int]
     published: Mapping[str, int]
     notes: tuple[str, ...] = ()
+    fits: tuple[Fit, ...] = ()
+    stem_estimate: FloatArray | None = None
+    wall_seconds: float = float("nan")
 
     def seconds(self, stamp: int) -> float:
         """Return the time of a stamp in s since the first sample."""
@@ -109,6 +139,24 @@ class RunLog:
                 return change
             before = change.mode
         return None
+
+    @property
+    def swap_sample(self) -> int | None:
+        """Number of the record's sample at which the swap took place."""
+        if self.swap is None:
+            return None
+        return round(self.seconds(self.swap.stamp) / self.record.sample_time)
+
+    @property
+    def fit_at_swap(self) -> Fit | None:
+        """The last fit whose window ended before the swap."""
+        if self.swap is None:
+            return None
+        return max(
+            (fit for fit in self.fits if fit.stamp < self.swap.stamp),
+            key=lambda fit: fit.stamp,
+            default=None,
+        )
 
 
 def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
@@ -126,8 +174,10 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     messages: list[BagMessage] = []
     signals = LoopSignals(str(path))
     decoder = MessageDecoder()
+    sent: list[int] = []
     for raw in read_raw(path, notes):
         recorded[raw.topic.name] += 1
+        sent.append(raw.publish_time)
         signal = is_signal(raw.topic)
         if not signal and not _wanted(raw.topic):
             continue
@@ -140,9 +190,11 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
             messages.append(message)
     notes.extend(decoder.notes)
     record = signals.record(Path(path).name, namespace, notes)
+    start = signals.first_stamp(namespace)
+    stamps = start + np.rint(record.time * 1e9).astype(np.int64)
     return RunLog(
         record=record,
-        start=signals.first_stamp(namespace),
+        start=start,
         estimates=estimates(messages),
         modes=mode_changes(messages) or mode_texts(messages),
         loop_models=texts(messages, "loop_model"),
@@ -151,6 +203,9 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         recorded=dict(recorded),
         published=published_counts(messages),
         notes=record.notes,
+        fits=fits(messages),
+        stem_estimate=stem_estimate(messages, stamps.tolist(), record.valves),
+        wall_seconds=(max(sent) - min(sent)) / 1e9,
     )
 
 
@@ -168,7 +223,7 @@ def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
 
 
 def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
-    """Return the changes of mode or model that ``/diagnostics`` tells, with swap times."""
+    """Return the changes of mode, model or friction in ``/diagnostics``, with swap times."""
     changes: list[ModeChange] = []
     for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
         for status in message.message.status:
@@ -180,10 +235,64 @@ def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
                 values["mode"],
                 values.get("model", ""),
                 values.get("reason", ""),
+                _frictions(values, "."),
             )
-            if not changes or (changes[-1].mode, changes[-1].model) != (change.mode, change.model):
+            if not changes or _force(changes[-1]) != _force(change):
                 changes.append(change)
     return tuple(changes)
+
+
+def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
+    """Return the fits that ``/diagnostics`` tells, by the end of their window."""
+    found: dict[int, Fit] = {}
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            values = {item.key: item.value for item in status.values}
+            if "identification" not in values or not values.get("window_end", "").isdecimal():
+                continue
+            try:
+                identification = json.loads(values["identification"])
+            except json.JSONDecodeError:
+                continue
+            if isinstance(identification, dict):
+                stamp = int(values["window_end"])
+                found[stamp] = Fit(stamp, identification, _frictions(values, ".trusted_"))
+    return tuple(found[stamp] for stamp in sorted(found))
+
+
+def stem_estimate(
+    messages: Iterable[BagMessage], stamps: Sequence[int], valves: Sequence[str]
+) -> FloatArray | None:
+    """Return the stem positions, shape (N, m), in the first points on ``prediction``."""
+    rows: dict[int, list[float]] = {}
+    for message in _of(messages, _TRAJECTORY, "prediction"):
+        plan = message.message
+        if not plan.points:
+            continue
+        found = dict(zip(plan.joint_names, plan.points[0].positions, strict=False))
+        rows[stamp_ns(plan)] = [float(found.get(name, np.nan)) for name in valves]
+    if not rows:
+        return None
+    unknown = [float("nan")] * len(valves)
+    return np.array([rows.get(stamp, unknown) for stamp in stamps]).reshape(-1, len(valves))
+
+
+def _force(change: ModeChange) -> tuple[object, ...]:
+    return change.mode, change.model, change.frictions
+
+
+def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
+    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
+    found = {}
+    for key, value in values.items():
+        valve, dot, name = key.rpartition(mark)
+        if not (valve and dot and name in ("f_s", "f_d")):
+            continue
+        try:
+            found[f"{valve}.{name}"] = float(value)
+        except ValueError:
+            continue
+    return found
 
 
 def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
@@ -237,6 +346,7 @@ def _wanted(topic: BagTopic) -> bool:
         (JOINT_STATE, "stiction"),
         (_DIAGNOSTICS, "diagnostics"),
         (_CLOCK, "clock"),
+        (_TRAJECTORY, "prediction"),
         (_STRING, "mode"),
         (_STRING, "loop_model"),
         (_STRING, "config"),

@@ -1,7 +1,6 @@
-from __future__ import annotations
+"""Makes the helpers of this folder importable."""
 
 import sys
 from pathlib import Path
 
-# The tests of this folder share graph.py; importlib mode does not look beside them.
 sys.path.insert(0, str(Path(__file__).parent))

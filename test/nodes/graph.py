@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import os
+import random
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
@@ -30,6 +33,7 @@ KINDS: dict[str, type[ManagedNode]] = {
     "estimator": EstimatorNode,
     "recorder": RecorderNode,
 }
+DOMAINS = itertools.cycle(random.SystemRandom().sample(range(1, 101), 100))
 BUDGET = 30.0  # s; a test that needs this long has failed
 
 SIGNALS: dict[str, type[Any]] = {
@@ -54,8 +58,14 @@ class Graph:
     """Nodes that are built, spun and ended together."""
 
     def __init__(self) -> None:
-        self.context = Context()
-        self.context.init()
+        # Nothing of another process is discovered, nor what an earlier graph has left.
+        before = os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "OFF"
+        try:
+            self.context = Context()
+            self.context.init(domain_id=next(DOMAINS))
+        finally:
+            os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = before
         self.executor = SingleThreadedExecutor(context=self.context)
         self.nodes: list[Node] = []
         self.seen: dict[str, list[Any]] = defaultdict(list)
@@ -75,9 +85,15 @@ class Graph:
         """Build a node that the test itself talks through."""
         return self.adopt(Node(name, context=self.context))
 
+    def peer(self, name: str) -> Node:
+        """Build a plain node that says it is ready, as the nodes of ``wait_for`` do."""
+        node = self.plain(name)
+        node.create_publisher(String, "~/config", LATCHED_QOS)
+        return node
+
     def listen(self, name: str = "recorder") -> Node:
         """Note every message of every topic, under the name that the nodes wait for."""
-        node = self.plain(name)
+        node = self.peer(name)
         for topic, kind in SIGNALS.items():
             node.create_subscription(kind, topic, self.seen[topic].append, SIGNAL_QOS)
         for topic, kind in LATCHED.items():

@@ -16,9 +16,7 @@ from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel, simulate_closed_loop
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.messages import joint_state, to_ns
-from stiction_ros.online import session
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings
-from stiction_ros.online.live_estimator import EstimatorSettings
+from stiction_ros.online.live_controller import LiveController
 from stiction_ros.settings import settings_of
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -98,10 +96,7 @@ def test_a_node_waits_for_its_peers(kind: str, graph: Graph, tmp_path: Path) -> 
     node.start()
     graph.spin_some()
     assert not node.running
-    peer = graph.plain("listener")
-    for topic in ("/diagnostics",):
-        kind_of = node.outlets[topic].publisher.msg_type
-        peer.create_subscription(kind_of, topic, lambda _: None, 10)
+    graph.peer("listener")
     graph.spin_until(lambda: node.running, f"{kind} to find its peer")
 
 
@@ -238,25 +233,6 @@ def test_parameters_of_ros_itself_can_be_set(graph: Graph, tmp_path: Path) -> No
     node.start()
     (result,) = node.set_parameters([Parameter("use_sim_time", value=True)])
     assert result.successful
-
-
-KEYS = {
-    "plant": session.PLANT_NODE_KEYS,
-    "recorder": session.RECORDER_NODE_KEYS,
-    "controller": session.CONTROLLER_NODE_KEYS,
-    "estimator": session.ESTIMATOR_NODE_KEYS,
-}
-
-
-@every_kind
-def test_a_scenario_file_may_set_every_parameter_of_a_node(kind: str, graph: Graph) -> None:
-    """The core reads scenario files without ROS, so it keeps the nodes' names itself."""
-    core = {
-        "controller": settings_of(LiveControllerSettings),
-        "estimator": settings_of(EstimatorSettings),
-    }.get(kind, ())
-    declared = {entry.name for entry in settings_of(graph.add(kind).settings_class)}
-    assert {*KEYS[kind], *(entry.name for entry in core)} == declared
 
 
 # ---- topics ------------------------------------------------------------------------------------

@@ -141,7 +141,7 @@ def test_a_missing_node_is_named(node: str, tmp_path: Path) -> None:
     document = yaml.safe_load(path.read_text())
     del document[node]
     path.write_text(yaml.safe_dump(document))
-    with pytest.raises(InputError, match=f"lacks the node '{node}'"):
+    with pytest.raises(InputError, match=f"lacks '{node}'; add {node}"):
         Scenario.load(path)
 
 

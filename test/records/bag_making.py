@@ -57,6 +57,15 @@ def diagnostics(stamp: int, name: str, values: dict[str, str]) -> bytes:
     return cdr("diagnostic_msgs/msg/DiagnosticArray", header(stamp), [status])
 
 
+def trajectory(stamp: int, names: Sequence[str], first: Sequence[float]) -> bytes:
+    nothing = np.array([])
+    start = message("builtin_interfaces/msg/Duration", 0, 0)
+    position = np.array(first, dtype=float)
+    kind = "trajectory_msgs/msg/JointTrajectoryPoint"
+    point = message(kind, position, nothing, nothing, nothing, start)
+    return cdr("trajectory_msgs/msg/JointTrajectory", header(stamp), list(names), [point])
+
+
 @dataclasses.dataclass
 class Bag:
     """A bag writer that knows the types of its messages and remembers what it wrote."""
@@ -81,6 +90,10 @@ class Bag:
     def diagnostics(self, stamp: int, name: str, values: dict[str, str]) -> None:
         data = diagnostics(stamp, name, values)
         self.put("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", data, stamp)
+
+    def prediction(self, stamp: int, names: Sequence[str], first: Sequence[float]) -> None:
+        data = trajectory(stamp, names, first)
+        self.put("/prediction", "trajectory_msgs/msg/JointTrajectory", data, stamp)
 
     def loop(self, samples: int, space: str = "", start: int = 5 * SECOND) -> None:
         """Write ``samples`` samples of one loop, one second apart."""

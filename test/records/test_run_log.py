@@ -4,7 +4,7 @@ import math
 
 from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
 
-from stiction_ros.records.run_log import Estimate, ModeChange, read_run
+from stiction_ros.records.run_log import Estimate, Fit, ModeChange, read_run
 
 
 def test_a_run(bag: Bag) -> None:
@@ -67,3 +67,42 @@ def test_without_diagnostics_the_mode_topic_stands_in(bag: Bag) -> None:
 def test_a_run_that_never_swaps(bag: Bag) -> None:
     bag.loop(5)
     assert read_run(bag.writer.directory).swap is None
+
+
+def test_fits_and_the_friction_that_the_controller_works_with(bag: Bag) -> None:
+    start = 5 * SECOND
+    bag.loop(10)
+    known = {"V1.f_s": "8.0", "V1.f_d": "1.0", "V1.trusted_f_s": "9"}
+    for k, more in ((0, {}), (4, known), (7, {**known, "V1.f_s": "7.5"}), (8, {"V1.f_s": "?"})):
+        values = {"mode": "embedding", "model": "tank", **more}
+        bag.diagnostics(start + k * SECOND, "controller: mode", values)
+    fit = {
+        "window_end": str(start + 3 * SECOND),
+        "V1.trusted_f_s": "8.0",
+        "identification": '{"valves": []}',
+    }
+    bag.diagnostics(start + 4 * SECOND, "estimator: fit", fit)
+    bag.diagnostics(start + 4 * SECOND, "estimator: fit", {**fit, "identification": "{"})
+    bag.writer.close()
+    run = read_run(bag.writer.directory)
+    assert run.fits == (Fit(start + 3 * SECOND, {"valves": []}, {"V1.f_s": 8.0}),)
+    assert [change.frictions for change in run.modes] == [
+        {},
+        {"V1.f_s": 8.0, "V1.f_d": 1.0},
+        {"V1.f_s": 7.5, "V1.f_d": 1.0},
+        {},
+    ]
+
+
+def test_stem_estimates_come_from_the_first_point_of_the_prediction(bag: Bag) -> None:
+    start = 5 * SECOND
+    bag.loop(4)
+    for k in (0, 2, 3):
+        bag.prediction(start + k * SECOND, ["C", "T", "V2", "V1"], [7.0, 42.0, 20.0 + k, 10.0 + k])
+    bag.writer.close()
+    run = read_run(bag.writer.directory)
+    assert run.stem_estimate is not None
+    assert run.stem_estimate.shape == (4, 2)
+    assert run.stem_estimate[[0, 2, 3]].tolist() == [[10.0, 20.0], [12.0, 22.0], [13.0, 23.0]]
+    assert all(math.isnan(value) for value in run.stem_estimate[1])
+    assert run.wall_seconds == 3.0

@@ -1,0 +1,151 @@
+"""``stiction demo``: a live loop from limit cycle to compensation, recorded and reported."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
+from stiction_ros.cli.progress import Bar, bar
+from stiction_ros.cli.scenarios import SCENARIOS, find, node_parameters
+from stiction_ros.errors import InputError
+from stiction_ros.online.session import Scenario
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "demo",
+        help="run a live loop: cycle, identify, swap, record, report",
+        description="Start plant, controller, estimator and recorder as processes; let the loop "
+        "cycle; identify the friction; swap the controller; record all traffic; write the report.",
+    )
+    parser.add_argument(
+        "scenario",
+        nargs="*",
+        metavar="SCENARIO",
+        help="tank, siso, or a file (default: both)",
+    )
+    parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    parser.add_argument(
+        "--speed",
+        default="max",
+        type=_speed,
+        metavar="max|N",
+        help="lockstep as fast as possible, or N simulated seconds per second (default: max)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    scenarios = [Scenario.load(find(name)) for name in options.scenario or SCENARIOS]
+    require_ros()
+    signal.signal(signal.SIGTERM, _interrupt)
+    good = True
+    for scenario in scenarios:
+        directory = Path(options.out) / scenario.name
+        _make_empty(directory)
+        with bar(f"{scenario.name}: starting") as show:
+            good = _run_scenario(scenario, directory, options, show) and good
+    return 0 if good else 1
+
+
+def _run_scenario(
+    scenario: Scenario, directory: Path, options: argparse.Namespace, show: Bar
+) -> bool:
+    """Run one scenario and print its table; return whether it succeeded."""
+    from stiction_ros.report.run_report import report_run
+
+    name = scenario.name
+    nodes = node_parameters(scenario.path, directory)
+    seed = scenario.seed if options.seed is None else options.seed
+    nodes["plant"]["seed"] = seed
+    if options.speed is not None:
+        nodes["plant"].update(pace="realtime", speed=options.speed)
+        nodes["controller"]["pace"] = "realtime"
+    processes = NodeProcesses(nodes, directory)
+    begin = time.monotonic()
+    try:
+        try:
+            processes.start()
+            processes.wait(lambda share: show(0.9 * share, f"{name}: running"))
+        finally:
+            processes.stop()
+        processes.check()
+    except NodeError as failure:
+        print(f"stiction: {name}: {failure}; see {directory / 'log'}", file=sys.stderr)
+        return False
+    seconds = time.monotonic() - begin
+    show(0.92, f"{name}: reporting")
+    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds)
+    show(1.0)
+    _print(report.summary, directory)
+    return bool(report.summary["status"] == "ok")
+
+
+def _print(summary: dict[str, Any], directory: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    name = summary["scenario"]
+    if summary["swap_time"] is None:
+        console.print(f"{name}: the controller was never swapped")
+    else:
+        valves = ", ".join(
+            f"{v['name']} {v['verdict']} (f_S {v['f_s']:.2f}, f_D {v['f_d']:.2f})"
+            for v in summary["valves"]
+        )
+        console.print(f"{name}: swapped at {summary['swap_time']:.0f} s; {valves}")
+    table = Table(title=f"{name}, {summary['samples']} samples", title_justify="left")
+    for column in ("output", "", "before", "after", "stiction-free"):
+        table.add_column(column)
+    phases = summary["phases"]
+    for output in phases.get("before", {}):
+        for key in ("amplitude", "offset", "iae_per_hour"):
+            cells = [
+                f"{phases[phase][output][key]:.4g}" if output in phases.get(phase, {}) else "–"
+                for phase in ("before", "after", "stiction_free")
+            ]
+            table.add_row(output, key, *cells)
+    console.print(table)
+    if summary["status"] != "ok":
+        console.print(f"{name}: {summary['reason']}")
+    console.print(f"{directory / 'report.html'}")
+
+
+def _make_empty(directory: Path) -> None:
+    """Make the folder, and remove what an earlier run of the demo left in it."""
+    if directory.exists() and any(directory.iterdir()):
+        if not (directory / "parameters.yaml").is_file():
+            raise InputError(
+                "holds other files", where=str(directory), fix="choose another folder by --out"
+            )
+        shutil.rmtree(directory)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made ({error.strerror})", where=str(directory)) from None
+
+
+def _speed(text: str) -> float | None:
+    if text == "max":
+        return None
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not speed > 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither max nor a positive number")
+    return speed
+
+
+def _interrupt(_number: int, _frame: Any) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,138 @@
+"""``stiction study``: a scenario over many seeds, by the core without ROS."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import multiprocessing
+import os
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.json_output import write_json
+from stiction_ros.cli.progress import bar
+from stiction_ros.cli.scenarios import find
+from stiction_ros.online.session import Scenario, run_live
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """One seed.
+
+    Attributes:
+        seed: of the noise.
+        summary: as in ``summary.json`` of the demo.
+    """
+
+    seed: int
+    summary: dict[str, Any]
+
+    def ratio(self, output: str, key: str, baseline: str) -> float:
+        """Return a score of ``after`` over that of another phase; NaN when there is none."""
+        phases = self.summary["phases"]
+        try:
+            return float(phases["after"][output][key] / phases[baseline][output][key])
+        except (KeyError, TypeError, ZeroDivisionError):
+            return float("nan")
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "study",
+        help="run a scenario over many seeds, without ROS",
+        description="Run a scenario's live loop over many seeds by the core, without ROS, and "
+        "print what was identified and what the swap gained. Exit code 1 when a run with "
+        "sticky valves was not swapped, or one with ideal valves was.",
+    )
+    parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
+    parser.add_argument(
+        "--seeds", type=seed_range, default=(11, 20), metavar="A:B", help="inclusive (11:20)"
+    )
+    parser.add_argument("--ideal-valves", action="store_true", help="valves that follow OP")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="processes")
+    parser.add_argument("--json", metavar="F", help="write all summaries; - for stdout")
+    parser.set_defaults(run=run)
+
+
+def seed_range(text: str) -> tuple[int, int]:
+    """Return ``A:B`` (or one number) as an inclusive range."""
+    low, _, high = text.partition(":")
+    try:
+        first, last = int(low), int(high or low)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no range, write A:B") from None
+    if not 0 <= first <= last:
+        raise argparse.ArgumentTypeError(f"{text!r} holds no seed")
+    return first, last
+
+
+def run_seed(scenario: Scenario, seed: int, ideal_valves: bool) -> Outcome:
+    """Run one seed; a plain function, so that a worker process can run it."""
+    from stiction_ros.report.live_log import log_of
+    from stiction_ros.report.story import tell
+    from stiction_ros.report.summary import summary
+
+    chosen = dataclasses.replace(scenario, seed=seed)
+    live = run_live(chosen, ideal_valves=ideal_valves)
+    return Outcome(seed, summary(tell(log_of(live), scenario=chosen)))
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    scenario = Scenario.load(find(options.scenario))
+    seeds = range(options.seeds[0], options.seeds[1] + 1)
+    outcomes = []
+    context = multiprocessing.get_context("spawn")
+    with (
+        bar(f"{scenario.name}: {len(seeds)} seeds") as show,
+        ProcessPoolExecutor(max(options.jobs, 1), mp_context=context) as pool,
+    ):
+        futures = [pool.submit(run_seed, scenario, s, options.ideal_valves) for s in seeds]
+        for done in as_completed(futures):
+            outcomes.append(done.result())
+            show(len(outcomes) / len(seeds))
+    outcomes.sort(key=lambda outcome: outcome.seed)
+    if options.json is not None:
+        write_json(options.json, [outcome.summary for outcome in outcomes])
+    if options.json != "-":
+        _print(scenario, outcomes)
+    swapped = sum(outcome.summary["swap_time"] is not None for outcome in outcomes)
+    return 0 if swapped == (0 if options.ideal_valves else len(outcomes)) else 1
+
+
+def _print(scenario: Scenario, outcomes: list[Outcome]) -> None:
+    console = Console()
+    table = Table(title=f"{scenario.name}, {scenario.samples} samples a run", title_justify="left")
+    for name in ("seed", "swap s", "valves", "delay", "output"):
+        table.add_column(name)
+    for name in ("amplitude after / before", "IAE after / stiction-free"):
+        table.add_column(name, justify="right")
+    for outcome in outcomes:
+        summary = outcome.summary
+        swap = summary["swap_time"]
+        head = [
+            str(outcome.seed),
+            "never" if swap is None else f"{swap:.0f}",
+            "\n".join(
+                f"{v['name']} {v['verdict']} {v['f_s']:.2f} {v['f_d']:.2f}"
+                for v in summary["valves"]
+            ),
+            "\n".join(" ".join(map(str, d.values())) for d in summary["delay"].values()),
+        ]
+        outputs = scenario.process.outputs
+        table.add_row(
+            *head,
+            "\n".join(outputs),
+            "\n".join(f"{outcome.ratio(o, 'amplitude', 'before'):.3f}" for o in outputs),
+            "\n".join(f"{outcome.ratio(o, 'iae_per_hour', 'stiction_free'):.3f}" for o in outputs),
+        )
+    console.print(table)
+    swapped = sum(outcome.summary["swap_time"] is not None for outcome in outcomes)
+    console.print(f"{swapped} of {len(outcomes)} runs were swapped")
+    for outcome in outcomes:
+        if outcome.summary["status"] != "ok" and outcome.summary["swap_time"] is not None:
+            console.print(f"seed {outcome.seed}: {outcome.summary['reason']}")

@@ -1,0 +1,287 @@
+"""A whole record with friction, delays and linear parts: scanned, fitted, delays improved.
+
+Delays are chosen channel by channel, by the exact fit under the noise model.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
+from stiction_ros.identification.friction_grid import (
+    count_moves,
+    simulate,
+    switching_bounds,
+)
+from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
+from stiction_ros.identification.scan import OutputScan
+
+BLOCK = 1_500_000
+DELAY_MARGIN = 2.0
+
+
+class Criterion(enum.Enum):
+    """Prefilter of a scan: which error of the current model counts."""
+
+    ONE_STEP = enum.auto()
+    FREE_RUN = enum.auto()
+    INNOVATIONS = enum.auto()
+
+
+@dataclasses.dataclass(frozen=True)
+class Data:
+    """One record prepared for the search.
+
+    Attributes:
+        y: outputs about their mean in units of their standard deviation, shape (p, N).
+        u: OP about its mean, %, shape (m, N).
+        law: friction law.
+        limit: largest f_S per valve, %, shape (m,).
+        delay: inclusive range of t_d.
+        min_moves: fewest stem moves of an accepted candidate.
+        resolution: final step of the grid as a share of the limit.
+    """
+
+    y: FloatArray
+    u: FloatArray
+    law: type[SimulatesGrid]
+    limit: FloatArray
+    delay: tuple[int, int]
+    min_moves: int
+    resolution: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """Friction, stems, delays and fits of the whole record.
+
+    Attributes:
+        friction: (f_S, f_D) per valve, shape (m, 2), %.
+        start: stem before the first sample minus first OP, in units of f_S, shape (m,).
+        stems: shape (m, N), about the mean of the OP.
+        delays: one tuple of m delays per output.
+        fits: one fit per output.
+    """
+
+    friction: FloatArray
+    start: FloatArray
+    stems: FloatArray
+    delays: tuple[tuple[int, ...], ...]
+    fits: tuple[OutputFit, ...]
+
+    @property
+    def loss(self) -> float:
+        """Sum over outputs of n log(mean squared innovation)."""
+        return float(sum(fit.loss for fit in self.fits))
+
+    @property
+    def bic(self) -> float:
+        """BIC of the linear parts and noise; friction is not counted here."""
+        return float(sum(fit.bic for fit in self.fits))
+
+
+@dataclasses.dataclass(frozen=True)
+class ValveScan:
+    """Result of one scan.
+
+    Attributes:
+        grid: rows (f_S, f_D), shape (G, 2).
+        loss: best over the delays, summed over outputs, shape (G,).
+        delays: the best delay per output, shape (G, p).
+        moves: shape (G,).
+        stayed, slipped: range of f_S with the same switching pattern, shape (G,).
+    """
+
+    grid: FloatArray
+    loss: FloatArray
+    delays: FloatArray
+    moves: FloatArray
+    stayed: FloatArray
+    slipped: FloatArray
+
+    def best(self, count: int, min_moves: int, apart: float) -> list[int]:
+        """Return up to ``count`` best rows at least ``apart`` from each other."""
+        chosen: list[int] = []
+        for index in np.argsort(self.loss, kind="stable"):
+            if self.moves[index] < min_moves:
+                continue
+            near = [np.abs(self.grid[index] - self.grid[i]).max() < apart for i in chosen]
+            if not any(near):
+                chosen.append(int(index))
+            if len(chosen) == count:
+                break
+        return chosen
+
+
+def stem_of(data: Data, valve: int, friction: FloatArray, ratio: float) -> FloatArray:
+    """Return the stem of one valve, shape (N,)."""
+    u = data.u[valve]
+    stems = simulate(data.law, friction[None, :], u, float(u[0] + ratio * friction[0]))
+    return np.asarray(stems[0])
+
+
+def scan_valve(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    grid: FloatArray,
+    ratios: FloatArray | float,
+    criterion: Criterion = Criterion.INNOVATIONS,
+    delay: tuple[int, int] | None = None,
+) -> ValveScan:
+    """Scan the friction of ``valve`` with the other valves of ``model`` fixed.
+
+    Args:
+        ratios: start of the stem in units of f_S, shape (G,) or one for all.
+        criterion: filter by 1, 1/A or D/A of the model's fits.
+        delay: range of delays scanned; None is that of the data.
+    """
+    others = [j for j in range(len(data.u)) if j != valve]
+    one = np.ones(1)
+    scans = [
+        OutputScan(
+            y,
+            model.stems[others],
+            tuple(delays[j] for j in others),
+            orders,
+            delay or data.delay,
+            fit.noise if criterion is Criterion.INNOVATIONS else one,
+            fit.a if criterion is not Criterion.ONE_STEP else one,
+        )
+        for y, fit, delays in zip(data.y, model.fits, model.delays, strict=True)
+    ]
+    u = data.u[valve]
+    start = u[0] + np.broadcast_to(np.asarray(ratios, dtype=float), (len(grid),)) * grid[:, 0]
+    size = max(1, BLOCK // len(u))
+    loss, best, moves, stayed, slipped = [], [], [], [], []
+    for low in range(0, len(grid), size):
+        rows = slice(low, low + size)
+        stems = simulate(data.law, grid[rows], u, start[rows])
+        losses = [scan.loss(stems) for scan in scans]
+        loss.append(sum(values.min(axis=1) for values in losses))
+        best.append(np.stack([values.argmin(axis=1) for values in losses], axis=1))
+        moves.append(count_moves(stems))
+        bounds = switching_bounds(stems, u, start[rows], grid[rows, 0])
+        stayed.append(bounds[0])
+        slipped.append(bounds[1])
+    first = (delay or data.delay)[0]
+    return ValveScan(
+        grid,
+        np.concatenate(loss),
+        np.concatenate(best) + first,
+        np.concatenate(moves),
+        np.concatenate(stayed),
+        np.concatenate(slipped),
+    )
+
+
+def with_valve(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    friction: FloatArray,
+    ratio: float,
+    delays: FloatArray,
+    warm: bool = True,
+) -> Model:
+    """Return the exact model with one valve's friction and delays replaced."""
+    stems = model.stems.copy()
+    stems[valve] = stem_of(data, valve, friction, ratio)
+    all_friction, start = model.friction.copy(), model.start.copy()
+    all_friction[valve], start[valve] = friction, ratio
+    return refit(
+        data,
+        dataclasses.replace(
+            model,
+            friction=all_friction,
+            start=start,
+            stems=stems,
+            delays=tuple(
+                tuple(int(delays[i]) if j == valve else d for j, d in enumerate(row))
+                for i, row in enumerate(model.delays)
+            ),
+        ),
+        orders,
+        warm,
+    )
+
+
+def refit(data: Data, model: Model, orders: Orders, warm: bool = True) -> Model:
+    """Return the model with all outputs fitted to its stems and delays."""
+    fits = []
+    for i, y in enumerate(data.y):
+        old = model.fits[i] if warm and i < len(model.fits) else None
+        usable = old if old is not None and old.orders == orders else None
+        fits.append(fit_output(y, model.stems, model.delays[i], orders, usable))
+    return dataclasses.replace(model, fits=tuple(fits))
+
+
+def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model:
+    """Return the best model with the stems of ``base``; friction-free when None."""
+    m, p = len(data.u), len(data.y)
+    if base is None:
+        zero = np.zeros((m, 2))
+        delays = tuple((data.delay[0],) * m for _ in range(p))
+        base = Model(zero, np.zeros(m), data.u.copy(), delays, ())
+    model = refit(data, base, orders, warm=False)
+    for _ in range(3):
+        before = model.loss
+        model = improve_delays(data, model, orders)
+        if model.loss > before - 1e-3:
+            break
+    return model
+
+
+def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
+    """Scan all delays of every channel with friction fixed; keep what the exact fit favours."""
+    if data.delay[0] == data.delay[1]:
+        return model
+    for valve in range(len(data.u)):
+        for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
+            friction = model.friction[valve][None, :]
+            scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
+            now = [row[valve] for row in model.delays]
+            if list(scan.delays[0]) == now:
+                continue
+            rival = with_valve(
+                data,
+                model,
+                orders,
+                valve,
+                friction[0],
+                model.start[valve],
+                scan.delays[0],
+                warm=False,
+            )
+            model = min(model, rival, key=lambda candidate: candidate.loss)
+    return model
+
+
+def neighbouring_delays(data: Data, model: Model, orders: Orders) -> Model:
+    """Try each channel's delay earlier and later by the exact fit.
+
+    A leading coefficient that the data cannot tell from zero counts as delay: of delays that
+    fit equally well (within ``DELAY_MARGIN``) the longest is kept.
+    """
+    for i, y in enumerate(data.y):
+        for j in range(len(data.u)):
+            for shift, margin in ((-1, -DELAY_MARGIN), (1, DELAY_MARGIN)):
+                best = model.fits[i].loss
+                while True:
+                    row = list(model.delays[i])
+                    row[j] += shift
+                    if not data.delay[0] <= row[j] <= data.delay[1]:
+                        break
+                    fit = fit_output(y, model.stems, tuple(row), orders)
+                    if fit.loss > best + margin:
+                        break
+                    best = min(best, fit.loss)
+                    delays, fits = list(model.delays), list(model.fits)
+                    delays[i], fits[i] = tuple(row), fit
+                    model = dataclasses.replace(model, delays=tuple(delays), fits=tuple(fits))
+    return model

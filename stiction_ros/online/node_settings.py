@@ -1,0 +1,85 @@
+"""The parameters of the nodes, as parameter files and ``ros2 param`` know them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.online.live_controller import LiveControllerSettings
+from stiction_ros.online.live_estimator import EstimatorSettings
+from stiction_ros.settings import setting
+
+PACES = ("lockstep", "realtime")
+
+
+@dataclasses.dataclass(frozen=True)
+class NodeSettings:
+    """Start-up, the same for every node."""
+
+    autostart: bool = setting(True, "configure and activate without being told", fixed=True)
+    wait_for: tuple[str, ...] = setting(
+        (), "nodes of this package that must be ready before this one begins", fixed=True
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class PlantNodeSettings(NodeSettings):
+    """What the plant simulates, how long and how fast."""
+
+    model: str = setting("", "loop model file, *.loop.yaml", fixed=True)
+    set_points: str = setting(
+        "", "set-point schedule file; empty when sp comes from elsewhere", fixed=True
+    )
+    seed: int = setting(0, "seed of the noise", low=0, fixed=True)
+    samples: int = setting(0, "samples to run; 0 runs until stopped", low=0, fixed=True)
+    pace: str = setting(
+        "lockstep",
+        "lockstep waits for the op of each sample; realtime does not",
+        choices=PACES,
+        fixed=True,
+    )
+    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
+    start_time: float = setting(
+        1.0, "simulated time of the first sample, s", low=0.0, high=4e9, fixed=True
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
+    """The live controller's settings and what belongs to the node."""
+
+    model: str = setting("", "loop model file the controller is built from", fixed=True)
+    pace: str = setting(
+        "lockstep",
+        "lockstep holds op until an awaited fit is there; realtime does not",
+        choices=PACES,
+        fixed=True,
+    )
+    sp_source: str = setting(
+        "schedule",
+        "schedule: sp comes with every pv; external: the last sp (transient local) holds",
+        choices=("schedule", "external"),
+        fixed=True,
+    )
+    fit_timeout: float = setting(120.0, "s to wait for an awaited fit", low=0.1, high=1e5)
+    prediction_points: int = setting(11, "points of the published plan", low=1, high=1001)
+
+
+@dataclasses.dataclass(frozen=True)
+class EstimatorNodeSettings(EstimatorSettings, NodeSettings):
+    """The live estimator's settings and what belongs to the node."""
+
+    loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
+    sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class RecorderNodeSettings(NodeSettings):
+    """What is recorded, and where."""
+
+    directory: str = setting("bag", "the bag, a directory that holds nothing yet", fixed=True)
+    topics: str = setting(
+        ".*", "regular expression of the full names of the topics to record", fixed=True
+    )
+    compression: str = setting(
+        "zstd", "of the finished bag", choices=("zstd", "lz4", "none"), fixed=True
+    )

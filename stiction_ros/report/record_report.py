@@ -1,0 +1,199 @@
+"""The report of one record: is it the valve, which one, how bad, and how well that fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stiction_ros import __version__
+from stiction_ros.identification import Identification, ValveEstimate
+from stiction_ros.records.record import Record
+from stiction_ros.report.drawing import (
+    BLUE,
+    GREY,
+    INK,
+    VERMILION,
+    Drawing,
+    TimeAxis,
+    legend,
+    panels,
+    style,
+)
+from stiction_ros.report.page import Cell, duration, embedded, number, page, table, text
+from stiction_ros.report.run_page import process_table, valve_cards, verdict_line
+from stiction_ros.report.shapes import (
+    draw_output,
+    draw_responses,
+    draw_valve,
+    fitted_start,
+    free_run,
+)
+from stiction_ros.report.summary import finite
+
+_MEANING = {
+    "delta_bic": "BIC by which friction beats the best model without it",
+    "variance_ratio": "innovation variance without friction over that with it",
+    "free_run_ratio": "free-run error without friction over that with it",
+    "half_1": "−2 log likelihood gained in the first half",
+    "half_2": "−2 log likelihood gained in the second half",
+    "share": "f_S over the span of OP",
+    "moves": "samples at which the stem moved",
+    "rival_order": "order of the best model without friction",
+    "deadband_loss": "−2 log likelihood that a pure deadband (f_S = f_D) loses",
+}
+
+
+def report_record(record: Record, identification: Identification, out: str | Path) -> Path:
+    """Write ``report.html`` and its figures and return the page.
+
+    Args:
+        record: that was looked at.
+        identification: of this record.
+        out: folder, made when missing; or the ``.html`` file alone.
+    """
+    out = Path(out)
+    alone = out.suffix.lower() == ".html"
+    folder = out.parent if alone else out
+    folder.mkdir(parents=True, exist_ok=True)
+    drawings = [(drawing, drawing.png()) for drawing in draw_record(record, identification)]
+    target = out if alone else folder / "report.html"
+    target.write_text(record_page(record, identification, drawings), encoding="utf-8")
+    if not alone:
+        for drawing, png in drawings:
+            (folder / f"{drawing.name}.png").write_bytes(png)
+    return target
+
+
+def record_page(
+    record: Record, identification: Identification, drawings: Sequence[tuple[Drawing, bytes]]
+) -> str:
+    """Return the report of a record as HTML."""
+    found = finite(identification.to_json())
+    headline = verdict_line(found["valves"])
+    kicker = (
+        f"{record.name}: {len(record)} samples of {record.sample_time:g} s, "
+        f"{duration(len(record) * record.sample_time)} of operation"
+    )
+    trouble = ""
+    if identification.reason:
+        trouble = f'<p class="warn">The fit is not to be trusted: {text(identification.reason)}</p>'
+    notes = [*record.notes, *identification.notes]
+    listed = "".join(f"<li>{text(note)}</li>" for note in notes)
+    parts = [
+        f"<h1>{text(headline)}</h1>",
+        f'<p class="kicker">{text(kicker)}</p>',
+        trouble,
+        valve_cards(found["valves"]),
+        *[embedded(drawing, png) for drawing, png in drawings],
+        evidence_table(identification.valves),
+        process_table(found["outputs"], record.sample_time),
+        f"<h2>Notes</h2><ul>{listed}</ul>" if notes else "",
+    ]
+    return page(f"{record.name}: {headline}", parts, f"stiction_ros {__version__}")
+
+
+def evidence_table(valves: Sequence[ValveEstimate]) -> str:
+    """Return the figures behind the verdicts."""
+    keys = list(dict.fromkeys(key for valve in valves for key in valve.evidence))
+    if not keys:
+        return ""
+    rows: list[list[Cell]] = [
+        [_MEANING.get(key, key), *[number(valve.evidence.get(key)) for valve in valves]]
+        for key in keys
+    ]
+    return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in valves]], rows)
+
+
+def draw_record(record: Record, identification: Identification) -> tuple[Drawing, ...]:
+    """Draw the signals with the estimated stems, valve curves, free run and step responses."""
+    with style():
+        drawn = [_signals(record, identification)]
+        if identification.stem.shape == record.op.shape:
+            drawn += [_curves(record, identification)]
+            if identification.outputs:
+                drawn += [_free_runs(record, identification)]
+        if identification.outputs:
+            outputs = [output.to_json() for output in identification.outputs]
+            drawn.append(
+                Drawing(
+                    "step_responses",
+                    "Identified process",
+                    "Response of each PV to a stem step of 1 %.",
+                    draw_responses(outputs, record, None, {}),
+                )
+            )
+    return tuple(drawn)
+
+
+def _signals(record: Record, identification: Identification) -> Drawing:
+    rows = len(record.outputs) + len(record.valves)
+    figure, axes = panels(rows, 0.6 + 2.0 * rows, sharex=True)
+    time = TimeAxis.spanning(record.time[-1])
+    at = time(record.time)
+    for j, name in enumerate(record.outputs):
+        draw_output(axes[j, 0], at, record, j, slice(None))
+        axes[j, 0].set_ylabel(f"{name} (PV units)")
+    known = identification.stem.shape == record.op.shape
+    for j, name in enumerate(record.valves):
+        axis = axes[len(record.outputs) + j, 0]
+        true = None if record.stem is None else record.stem[:, j]
+        draw_valve(axis, at, record.op[:, j], true, identification.stem[:, j] if known else None)
+        axis.set_title(name)
+        legend(axis)
+    axes[-1, 0].set_xlabel(time.label)
+    axes[-1, 0].set_xlim(at[0], at[-1])
+    legend(axes[0, 0])
+    caption = "The record, and the stem positions that the identified valves give for its OP."
+    return Drawing("signals", "Signals and stems", caption, figure)
+
+
+def _curves(record: Record, identification: Identification) -> Drawing:
+    count = len(record.valves)
+    figure, axes = panels(1, 4.4, count)
+    for j, name in enumerate(record.valves):
+        axis = axes[0, j]
+        op, stem = record.op[:, j], identification.stem[:, j]
+        ends = np.array([op.min(), op.max()])
+        axis.plot(ends, ends, color=GREY, linestyle=(0, (5, 3)), label="ideal valve")
+        axis.plot(op, stem, color=BLUE, linewidth=0.8, label="stem χ̂")
+        axis.set_title(name)
+        axis.set_xlabel("OP u (%)")
+        axis.set_aspect("equal", adjustable="box")
+        axis.locator_params(nbins=6)
+        legend(axis)
+    axes[0, 0].set_ylabel("stem χ̂ (%)")
+    caption = (
+        "Estimated stem against OP: a sticky valve rests while OP travels (level lines) and then "
+        "jumps; a healthy one stays on the diagonal."
+    )
+    return Drawing("valve_curves", "Valve curves", caption, figure)
+
+
+def _free_runs(record: Record, identification: Identification) -> Drawing:
+    count = len(identification.outputs)
+    figure, axes = panels(count, 0.6 + 2.2 * count, sharex=True)
+    time = TimeAxis.spanning(record.time[-1])
+    at = time(record.time)
+    stems = {name: identification.stem[:, j] for j, name in enumerate(record.valves)}
+    for row, output in enumerate(identification.outputs):
+        axis = axes[row, 0]
+        measured = record.pv[:, record.outputs.index(output.name)]
+        model = output.to_json()
+        run = free_run(model, stems, fitted_start(model, stems, measured))
+        axis.plot(at, measured, color=INK, linewidth=0.8, label="PV, measured")
+        axis.plot(at, run, color=VERMILION, linewidth=1.2, label="free run of the model")
+        axis.set_title(
+            f"{output.name}: free-run fit {number(output.fit_free_run)} %, "
+            f"one-step fit {number(output.fit_one_step)} %"
+        )
+        axis.set_ylabel(f"{output.name} (PV units)")
+        legend(axis)
+    axes[-1, 0].set_xlabel(time.label)
+    axes[-1, 0].set_xlim(at[0], at[-1])
+    caption = (
+        "The model driven by the recorded OP alone: friction, then process. Slow disturbances "
+        "that the loop suffered are not in it."
+    )
+    return Drawing("free_run", "Model against measurement", caption, figure)

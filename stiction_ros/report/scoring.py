@@ -1,0 +1,356 @@
+"""How well a loop keeps its set-points, and what a swap of controllers changed.
+
+Everything is computed from the error e = PV − SP inside the *holds*: the stretches of samples
+between two moves of any set-point.
+
+- *Dominant period* T: the one period at which sine, cosine and a constant, fitted to every
+  hold and output on their own, explain most of the phase `before` (log likelihood for white
+  noise). The first quarter of each hold is left out, as it still settles.
+- *Amplitude* of an output: √2 × RMS of the spectral line at T. Each hold gives its last
+  whole number of periods that fits after half a period for settling; sine, cosine and a
+  constant are fitted to them, and the squared amplitudes are averaged with the number of
+  samples as weight. A hold too short for one period says nothing.
+- *Offset*: mean over the holds of |mean e| over their last 50 samples. Holds of fewer than
+  100 samples have not settled by then and do not count, unless all are shorter.
+- *IAE per hour*: ∫|e|dt over all samples of the phase, per hour, minus the share of white
+  measurement noise, E|v| = √(2/π) σ ≈ 0.798 σ. With time in hours on both sides that is
+  mean |e| − 0.798 σ, in PV units × h per h.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records import Record
+
+OFFSET_SAMPLES = 50
+NEEDED_CYCLES = 4
+NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1
+LEAST_LINE = 0.25  # share of the variance inside the holds that a cycle explains at least
+_SHORTEST = 6.0  # samples; below that a cycle cannot be told from noise
+
+
+class PhaseStatus(enum.StrEnum):
+    """Whether the phases could be compared."""
+
+    OK = "ok"
+    NO_SWAP = "no_swap"
+    NO_ROUND = "no_round"
+    NO_CYCLE = "no_cycle"
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """How one output behaved during one phase, in its engineering units.
+
+    Attributes:
+        amplitude: of the spectral line at the dominant period; None when no hold is long
+            enough to measure it or there is no period.
+        offset: |mean error| at the end of the holds.
+        iae_per_hour: mean |error| less the share of known noise, PV units × h per h.
+    """
+
+    amplitude: float | None
+    offset: float
+    iae_per_hour: float
+
+    def to_json(self) -> dict[str, float | None]:
+        """Return the mapping of ``summary.json``."""
+        return dataclasses.asdict(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Phase:
+    """A stretch of samples, ``first`` up to, not including, ``last``, and its scores."""
+
+    first: int
+    last: int
+    scores: Mapping[str, Score]
+
+
+@dataclasses.dataclass(frozen=True)
+class Cycle:
+    """The oscillation of a loop.
+
+    Attributes:
+        period: dominant period, samples.
+        share: of the variance inside the holds that it explains, of the clearest output.
+        count: whole cycles that this output went through inside the holds.
+        output: index of that output.
+    """
+
+    period: float
+    share: float
+    count: int
+    output: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Phases:
+    """The rounds of the schedule before and after the swap, scored alike.
+
+    Attributes:
+        status: ok, or why the two cannot be compared.
+        reason: one sentence; empty when ok.
+        cycle: of ``before``, None when it could not be looked for.
+        before, after: None where there is no whole round.
+    """
+
+    status: PhaseStatus
+    reason: str
+    cycle: Cycle | None
+    before: Phase | None
+    after: Phase | None
+
+
+def holds(sp: FloatArray) -> list[tuple[int, int]]:
+    """Return first and one-past-last sample of every stretch without a set-point move.
+
+    Args:
+        sp: set-points, shape (N, p).
+    """
+    moves = np.flatnonzero(np.any(np.diff(sp, axis=0) != 0.0, axis=1)) + 1
+    edges = [0, *moves.tolist(), len(sp)]
+    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
+
+
+def round_length(sp: FloatArray) -> int | None:
+    """Return the samples after which the moves of ``sp``, shape (N, p), repeat exactly.
+
+    None when they do not repeat, or when nothing moves.
+    """
+    moves = [first for first, _ in holds(sp)[1:]]
+    for length in moves:
+        if 2 * length <= len(sp) and np.array_equal(sp[length:], sp[:-length]):
+            return int(length)
+    return None
+
+
+def dominant_cycle(error: FloatArray, stretches: Sequence[tuple[int, int]]) -> Cycle | None:
+    """Return the oscillation that explains the errors inside the holds best.
+
+    Args:
+        error: PV − SP, shape (N, p).
+        stretches: the holds.
+
+    Returns:
+        None when no hold has room for one period, or nothing moves at all.
+    """
+    settled = [(a + (b - a) // 4, b) for a, b in stretches]
+    longest = max(b - a for a, b in settled)
+    settled = [(a, b) for a, b in settled if b - a >= longest / 3]
+    total = np.array([sum(_energy(error[a:b, j]) for a, b in settled) for j in _columns(error)])
+    if longest < 2 * _SHORTEST or not np.any(total > 0):
+        return None
+    count = sum(b - a for a, b in settled)
+    # A step of 1/(16 L) in frequency turns the phase by 1/16 of a cycle over a hold.
+    frequencies = np.arange(1.0 / longest, 1.0 / _SHORTEST, 0.0625 / longest)
+    shares = np.array([_explained(error, settled, 1 / f) for f in frequencies]) / np.maximum(
+        total, 1e-300
+    )
+    gains = -0.5 * count * np.log(np.maximum(1.0 - shares, 1e-12)).sum(axis=1)
+    best = int(np.argmax(gains))
+    period = float(1 / frequencies[best])
+    output = int(np.argmax(shares[best]))
+    swings = _count_swings(error[:, output], stretches, settled, period)
+    return Cycle(period, float(shares[best, output]), swings, output)
+
+
+def amplitude(
+    error: FloatArray, stretches: Sequence[tuple[int, int]], period: float
+) -> float | None:
+    """Return √2 × RMS of the spectral line of ``error``, shape (N,), at ``period`` samples."""
+    squares = weight = 0.0
+    for first, last in stretches:
+        room = last - first - period / 2
+        count = round(np.floor(room / period + 1e-9) * period)
+        if count < period / 2 or count < 4:
+            continue
+        fitted = _line(error[last - count : last], period)
+        squares += count * float(fitted[1] ** 2 + fitted[2] ** 2)
+        weight += count
+    return float(np.sqrt(squares / weight)) if weight else None
+
+
+def offset(error: FloatArray, stretches: Sequence[tuple[int, int]]) -> float:
+    """Return the mean over holds of |mean error| over the last 50 samples of each."""
+    long_enough = [(a, b) for a, b in stretches if b - a >= 2 * OFFSET_SAMPLES]
+    ends = [error[max(b - OFFSET_SAMPLES, a) : b] for a, b in long_enough or stretches]
+    return float(np.mean([abs(float(end.mean())) for end in ends]))
+
+
+def iae_per_hour(error: FloatArray, noise_std: float = 0.0) -> float:
+    """Return ∫|e|dt per hour less the share 0.798 σ of white measurement noise."""
+    return float(np.abs(error).mean()) - NOISE_SHARE * noise_std
+
+
+def score(
+    record: Record, first: int, last: int, period: float | None, noise_std: Sequence[float]
+) -> Phase:
+    """Score every output over samples ``first`` up to, not including, ``last``.
+
+    Args:
+        record: with set-points; without them the mean of each PV stands in.
+        period: dominant period, samples; None leaves amplitudes out.
+        noise_std: σ of the measurement noise of each output where known, else 0.
+    """
+    error, stretches = errors(record.part(first, last))
+    return Phase(
+        first,
+        last,
+        {
+            name: Score(
+                None if period is None else amplitude(error[:, j], stretches, period),
+                offset(error[:, j], stretches),
+                iae_per_hour(error[:, j], noise_std[j]),
+            )
+            for j, name in enumerate(record.outputs)
+        },
+    )
+
+
+def errors(record: Record) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Return PV − SP, shape (N, p), and the holds; without SP deviations from the mean."""
+    if record.sp is None:
+        return record.pv - record.pv.mean(axis=0), [(0, len(record))]
+    return record.pv - record.sp, holds(record.sp)
+
+
+def phases(
+    record: Record,
+    swap: int | None,
+    round_samples: int | None,
+    noise_std: Sequence[float] | None = None,
+) -> Phases:
+    """Score the last whole round before the swap and the first whole one after it.
+
+    Rounds are counted from the first sample. Without a repeating schedule everything before
+    the swap is set against everything after it, which the caller should say.
+
+    Args:
+        record: of the whole run.
+        swap: first sample of the new controller; None when there was none.
+        round_samples: length of one round of the set-point schedule.
+        noise_std: σ of the measurement noise of each output where known.
+    """
+    sigma = [0.0] * len(record.outputs) if noise_std is None else list(noise_std)
+    if swap is None or not 0 < swap < len(record):
+        return _unswapped(record, round_samples, sigma)
+    if round_samples is None:
+        spans: tuple[int, int, int, int] = (0, swap, swap, len(record))
+    else:
+        ended = swap // round_samples
+        begun = -(-swap // round_samples)
+        spans = (
+            (ended - 1) * round_samples,
+            ended * round_samples,
+            begun * round_samples,
+            (begun + 1) * round_samples,
+        )
+        if ended < 1:
+            reason = f"the swap at sample {swap} came before the first round of set-points ended"
+            return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
+    cycle = dominant_cycle(*errors(record.part(spans[0], spans[1])))
+    period = None if cycle is None else cycle.period
+    before = score(record, spans[0], spans[1], period, sigma)
+    if spans[3] > len(record):
+        reason = "the record ends before one whole round of set-points after the swap"
+        return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
+    after = score(record, spans[2], spans[3], period, sigma)
+    reason = _no_cycle(cycle)
+    status = PhaseStatus.NO_CYCLE if reason else PhaseStatus.OK
+    return Phases(status, reason, cycle, before, after)
+
+
+def _unswapped(record: Record, round_samples: int | None, sigma: Sequence[float]) -> Phases:
+    """Score the last whole round of a run without a swap, or all of it."""
+    first, last = 0, len(record)
+    if round_samples is not None and last >= round_samples:
+        last -= last % round_samples
+        first = last - round_samples
+    cycle = dominant_cycle(*errors(record.part(first, last)))
+    before = score(record, first, last, None if cycle is None else cycle.period, sigma)
+    reason = "the controller was never swapped"
+    return Phases(PhaseStatus.NO_SWAP, reason, cycle, before, None)
+
+
+def _no_cycle(cycle: Cycle | None) -> str:
+    """Return why there is no limit cycle to judge by; empty when there is one."""
+    if cycle is None or cycle.share < LEAST_LINE:
+        return "the loop did not cycle in the last round of set-points before the swap"
+    if cycle.count < NEEDED_CYCLES:
+        return (
+            f"the loop made {cycle.count} whole cycles in the last round of set-points before "
+            f"the swap, at least {NEEDED_CYCLES} are needed"
+        )
+    return ""
+
+
+def _columns(error: FloatArray) -> range:
+    return range(error.shape[1])
+
+
+def _energy(values: FloatArray) -> float:
+    return float(((values - values.mean()) ** 2).sum())
+
+
+def _basis(count: int, period: float) -> FloatArray:
+    angle = 2 * np.pi / period * np.arange(count)
+    return np.column_stack([np.ones(count), np.cos(angle), np.sin(angle)])
+
+
+def _line(values: FloatArray, period: float) -> FloatArray:
+    """Return constant, cosine and sine amplitude of the fit to ``values``."""
+    fitted = np.linalg.lstsq(_basis(len(values), period), values, rcond=None)[0]
+    return np.asarray(fitted)
+
+
+def _explained(
+    error: FloatArray, stretches: Sequence[tuple[int, int]], period: float
+) -> FloatArray:
+    """Return the energy, shape (p,), that a line at ``period`` takes out of the holds."""
+    taken = np.zeros(error.shape[1])
+    for first, last in stretches:
+        if last - first < period:
+            continue
+        values = error[first:last]
+        centred = values - values.mean(axis=0)
+        basis = _basis(last - first, period)
+        fitted = np.linalg.lstsq(basis, centred, rcond=None)[0]
+        taken += (centred**2).sum(axis=0) - ((centred - basis @ fitted) ** 2).sum(axis=0)
+    return np.asarray(taken)
+
+
+def _count_swings(
+    values: FloatArray,
+    stretches: Sequence[tuple[int, int]],
+    settled: Sequence[tuple[int, int]],
+    period: float,
+) -> int:
+    """Return how many whole cycles ``values`` go through inside the holds.
+
+    A half cycle ends where the error, smoothed over an eighth of a period, crosses from
+    beyond half the RMS of the settled parts on one side of their mean to beyond it on the
+    other. A hold in which the valve rests adds none.
+    """
+    width = max(int(period / 8), 1)
+    smooth = np.convolve(values, np.ones(width) / width, mode="same")
+    means = [float(smooth[a:b].mean()) for a, b in settled]
+    energy = sum(_energy(smooth[a:b]) for a, b in settled)
+    level = 0.5 * float(np.sqrt(energy / sum(b - a for a, b in settled)))
+    by_end = {b: mean for (_, b), mean in zip(settled, means, strict=True)}
+    halves = 0
+    for first, last in stretches:
+        if last not in by_end:
+            continue
+        part = smooth[first + round(period / 4) : last] - by_end[last]
+        sides = np.sign(part[np.abs(part) > level])
+        turns = int(np.count_nonzero(np.diff(sides)))
+        halves += turns + 1 if turns else 0
+    return halves // 2

@@ -1,0 +1,190 @@
+"""What the figures of runs and of single records have in common: signals and responses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.loop import LoopModel
+from stiction_ros.records.record import Record
+from stiction_ros.report.drawing import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILION,
+    TimeAxis,
+    data_limits,
+    panels,
+)
+
+
+def draw_output(axis: Any, at: FloatArray, record: Record, output: int, part: slice) -> None:
+    """Draw PV and SP of one output over ``part`` of the record at the times ``at``."""
+    axis.plot(at, record.pv[part, output], color=BLUE, linewidth=0.9, label="PV")
+    if record.sp is not None:
+        axis.plot(at, record.sp[part, output], color=INK, drawstyle="steps-post", label="SP")
+    axis.set_title(record.outputs[output])
+
+
+def draw_valve(
+    axis: Any,
+    at: FloatArray,
+    op: FloatArray,
+    stem: FloatArray | None,
+    estimate: FloatArray | None,
+) -> None:
+    """Draw OP and the true and estimated stem of one valve, each of shape (N,), %."""
+    drawn = [op]
+    axis.plot(at, op, color=GREY, linewidth=0.9, drawstyle="steps-post", label="OP u")
+    if stem is not None:
+        drawn.append(stem)
+        axis.plot(
+            at,
+            stem,
+            color=ORANGE,
+            linewidth=2.4,
+            alpha=0.85,
+            drawstyle="steps-post",
+            label="stem χ, true",
+        )
+    if estimate is not None:
+        drawn.append(estimate)
+        axis.plot(
+            at,
+            estimate,
+            color=BLUE,
+            linewidth=0.9,
+            drawstyle="steps-post",
+            label="stem χ̂, estimated",
+        )
+    data_limits(axis, drawn)
+    axis.set_ylabel("position (%)")
+
+
+def draw_responses(
+    outputs: Sequence[Mapping[str, Any]],
+    record: Record,
+    truth: LoopModel | None,
+    units: Mapping[str, str],
+) -> Any:
+    """Return a figure with the response of every output to a step of every stem.
+
+    Args:
+        outputs: of ``identify --json``.
+        record: that they were identified from.
+        truth: simulated loop, None when unknown.
+        units: engineering unit of each PV where known.
+    """
+    length = _settling(outputs, truth)
+    time = TimeAxis.spanning(length * record.sample_time)
+    at = time(np.arange(length) * record.sample_time)
+    rows = len(outputs)
+    figure, axes = panels(rows, 0.7 + 2.1 * rows, len(record.valves), sharex=True, sharey="row")
+    for row, output in enumerate(outputs):
+        for column, valve in enumerate(record.valves):
+            axis = axes[row, column]
+            if truth is not None:
+                known = true_response(truth, row, column, length)
+                axis.plot(at, known, color=VERMILION, linestyle=(0, (5, 3)), label="true")
+            axis.plot(at, step_response(output, valve, length), color=BLUE, label="identified")
+            axis.set_title(f"{valve} → {output['name']}")
+            if column == 0:
+                axis.set_ylabel(f"{output['name']} ({units.get(output['name'], 'PV units')})")
+            if row == rows - 1:
+                axis.set_xlabel(f"time since the step ({time.unit})")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=2)
+    return figure
+
+
+def step_response(output: Mapping[str, Any], valve: str, samples: int) -> FloatArray:
+    """Return the response, shape (N,), of one identified output to a stem step of 1 %.
+
+    Args:
+        output: entry of ``outputs`` of ``identify --json``: a, b, delay.
+        valve: whose stem steps at sample 0.
+        samples: N.
+    """
+    stems = {name: np.zeros(samples) for name in output["b"]}
+    stems[valve] = np.ones(samples)
+    return free_run({**output, "bias": 0.0}, stems, np.zeros(len(output["a"])), rest=False)
+
+
+def free_run(
+    output: Mapping[str, Any],
+    stems: Mapping[str, FloatArray],
+    start: FloatArray,
+    *,
+    rest: bool = True,
+) -> FloatArray:
+    """Return the free run, shape (N,), of equation (9) without noise.
+
+    Args:
+        output: entry of ``outputs`` of ``identify --json``: a, b, delay, bias.
+        stems: positions of each valve, shape (N,), %.
+        start: outputs of the first n_a samples.
+        rest: whether stems were where they start before the first sample, else at 0.
+    """
+    a, count = np.array(output["a"], dtype=float), len(next(iter(stems.values())))
+    driven = np.full(count, float(output["bias"]))
+    for valve, b in output["b"].items():
+        stem, delay = stems[valve], int(output["delay"].get(valve, 0))
+        for i, weight in enumerate(b, start=1):
+            late = min(i + delay, count)
+            before = np.full(late, stem[0] if rest else 0.0)
+            driven += weight * np.concatenate([before, stem[: count - late]])
+    y = np.zeros(count)
+    order = len(a)
+    y[:order] = start[:count]
+    if not rest:
+        order = 0
+    for k in range(order, count):
+        past = y[max(k - len(a), 0) : k][::-1]
+        y[k] = driven[k] - float(a[: len(past)] @ past)
+    return y
+
+
+def fitted_start(
+    output: Mapping[str, Any], stems: Mapping[str, FloatArray], measured: FloatArray
+) -> FloatArray:
+    """Return the outputs of the first n_a samples from which the free run fits best.
+
+    Args:
+        output, stems: as for :func:`free_run`.
+        measured: PV, shape (N,).
+    """
+    order = len(output["a"])
+    forced = free_run(output, stems, np.zeros(order))
+    silent = {**output, "b": {name: [] for name in output["b"]}, "bias": 0.0}
+    basis = np.column_stack([free_run(silent, stems, row) for row in np.eye(order)])
+    if not (np.isfinite(forced).all() and np.isfinite(basis).all()):
+        return measured[:order].copy()
+    return np.asarray(np.linalg.lstsq(basis, measured - forced, rcond=None)[0])
+
+
+def true_response(model: LoopModel, output: int, valve: int, samples: int) -> FloatArray:
+    """Return the response, shape (N,), of the true loop, linearised, to a stem step of 1 %."""
+    linear = model.process.linear(model.sample_time)
+    state, y = np.zeros(linear.order), np.zeros(samples)
+    for k in range(samples):
+        y[k] = linear.c[output] @ state
+        state = linear.a @ state + linear.b[:, valve]
+    return y
+
+
+def _settling(outputs: Sequence[Mapping[str, Any]], truth: LoopModel | None) -> int:
+    """Return after how many samples the slowest of the shown models has settled."""
+    if truth is not None:
+        linear = truth.process.linear(truth.sample_time)
+        radius = float(np.abs(np.linalg.eigvals(linear.a)).max())
+    else:
+        roots = [np.abs(np.roots([1.0, *output["a"]])) for output in outputs]
+        radius = max(float(each.max(initial=0.0)) for each in roots)
+    if not 0.0 < radius < 1.0:
+        return 100
+    return int(np.clip(math.ceil(math.log(0.01) / math.log(radius)), 20, 400))

@@ -1,0 +1,86 @@
+"""``summary.json`` of a run: the figures that acceptance looks at."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.report.scoring import Phase
+from stiction_ros.report.story import Story
+
+
+def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
+    """Return the mapping of ``summary.json``; numbers that do not exist are null.
+
+    Args:
+        story: of the run.
+        seconds: wall time of the run; without it the time between the first and the last
+            publication in the bag.
+    """
+    log, record = story.log, story.record
+    seconds = log.wall_seconds if seconds is None else seconds
+    found = story.phases
+    free = story.stiction_free
+    mapping = {
+        "scenario": story.name,
+        "status": found.status.value,
+        "reason": found.reason,
+        "seed": story.seed,
+        "samples": len(record),
+        "sample_time": record.sample_time,
+        "seconds": seconds,
+        "samples_per_second": len(record) / seconds if seconds > 0 else None,
+        "swap_time": story.swap_time,
+        "delay": {o["name"]: dict(o["delay"]) for o in story.identified.get("outputs", [])},
+        "valves": list(story.identified.get("valves", [])),
+        "valves_latest": list(story.latest.get("valves", [])),
+        "period": None if found.cycle is None else found.cycle.period * record.sample_time,
+        "cycles": None if found.cycle is None else found.cycle.count,
+        "phases": {
+            name: scores(phase)
+            for name, phase in (
+                ("before", found.before),
+                ("after", found.after),
+                ("stiction_free", free),
+            )
+            if phase is not None
+        },
+        "messages": messages(log.published, log.recorded),
+        "notes": list(log.notes),
+    }
+    return dict(finite(mapping))
+
+
+def scores(phase: Phase) -> dict[str, dict[str, float | None]]:
+    """Return ``{PV: {amplitude, offset, iae_per_hour}}``."""
+    return {name: score.to_json() for name, score in phase.scores.items()}
+
+
+def messages(
+    published: Mapping[str, int], recorded: Mapping[str, int]
+) -> dict[str, dict[str, int | None]]:
+    """Return ``{topic: {published, recorded}}``; published is None where nobody counts."""
+    return {
+        topic: {"published": published.get(topic), "recorded": recorded.get(topic, 0)}
+        for topic in sorted(published.keys() | recorded.keys())
+    }
+
+
+def finite(value: Any) -> Any:
+    """Return JSON data with None in place of numbers that JSON does not have."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def write_json(value: Mapping[str, Any], path: str | Path) -> None:
+    """Write ``value`` as JSON that every reader takes."""
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    Path(path).write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,164 @@
+"""The graph as processes: everything recorded, deterministic, nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_loop import write_small_scenario
+
+pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
+
+from stiction_ros.cli.node_processes import NodeProcesses, ros_environment
+from stiction_ros.online.session import Scenario, run_live
+from stiction_ros.records.bag_messages import read_messages
+from stiction_ros.records.run_log import read_run
+
+PATIENCE = 120.0
+TOPICS = ("clock", "pv", "sp", "op", "stem", "stiction", "loop_model", "mode", "prediction")
+
+
+def run_processes(directory: Path) -> Path:
+    """Run the small scenario in processes and return its bag."""
+    nodes = {name: dict(v) for name, v in Scenario.load(scenario(directory)).nodes.items()}
+    nodes["recorder"]["directory"] = str(directory / "bag")
+    processes = NodeProcesses(nodes, directory)
+    try:
+        processes.start()
+        processes.wait(lambda _share: None)
+    finally:
+        processes.stop()
+    processes.check()
+    return directory / "bag"
+
+
+def scenario(directory: Path) -> Path:
+    path = directory / "small.scenario.yaml"
+    return path if path.exists() else write_small_scenario(directory)
+
+
+def running(mark: str) -> list[int]:
+    """Return the ids of running processes whose command line holds ``mark``."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit() or int(entry.name) == os.getpid():
+            continue
+        try:
+            line = (entry / "cmdline").read_bytes().decode(errors="replace")
+            state = (entry / "stat").read_text().rsplit(")", 1)[1].split()[0]
+        except OSError:
+            continue
+        if mark in line and state != "Z":
+            found.append(int(entry.name))
+    return found
+
+
+def wait_until(condition, patience: float = PATIENCE) -> None:
+    """Wait for ``condition``; fail when it does not come true in time."""
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end, "it did not come true in time"
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory) -> Path:
+    return run_processes(tmp_path_factory.mktemp("graph"))
+
+
+@pytest.fixture(scope="module")
+def core(bag):
+    return run_live(Scenario.load(scenario(bag.parent)))
+
+
+def test_every_topic_is_recorded_whole(bag):
+    log = read_run(bag)
+    own = {topic: log.published[topic] for topic in log.published if topic != "/diagnostics"}
+    assert {topic: log.recorded.get(topic) for topic in own} == own
+    assert {f"/{topic}" for topic in TOPICS} <= {t for t, n in log.recorded.items() if n}
+
+
+def test_only_the_recorders_last_diagnostics_are_missing(bag):
+    log = read_run(bag)
+    assert log.recorded["/diagnostics"] == log.published["/diagnostics"] - 1
+
+
+@pytest.mark.parametrize("signal_name", ["op", "pv", "sp", "stem"])
+def test_the_graph_gives_the_numbers_of_the_core(bag, core, signal_name):
+    recorded = getattr(read_run(bag).record, signal_name)
+    assert np.array_equal(recorded, getattr(core.run.record, signal_name))
+
+
+def test_the_swap_comes_at_the_same_sample(bag, core):
+    log = read_run(bag)
+    assert core.swap is not None
+    assert log.swap is not None
+    assert log.seconds(log.swap.stamp) == core.swap.sample
+
+
+def test_a_second_run_gives_identical_pv_and_op(bag, tmp_path):
+    first = read_run(bag).record
+    second = read_run(run_processes(tmp_path)).record
+    assert np.array_equal(first.pv, second.pv)
+    assert np.array_equal(first.op, second.op)
+
+
+def test_rosbags_reads_every_message(bag):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    with rosbag2.Reader(bag) as reader:
+        found = Counter(connection.topic for connection, _, _ in reader.messages())
+    assert found == {t: n for t, n in read_run(bag).recorded.items() if n}
+
+
+def test_mcap_ros2_support_reads_every_message(bag):
+    decoder = pytest.importorskip("mcap_ros2.decoder")
+    from mcap.reader import make_reader
+
+    found: Counter[str] = Counter()
+    for path in bag.glob("*.mcap"):
+        with path.open("rb") as stream:
+            reader = make_reader(stream, decoder_factories=[decoder.DecoderFactory()])
+            for _schema, channel, _message, _ros in reader.iter_decoded_messages():
+                found[channel.topic] += 1
+    assert found == {t: n for t, n in read_run(bag).recorded.items() if n}
+
+
+def test_log_time_is_simulated_time(bag):
+    late = [
+        (m.log_time - m.message.header.stamp.sec * 10**9 - m.message.header.stamp.nanosec) / 1e9
+        for m in read_messages(bag)
+        if m.topic == "/pv"
+    ]
+    assert max(abs(value) for value in late) <= 1.0  # one sample
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
+    out = tmp_path / "demo"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "stiction_ros.cli.main", "demo", "siso", "--out", str(out)],
+        env=ros_environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        wait_until(lambda: len(running(str(out))) >= 5 or process.poll() is not None)
+        assert process.poll() is None
+        wait_until(lambda: any((out / "siso").glob("bag/*.mcap")))
+        process.send_signal(number)
+        _, said = process.communicate(timeout=PATIENCE)
+    finally:
+        if process.poll() is None:
+            process.kill()
+    assert process.returncode == (-number if number == signal.SIGKILL else 130)
+    assert "Traceback" not in said
+    wait_until(lambda: not running(str(out)))

@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiction_ros.identification import FitStatus, Identification, OutputModel, ValveEstimate
+from stiction_ros.identification.results import VerdictKind
+from stiction_ros.loop import LoopModel
+from stiction_ros.records.run_log import RunLog
+from stiction_ros.report.drawing import TimeAxis
+from stiction_ros.report.page import duration, interval, number, words
+from stiction_ros.report.record_report import report_record
+from stiction_ros.report.run_report import write_run
+from stiction_ros.report.shapes import fitted_start, free_run, step_response, true_response
+from stiction_ros.report.story import tell
+
+FIGURES = {"rounds", "swap", "trends", "valves", "estimates", "step_responses"}
+
+
+def outside(page: str) -> list[str]:
+    """Return everything in a page that a browser would fetch."""
+    links = re.findall(r"""(?:src|href)\s*=\s*["']([^"']+)|url\(([^)]+)\)""", page)
+    return [a or b for a, b in links if not (a or b).startswith("data:")]
+
+
+def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
+    written = write_run(tell(log, name="made_up"), tmp_path / "new" / "folder")
+    page = written.page.read_text(encoding="utf-8")
+    assert outside(page) == []
+    assert "http" not in page
+    assert "<script" not in page
+    assert "Valve V1 sticks; the swap ended the limit cycle" in page
+    assert "After 8 min 20 s the controller changed from unaware to embedding" in page
+    assert "5.10 % (4.98 … 5.22)" in page
+    for key in ("amplitude", "offset", "iae_per_hour"):
+        assert number(written.summary["phases"]["before"]["PV1"][key]) in page
+    assert "a note &lt;of&gt; the reader" in page
+    assert "f_s: 5.0" in page
+    pictures = {path.stem for path in written.files if path.suffix == ".png"}
+    assert pictures == FIGURES
+    for path in written.files:
+        assert path.stat().st_size > 0
+        if path.suffix == ".png":
+            assert path.read_bytes()[:4] == b"\x89PNG"
+            assert path.stat().st_size < 300_000
+    assert page.count("data:image/png;base64") == len(FIGURES)
+
+
+def test_one_page_alone(log: RunLog, tmp_path: Path) -> None:
+    written = write_run(tell(log), tmp_path / "only.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["only.html"]
+    assert written.page.name == "only.html"
+
+
+def test_healthy_valves_are_no_trouble(healthy: RunLog, tmp_path: Path) -> None:
+    page = write_run(tell(healthy), tmp_path).page.read_text(encoding="utf-8")
+    assert "Valve V1 is healthy" in page
+    assert 'class="warn"' not in page
+    assert "The controller stayed unaware throughout." in page
+
+
+def test_a_bag_with_nothing_but_the_signals(log: RunLog, tmp_path: Path) -> None:
+    record = dataclasses.replace(log.record, sp=None, stem=None)
+    bare = RunLog(record, log.start, (), (), (), (), (), {"/pv": 1200}, {})
+    written = write_run(tell(bare), tmp_path)
+    assert "No fit of the valves" in written.page.read_text(encoding="utf-8")
+    assert {p.stem for p in written.files if p.suffix == ".png"} == {"trends", "valves"}
+
+
+def test_a_sticky_valve_without_a_comparison_is_a_warning(log: RunLog, tmp_path: Path) -> None:
+    quiet = dataclasses.replace(log.record, pv=log.record.sp)
+    page = write_run(tell(dataclasses.replace(log, record=quiet)), tmp_path).page
+    assert "the loop did not cycle" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("status", list(FitStatus))
+def test_the_report_of_a_record(log: RunLog, tmp_path: Path, status: FitStatus) -> None:
+    record = log.record
+    evidence = {"delta_bic": float("inf"), "moves": 12.0}
+    valve = ValveEstimate(
+        "V1", VerdictKind.STICKY, "he", 5.0, (4.9, 5.1), 2.0, (1.9, 2.1), 3.0, 50.0, 12, evidence
+    )
+    output = OutputModel("PV1", (-0.9,), {"V1": (0.1,)}, {"V1": 2}, 5.0, 0.1, 90.0, 80.0)
+    good = status is FitStatus.OK
+    found = Identification(
+        status,
+        "" if good else "no model fits",
+        "exact",
+        len(record),
+        1.0,
+        0.1,
+        (valve,),
+        (output,) if good else (),
+        record.stem if good else np.empty((0, 1)),
+        ("a note",),
+    )
+    page = report_record(record, found, tmp_path / "out").read_text(encoding="utf-8")
+    assert outside(page) == []
+    assert "Valve V1 sticks" in page
+    assert "5.00 % (4.90 … 5.10)" in page
+    assert ("no model fits" in page) is not good
+    assert len(list((tmp_path / "out").glob("*.png"))) == (4 if good else 1)
+
+
+def test_step_responses_agree_with_the_loop_model(model: LoopModel) -> None:
+    entry = {"name": "PV1", "a": [-0.9], "b": {"V1": [0.1]}, "delay": {"V1": 0}, "bias": 3.0}
+    steps = step_response(entry, "V1", 60)
+    assert steps == pytest.approx(true_response(model, 0, 0, 60))
+    assert steps[:3] == pytest.approx([0.0, 0.1, 0.19])
+    late = step_response({**entry, "delay": {"V1": 4}}, "V1", 60)
+    assert late[4:] == pytest.approx(steps[:-4])
+
+
+def test_the_start_of_a_free_run_is_fitted() -> None:
+    entry = {"a": [-1.5, 0.56], "b": {"V1": [0.1, 0.05]}, "delay": {"V1": 2}, "bias": 0.2}
+    stems = {"V1": np.random.default_rng(1).uniform(40, 60, 80)}
+    run = free_run(entry, stems, np.array([3.0, -2.0]))
+    assert fitted_start(entry, stems, run) == pytest.approx([3.0, -2.0])
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.05163, "0.0516"),
+        (123456.7, "123457"),
+        (0, "0"),
+        (14.0, "14"),
+        (1.25, "1.25"),
+        (-2.5e-7, "−2.50e−07"),
+        (None, "–"),
+        (float("nan"), "–"),
+        (True, "–"),
+    ],
+)
+def test_numbers_for_people(value: object, shown: str) -> None:
+    assert number(value) == shown
+
+
+def test_other_words_for_people() -> None:
+    assert duration(44880.0) == "12 h 28 min"
+    assert duration(125.0) == "2 min 5 s"
+    assert duration(None) == "–"
+    assert interval([1.0, None]) == "1.00 … –"
+    assert words("f_S < 1") == "f<sub>S</sub> &lt; 1"
+    assert [TimeAxis.spanning(s).unit for s in (100, 5000, 50000)] == ["s", "min", "h"]
