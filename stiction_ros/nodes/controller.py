@@ -46,6 +46,7 @@ class ControllerNode(ManagedNode):
         self._sp: dict[int, FloatArray] = {}
         self._dv: dict[int, FloatArray] = {}
         self._last_sp: FloatArray | None = None
+        self._last_op: JointState | None = None
         measured = self.model.process.measured_disturbances
         self._needs_dv = bool(measured) and settings.pace == "lockstep"
         self._fits: dict[int, str] = {}  # end of window -> valid_from of the model in force
@@ -96,6 +97,9 @@ class ControllerNode(ManagedNode):
             return
         if self._origin is None:
             self._origin = stamp
+        if self._last_op is not None and stamp == to_ns(self._last_op.header.stamp):
+            self._op.publish(self._last_op)  # a plant that was paused shows its sample again
+            return
         self._pv[stamp] = pv
         self._try_step()
 
@@ -149,7 +153,8 @@ class ControllerNode(ManagedNode):
                     del queue[old]
             result = self.live.step(self._pv.pop(stamp), sp, dv)
             self.stamp = stamp
-            self._op.publish(joint_state(stamp, self.model.valve_names, result.op))
+            self._last_op = joint_state(stamp, self.model.valve_names, result.op)
+            self._op.publish(self._last_op)
             self._sample += 1
             self._held = result.reason
             self._publish_plan(stamp, result)

@@ -66,10 +66,19 @@ class EstimatorNode(ManagedNode):
         return "warn" if self._missed else "ok", self._said, keys
 
     def finish(self) -> None:
+        self._end_worker()
+        super().finish()
+
+    def on_cleanup(self, state: Any) -> Any:
+        self._end_worker()
+        self.destroy_guard_condition(self._done)
+        return super().on_cleanup(state)
+
+    def _end_worker(self) -> None:
         if self._worker is not None:
             self._worker.close()
+            self._worker = None
             self._collect()
-        super().finish()
 
     # ---- samples in ------------------------------------------------------------------------
 

@@ -63,7 +63,8 @@ class ManagedNode(LifecycleNode):
         self.stamp = 0
         self.outlets: dict[str, Outlet] = {}
         self._inlets: list[tuple[str, Subscription, tuple[str, ...]]] = []
-        self._ready = self._linked = False
+        self._ready = self._linked = self._tunable = False
+        self._link_timer: Any = None
         parameters.declare(self, settings)
         self.settings = settings()
 
@@ -85,7 +86,7 @@ class ManagedNode(LifecycleNode):
         return self._guarded(self._activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.running = False
+        self._stop()
         self.deactivate()
         return super().on_deactivate(state)
 
@@ -94,7 +95,7 @@ class ManagedNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.running = False
+        self._stop()
         self.finished = True
         return TransitionCallbackReturn.SUCCESS
 
@@ -124,14 +125,25 @@ class ManagedNode(LifecycleNode):
         self._beat = self.create_timer(1.0, self._each_second)
         self.configure()
         self.add_on_set_parameters_callback(self._on_set)
+        self._tunable = True
 
     def _activate(self) -> None:
         self._ready = self._linked = False
         self.activate()
         self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
 
+    def _stop(self) -> None:
+        self.running = False
+        if self._link_timer is not None:
+            self.destroy_timer(self._link_timer)
+            self._link_timer = None
+
     def _tear_down(self) -> None:
-        self.remove_on_set_parameters_callback(self._on_set)
+        self._stop()
+        self._linked = False
+        if self._tunable:
+            self.remove_on_set_parameters_callback(self._on_set)
+            self._tunable = False
         self.destroy_timer(self._beat)
         for subscription in list(self.subscriptions):
             self.destroy_subscription(subscription)
@@ -140,6 +152,7 @@ class ManagedNode(LifecycleNode):
         self.outlets, self._inlets = {}, []
 
     def _guarded(self, action: Any) -> TransitionCallbackReturn:
+        self.failure = ""
         try:
             action()
         except InputError as error:
@@ -185,7 +198,8 @@ class ManagedNode(LifecycleNode):
         if not self._ready:
             if not all(self._hears(*inlet, wanted) for inlet in self._inlets):
                 return
-            self._announce_configuration()
+            if "~/config" not in self.outlets:  # it is there already after a pause
+                self._announce_configuration()
             self._ready = True
         namespace = self.get_namespace().rstrip("/")
         for name in wanted:
@@ -193,7 +207,7 @@ class ManagedNode(LifecycleNode):
             if all(info.node_name != name for info in announced):
                 return
         if all(self._is_heard(topic, outlet, wanted) for topic, outlet in self.outlets.items()):
-            self.destroy_timer(self._link_timer)
+            self._stop()
             self._linked = self.running = True
             self.report()
             self.linked()
