@@ -58,7 +58,7 @@ class ControllerNode(ManagedNode):
         self._op = self.outlet(JointState, "op", SIGNAL_QOS, others)
         self._prediction = self.outlet(JointTrajectory, "prediction", SIGNAL_QOS)
         self._mode = self.outlet(String, "mode", LATCHED_QOS)
-        sp_qos = QoSProfile(depth=100)
+        sp_qos = QoSProfile(depth=READER_QOS.depth)
         if settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
