@@ -1,1 +1,1 @@
-"""."""
+"""The command ``stiction``, thin over functions of the other floors."""

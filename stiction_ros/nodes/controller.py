@@ -12,7 +12,6 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import StepResult
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -39,6 +38,7 @@ class ControllerNode(ManagedNode):
             )
         self.model = LoopModel.load(find_config(settings.model))
         self.live = LiveController(settings, self.model)
+        self._plan_names = (*self.model.outputs, *self.model.valve_names)
         self._step = round(self.model.sample_time * SECOND)
         self._origin: int | None = None
         self._sample = 0
@@ -157,7 +157,9 @@ class ControllerNode(ManagedNode):
             self._op.publish(self._last_op)
             self._sample += 1
             self._held = result.reason
-            self._publish_plan(stamp, result)
+            rows, picks = self.live.prediction(result, self.settings.prediction_points)
+            times = (picks * self.model.sample_time).tolist()
+            self._prediction.publish(trajectory(stamp, self._plan_names, rows, times))
             self._tell_changes()
 
     def _fit_is_there(self) -> bool:
@@ -175,12 +177,6 @@ class ControllerNode(ManagedNode):
         if self._waiting_since is None:
             self._waiting_since = self._wall.now().nanoseconds
         return False
-
-    def _publish_plan(self, stamp: int, result: StepResult) -> None:
-        names = (*self.model.outputs, *self.model.valve_names)
-        rows, picks = self.live.prediction(result, self.settings.prediction_points)
-        times = (picks * self.model.sample_time).tolist()
-        self._prediction.publish(trajectory(stamp, names, rows, times))
 
     def _tell_changes(self) -> None:
         """Publish every change of mode since the last call."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections import deque
 from concurrent.futures import Future
 from typing import Any
@@ -13,6 +11,7 @@ from std_msgs.msg import String
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
+from stiction_ros.json_values import json_text
 from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, values_of
 from stiction_ros.nodes.runner import run
@@ -157,7 +156,7 @@ class EstimatorNode(ManagedNode):
         for name, friction in update.trusted.items():
             keys.append((f"{name}.trusted_f_s", friction.static_friction))
             keys.append((f"{name}.trusted_f_d", friction.dynamic_friction))
-        keys.append(("identification", json.dumps(_finite(update.identification.to_json()))))
+        keys.append(("identification", json_text(update.identification.to_json(), indent=None)))
         self.report([("fit", verdicts, keys)])
 
     def _publish(
@@ -169,17 +168,6 @@ class EstimatorNode(ManagedNode):
         message.effort = [high for _, _, high in values]
         message.header.frame_id = self._token
         self._stiction.publish(message)
-
-
-def _finite(value: Any) -> Any:
-    """Return JSON data with null in place of numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def main() -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiction_ros import __version__
 from stiction_ros.identification import Identification, ValveEstimate
+from stiction_ros.json_values import finite
 from stiction_ros.records.record import Record
 from stiction_ros.report.drawing import (
     BLUE,
@@ -30,7 +31,6 @@ from stiction_ros.report.shapes import (
     fitted_start,
     free_run,
 )
-from stiction_ros.report.summary import finite
 
 _MEANING = {
     "delta_bic": "BIC by which friction beats the best model without it",

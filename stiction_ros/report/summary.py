@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from stiction_ros.json_values import finite, json_text
 from stiction_ros.report.scoring import Phase
 from stiction_ros.report.story import Story
 
@@ -69,18 +68,6 @@ def messages(
     }
 
 
-def finite(value: Any) -> Any:
-    """Return JSON data with None in place of numbers that JSON does not have."""
-    if isinstance(value, Mapping):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
 def write_json(value: Mapping[str, Any], path: str | Path) -> None:
     """Write ``value`` as JSON that every reader takes."""
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    Path(path).write_text(json_text(value) + "\n", encoding="utf-8")
