@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from graph import KINDS, Graph
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -222,7 +221,8 @@ def test_an_accepted_value_retunes_the_estimator(graph: Graph, tmp_path: Path) -
     node = graph.add("estimator", values("estimator", tmp_path))
     node.start()
     graph.spin_until(lambda: node.running, "the estimator to run")
-    node._add(10**9, np.zeros(1), np.zeros(1))
+    node._on_pv(joint_state(10**9, ["PV1"], [50.0]))
+    node._on_op(joint_state(10**9, ["V1"], [50.0]))
     (result,) = node.set_parameters([Parameter("window", value=77)])
     assert result.successful
     assert node.live.settings.window == 77
