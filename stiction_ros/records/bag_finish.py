@@ -18,6 +18,7 @@ from stiction_ros.records.bag_metadata import (
 )
 from stiction_ros.records.mcap_scan import McapScan
 
+CLOCK = "/clock"
 _COMPRESSIONS = {
     "zstd": CompressionType.ZSTD,
     "lz4": CompressionType.LZ4,
@@ -34,6 +35,9 @@ def finish_bag(
     directory: str | Path, *, compression: str = "zstd", chunk_size: int = 1 << 20
 ) -> tuple[str, ...]:
     """Rewrite the journal of a bag chunked and indexed and write its ``metadata.yaml``.
+
+    Where there is a ``/clock``, what was received before its first message (configurations,
+    latched topics) came at wall time, years away; it gets that first simulated time.
 
     The journal is replaced when the new file is complete on the disk, so that a second
     kill loses nothing either.
@@ -67,7 +71,7 @@ def finish_bag(
                 enable_crcs=True,
                 enable_data_crcs=True,
             )
-            information = _Rewrite(writer, path.name).run(scan)
+            information = _Rewrite(writer, path.name).run(scan, _first_clock(path))
             output.flush()
             os.fsync(output.fileno())
         os.replace(partial, path)
@@ -75,6 +79,12 @@ def finish_bag(
         partial.unlink(missing_ok=True)
     _write_whole(directory / "metadata.yaml", metadata_yaml(information))
     return tuple(scan.notes)
+
+
+def _first_clock(path: Path) -> int | None:
+    """Return the log time of the first message on ``/clock``, or None."""
+    messages = McapScan(path).messages()
+    return next((message.log_time for message in messages if message.topic.name == CLOCK), None)
 
 
 class _Rewrite:
@@ -86,14 +96,18 @@ class _Rewrite:
         self._channels: dict[BagTopic, int] = {}
         self._schemas: dict[tuple[str, str, str], int] = {}
 
-    def run(self, scan: McapScan) -> dict[str, object]:
-        """Copy everything; return the bag's information."""
+    def run(self, scan: McapScan, clock: int | None) -> dict[str, object]:
+        """Copy everything, what came before the first ``clock`` at its time; sum it up."""
         writer = self._writer
         writer.start(profile="ros2", library="stiction_ros")
         counts: dict[BagTopic, int] = {}
         first: int | None = None
         last: int | None = None
         for topic, log_time, publish_time, data in scan.messages():
+            if topic.name == CLOCK:
+                clock = None
+            elif clock is not None:
+                log_time = clock
             channel = self._channels.get(topic) or self._register(topic)
             count = counts.get(topic, 0)
             writer.add_message(channel, log_time, data, publish_time, count & 0xFFFFFFFF)

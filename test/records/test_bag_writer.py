@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bag_making import JOINT_STATE, SECOND, Bag, joint_state
+from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -240,3 +240,13 @@ def test_two_profiles_of_one_topic(tmp_path: Path) -> None:
         writer.write("/pv", joint_state(0, ["A"], [1.0]), 1, 1)
     with Reader(tmp_path / "bag") as reader:
         assert sum(1 for _ in reader.messages()) == 1
+
+
+def test_what_came_before_the_clock_gets_its_first_time(bag: Bag) -> None:
+    wall = 1_790_000_000 * SECOND
+    bag.text("/plant/config", "seed: 1", wall)
+    bag.put("/clock", "rosgraph_msgs/msg/Clock", clock(5 * SECOND), 5 * SECOND)
+    bag.text("/mode", "unaware", 6 * SECOND)
+    bag.writer.close()
+    times = {m.topic: m.log_time for m in read_messages(bag.writer.directory)}
+    assert times == {"/plant/config": 5 * SECOND, "/clock": 5 * SECOND, "/mode": 6 * SECOND}
