@@ -133,6 +133,16 @@ def _print(scenario: Scenario, outcomes: list[Outcome]) -> None:
     console.print(table)
     swapped = sum(outcome.summary["swap_time"] is not None for outcome in outcomes)
     console.print(f"{swapped} of {len(outcomes)} runs were swapped")
+    if swapped:
+        for output in scenario.process.outputs:
+            worst = [
+                max(outcome.ratio(output, key, phase) for outcome in outcomes)
+                for key, phase in (("amplitude", "before"), ("iae_per_hour", "stiction_free"))
+            ]
+            console.print(
+                f"{output}: amplitude at most {worst[0]:.3g} of before, "
+                f"IAE at most {worst[1]:.3g} of stiction-free"
+            )
     for outcome in outcomes:
         if outcome.summary["status"] != "ok" and outcome.summary["swap_time"] is not None:
             console.print(f"seed {outcome.seed}: {outcome.summary['reason']}")
