@@ -106,9 +106,15 @@ class LiveEstimator:
         self._pv = deque(self._pv, maxlen=settings.window)
 
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
-        """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due."""
-        self._op.append(np.array(op, dtype=float))
-        self._pv.append(np.array(pv, dtype=float))
+        """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due.
+
+        No window holds a sample that is not finite: it begins anew behind it.
+        """
+        if np.isfinite(op).all() and np.isfinite(pv).all():
+            self._op.append(np.array(op, dtype=float))
+            self._pv.append(np.array(pv, dtype=float))
+        else:
+            self.restart()
         if not self.settings.due(sample):
             return None
         return Record(
@@ -116,8 +122,8 @@ class LiveEstimator:
             self._sample_time,
             self._valves,
             self._outputs,
-            np.array(self._op),
-            np.array(self._pv),
+            np.array(self._op).reshape(-1, len(self._valves)),
+            np.array(self._pv).reshape(-1, len(self._outputs)),
             start=(sample + 1 - len(self._op)) * self._sample_time,
         )
 

@@ -48,6 +48,21 @@ def concluded(*fits: Identification, settings: EstimatorSettings = SETTINGS) -> 
     return [live.conclude(19 + 10 * i, fit) for i, fit in enumerate(fits)]
 
 
+@pytest.mark.parametrize("bad", [25, 39])
+def test_no_window_holds_a_sample_that_is_not_finite(bad: int) -> None:
+    live, due = estimator(), {}
+    for k in range(50):
+        record = live.add(k, np.array([float(k)]), np.array([np.nan if k == bad else 1.0 * k]))
+        if record is not None:
+            due[k] = record
+    assert {end: len(record) for end, record in due.items()} == {
+        19: 20,
+        29: 4 if bad == 25 else 30,
+        39: 14 if bad == 25 else 0,
+        49: 24 if bad == 25 else 10,
+    }
+
+
 def test_a_window_is_due_by_the_schedule_and_slides() -> None:
     live, due = estimator(), {}
     for k in range(60):
