@@ -129,9 +129,12 @@ class EstimatorNode(ManagedNode):
             stamp = self._pairs.stamp_of(end)
             try:
                 found = future.result()
-            except InputError as error:
+            except Exception as error:  # one fit that fails must not end the estimator
                 self._failed += 1
                 self._said = f"window not usable: {error}"
+                if not isinstance(error, InputError):
+                    self._said = f"fit failed: {error!r}"
+                    self.get_logger().error(self._said)
                 self._publish(stamp, [], [])
                 continue
             self._fits += 1

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 
 from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.online.live_estimator import fit
@@ -16,18 +17,32 @@ from stiction_ros.records import Record
 class FitWorker:
     """One process that runs one fit after the other, in order.
 
-    It leaves interrupts to its parent and dies with it.
+    It leaves interrupts to its parent and dies with it. When it dies alone, as for want of
+    memory, the fits it had fail and the next one gets a new process.
     """
 
     def __init__(self) -> None:
         """Start the process and let it load what it needs."""
+        self._start()
+
+    def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
         self._ready = self._pool.submit(os.getpid)
 
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._ready.result()
+
     def submit(self, record: Record, options: IdentificationOptions) -> Future[Identification]:
         """Queue a fit; the future may hold the InputError of an unusable window."""
-        return self._pool.submit(fit, record, options)
+        try:
+            return self._pool.submit(fit, record, options)
+        except BrokenProcessPool:
+            self._pool.shutdown()
+            self._start()
+            return self._pool.submit(fit, record, options)
 
     def close(self) -> None:
         """Drop queued fits and end the process once the running one is done."""

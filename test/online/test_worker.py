@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures.process import BrokenProcessPool
+
+import numpy as np
+import pytest
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification import IdentificationOptions
+from stiction_ros.online.worker import FitWorker
+from stiction_ros.records import Record
+
+
+def test_a_process_that_died_is_replaced_for_the_next_fit() -> None:
+    short = Record("short", 1.0, ("V1",), ("PV1",), np.eye(5)[:, :1], np.eye(5)[:, :1])
+    worker = FitWorker()
+    try:
+        first = worker.pid
+        os.kill(first, signal.SIGKILL)
+        with pytest.raises((BrokenProcessPool, InputError)):  # it may be noticed at once
+            worker.submit(short, IdentificationOptions()).result(60.0)
+        with pytest.raises(InputError, match="too few"):
+            worker.submit(short, IdentificationOptions()).result(60.0)
+        assert worker.pid != first
+    finally:
+        worker.close()
