@@ -125,9 +125,19 @@ def _kalman(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
     noise[:n, :n] = tuning.state_noise * model.b @ model.b.T + 1e-12 * np.eye(n)
     noise[n:, n:] = np.diag(tuning.disturbance_noise)
     measurement = np.diag(tuning.measurement_noise)
-    covariance = solve_discrete_are(a.T, c.T, noise, measurement)
-    innovation = c @ covariance @ c.T + measurement
-    return np.asarray(np.linalg.solve(innovation, c @ covariance).T)
+    try:
+        covariance = solve_discrete_are(a.T, c.T, noise, measurement)
+        innovation = c @ covariance @ c.T + measurement
+        gain = np.asarray(np.linalg.solve(innovation, c @ covariance).T)
+        if np.isfinite(gain).all():
+            return gain
+    except ValueError:  # LinAlgError is one
+        pass
+    raise InputError(
+        "there is no Kalman filter for these variances",
+        where="measurement_noise",
+        fix="give the noise variances in the units of PV squared, and all of them finite",
+    )
 
 
 def _luenberger(model: LinearModel, tuning: ObserverTuning) -> FloatArray:

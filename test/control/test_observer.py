@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loops import first_order, kalman, luenberger, models, stable_model
 
-from stiction_ros.control.observer import Observer, ObserverTuning
+from stiction_ros.control.observer import Observer, ObserverKind, ObserverTuning
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
@@ -101,6 +101,23 @@ def test_an_integrating_process_is_refused(tuning: Callable[[int], ObserverTunin
         Observer(integrating, tuning(1))
     assert "output disturbance" in caught.value.what
     assert caught.value.fix
+
+
+@pytest.mark.parametrize(
+    ("state_noise", "disturbance_noise", "measurement_noise"),
+    [(1.0, 1e-5, np.inf), (1.0, np.inf, 1e-4), (1e300, 1e-5, 1e-4), (1.0, 1e300, 1e-4)],
+)
+def test_variances_without_a_filter_are_refused(
+    state_noise: float, disturbance_noise: float, measurement_noise: float
+) -> None:
+    tuning = ObserverTuning(
+        ObserverKind.KALMAN,
+        state_noise,
+        np.array([disturbance_noise]),
+        np.array([measurement_noise]),
+    )
+    with pytest.raises(InputError, match="no Kalman filter for these variances"):
+        Observer(first_order(), tuning)
 
 
 def test_an_unstable_process_takes_kalman_but_not_luenberger() -> None:

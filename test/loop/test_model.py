@@ -299,6 +299,13 @@ WRONG = {
     "b too wide": (changed(STATE_SPACE, "process.b", [[1.0, 0.0], [0.0, 1.0]]), "b"),
     "c too wide": (changed(STATE_SPACE, "process.c", [[1.0, 0.0, 0.0]]), "c"),
     "e without names": (without(STATE_SPACE, "process.measured_disturbances"), "columns"),
+    "measured is a text": (changed(STATE_SPACE, "process.measured_disturbances", "D"), "no list"),
+    "measured is a number": (changed(STATE_SPACE, "process.measured_disturbances", 5), "no list"),
+    "measured twice": (
+        changed(STATE_SPACE, "process.measured_disturbances", ["D", "D"]),
+        "two inputs have one name",
+    ),
+    "sensor twice": (changed(FULL, "sensors", FULL["sensors"] * 2), "there twice"),
     "empty matrix": (changed(STATE_SPACE, "process.a", []), "rows"),
     "one valve for a tank": (changed(TANK, "valves", [{"name": "V1"}]), "two valves"),
     "tank about a point": (
