@@ -240,6 +240,12 @@ def _read_sensors(top: Section, outputs: tuple[str, ...]) -> tuple[tuple[Behavio
     found: dict[str, tuple[Behaviour, ...]] = {}
     for section in top.sections("sensors", []):
         name = section.choice("name", outputs)
+        if name in found:
+            raise InputError(
+                f"{name} is there twice",
+                where=section.at("name"),
+                fix="put all its effects into one list",
+            )
         found[name] = _read_effects(section)
         section.finish()
     return tuple(found.get(name, ()) for name in outputs)

@@ -78,7 +78,7 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Proc
 
 def _read_state_space(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
     names, noise = _read_outputs(section, None)
-    measured = tuple(str(name) for name in section.raw("measured_disturbances", ()) or ())
+    measured = _read_measured(section)
     a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
     e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
     op0, pv0 = _read_point(point, valves, names)
@@ -93,7 +93,7 @@ def _read_tank(
     section: Section, point: Section, valves: tuple[str, ...], sample_time: float
 ) -> Process:
     names, noise = _read_outputs(section, ("C", "T"))
-    measured = tuple(str(name) for name in section.raw("measured_disturbances", ()) or ())
+    measured = _read_measured(section)
     values = {}
     for field in dataclasses.fields(TankParameters):
         if field.name in section:
@@ -121,6 +121,21 @@ def _read_outputs(
         noise.append(_read_noise(entry))
         entry.finish()
     return tuple(names), tuple(noise)
+
+
+def _read_measured(section: Section) -> tuple[str, ...]:
+    names = section.raw("measured_disturbances", ()) or ()
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n for n in names):
+        raise InputError(
+            f"{names!r} is no list of names",
+            where=section.at("measured_disturbances"),
+            fix="write [F_B]",
+        )
+    if len(set(names)) != len(names):
+        raise InputError(
+            "two inputs have one name", where=section.at("measured_disturbances"), fix="rename one"
+        )
+    return tuple(names)
 
 
 def _read_noise(entry: Section) -> Noise:
