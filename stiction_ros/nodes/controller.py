@@ -80,7 +80,7 @@ class ControllerNode(ManagedNode):
         self.live.retune(settings)
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        if self._waiting_since is not None:
+        if self._waiting_since is not None and not self.failure:
             waited = (self._wall.now().nanoseconds - self._waiting_since) / SECOND
             if waited > self.settings.fit_timeout:
                 self._fail(f"no fit came within {self.settings.fit_timeout:g} s")

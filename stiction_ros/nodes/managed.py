@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Iterable
 from typing import Any
@@ -28,6 +29,7 @@ LATCHED_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
 LINK_PERIOD = 0.02  # s between two looks at the graph until all peers are there
 
 
@@ -115,8 +117,10 @@ class ManagedNode(LifecycleNode):
         self.running = False
         self.deactivate()
         self.report()
+        end = time.monotonic() + ACK_PATIENCE
         for outlet in self.outlets.values():
-            outlet.publisher.wait_for_all_acked(Duration(seconds=2.0))
+            left = max(end - time.monotonic(), 0.0)
+            outlet.publisher.wait_for_all_acked(Duration(seconds=left))
 
     def _configure(self) -> None:
         parameters.refuse_unknown(self)
