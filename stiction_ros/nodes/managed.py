@@ -30,6 +30,7 @@ LATCHED_QOS = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
+LINK_PATIENCE = 5.0  # s until a node says whom it waits for
 LINK_PERIOD = 0.02  # s between two looks at the graph until all peers are there
 
 
@@ -133,6 +134,8 @@ class ManagedNode(LifecycleNode):
 
     def _activate(self) -> None:
         self._ready = self._linked = False
+        self._told_waiting = False
+        self._waiting_since = time.monotonic()
         self.activate()
         self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
 
@@ -199,6 +202,11 @@ class ManagedNode(LifecycleNode):
         first and then says that it is ready by announcing ``~/config``.
         """
         wanted = {name for name in self.settings.wait_for if name}
+        if not self._told_waiting and time.monotonic() > self._waiting_since + LINK_PATIENCE:
+            self._told_waiting = True
+            missing = sorted(wanted.difference(self.get_node_names()))
+            which = ", ".join(missing) or ", ".join(sorted(wanted))
+            self.get_logger().warning(f"still waiting for {which}; see the parameter wait_for")
         if not self._ready:
             if not all(self._hears(*inlet, wanted) for inlet in self._inlets):
                 return

@@ -13,6 +13,7 @@ from std_msgs.msg import String
 
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel, simulate_closed_loop
+from stiction_ros.nodes import managed
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.messages import joint_state, to_ns
 from stiction_ros.online.live_controller import LiveController
@@ -371,3 +372,23 @@ def test_the_mode_is_latched(graph: Graph) -> None:
     graph.plain("late").create_subscription(String, "mode", late.append, LATCHED_QOS)
     graph.spin_until(lambda: late, "the latched mode")
     assert [m.data for m in late] == ["hold"]
+
+
+def test_a_node_says_once_whom_it_waits_for(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(managed, "LINK_PATIENCE", 0.0)
+    node = graph.add("estimator", values("estimator", tmp_path) | {"wait_for": ["controler"]})
+    said: list[str] = []
+    monkeypatch.setattr(node, "get_logger", lambda: Listener(said))
+    node.start()
+    graph.spin_until(lambda: said, "the warning")
+    graph.spin_some()
+    assert said == ["still waiting for controler; see the parameter wait_for"]
+
+
+class Listener:
+    """Notes warnings."""
+
+    def __init__(self, said: list[str]) -> None:
+        self.warning = said.append
