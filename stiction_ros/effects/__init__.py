@@ -16,11 +16,13 @@ from stiction_ros.effects.disturbance import (
 )
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
+from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
 from stiction_ros.errors import InputError
 
 BEHAVIOURS: tuple[type[Behaviour], ...] = (
     HeStiction,
     SmoothedHeStiction,
+    SemiPhysicalStiction,
     StepDisturbance,
     DriftDisturbance,
     SineDisturbance,
@@ -34,6 +36,7 @@ __all__ = [
     "HeStiction",
     "Memory",
     "Parameter",
+    "SemiPhysicalStiction",
     "SineDisturbance",
     "SmoothedHeStiction",
     "StepDisturbance",
