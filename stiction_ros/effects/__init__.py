@@ -16,6 +16,7 @@ from stiction_ros.effects.disturbance import (
 )
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
+from stiction_ros.effects.stiction_kano import KanoStiction
 from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
 from stiction_ros.errors import InputError
 
@@ -23,6 +24,7 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
     HeStiction,
     SmoothedHeStiction,
     SemiPhysicalStiction,
+    KanoStiction,
     StepDisturbance,
     DriftDisturbance,
     SineDisturbance,
@@ -34,6 +36,7 @@ __all__ = [
     "DriftDisturbance",
     "FloatArray",
     "HeStiction",
+    "KanoStiction",
     "Memory",
     "Parameter",
     "SemiPhysicalStiction",
