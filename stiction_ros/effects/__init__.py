@@ -14,6 +14,7 @@ from stiction_ros.effects.disturbance import (
     SineDisturbance,
     StepDisturbance,
 )
+from stiction_ros.effects.stiction_choudhury import ChoudhuryStiction
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
 from stiction_ros.effects.stiction_kano import KanoStiction
@@ -25,6 +26,7 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
     SmoothedHeStiction,
     SemiPhysicalStiction,
     KanoStiction,
+    ChoudhuryStiction,
     StepDisturbance,
     DriftDisturbance,
     SineDisturbance,
@@ -33,6 +35,7 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
 __all__ = [
     "BEHAVIOURS",
     "Behaviour",
+    "ChoudhuryStiction",
     "DriftDisturbance",
     "FloatArray",
     "HeStiction",
