@@ -19,6 +19,7 @@ from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
 from stiction_ros.effects.stiction_kano import KanoStiction
 from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
+from stiction_ros.effects.stiction_xch import XchStiction
 from stiction_ros.errors import InputError
 
 BEHAVIOURS: tuple[type[Behaviour], ...] = (
@@ -27,6 +28,7 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
     SemiPhysicalStiction,
     KanoStiction,
     ChoudhuryStiction,
+    XchStiction,
     StepDisturbance,
     DriftDisturbance,
     SineDisturbance,
@@ -46,6 +48,7 @@ __all__ = [
     "SineDisturbance",
     "SmoothedHeStiction",
     "StepDisturbance",
+    "XchStiction",
     "from_mapping",
 ]
 
