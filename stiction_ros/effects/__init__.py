@@ -18,6 +18,7 @@ from stiction_ros.effects.stiction_choudhury import ChoudhuryStiction
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
 from stiction_ros.effects.stiction_kano import KanoStiction
+from stiction_ros.effects.stiction_kano_smoothed import SmoothedKanoStiction
 from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
 from stiction_ros.effects.stiction_xch import XchStiction
 from stiction_ros.errors import InputError
@@ -27,6 +28,7 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
     SmoothedHeStiction,
     SemiPhysicalStiction,
     KanoStiction,
+    SmoothedKanoStiction,
     ChoudhuryStiction,
     XchStiction,
     StepDisturbance,
@@ -47,6 +49,7 @@ __all__ = [
     "SemiPhysicalStiction",
     "SineDisturbance",
     "SmoothedHeStiction",
+    "SmoothedKanoStiction",
     "StepDisturbance",
     "XchStiction",
     "from_mapping",
