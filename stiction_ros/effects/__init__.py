@@ -14,13 +14,23 @@ from stiction_ros.effects.disturbance import (
     SineDisturbance,
     StepDisturbance,
 )
+from stiction_ros.effects.stiction_choudhury import ChoudhuryStiction
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
+from stiction_ros.effects.stiction_kano import KanoStiction
+from stiction_ros.effects.stiction_kano_smoothed import SmoothedKanoStiction
+from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
+from stiction_ros.effects.stiction_xch import XchStiction
 from stiction_ros.errors import InputError
 
 BEHAVIOURS: tuple[type[Behaviour], ...] = (
     HeStiction,
     SmoothedHeStiction,
+    SemiPhysicalStiction,
+    KanoStiction,
+    SmoothedKanoStiction,
+    ChoudhuryStiction,
+    XchStiction,
     StepDisturbance,
     DriftDisturbance,
     SineDisturbance,
@@ -29,14 +39,19 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
 __all__ = [
     "BEHAVIOURS",
     "Behaviour",
+    "ChoudhuryStiction",
     "DriftDisturbance",
     "FloatArray",
     "HeStiction",
+    "KanoStiction",
     "Memory",
     "Parameter",
+    "SemiPhysicalStiction",
     "SineDisturbance",
     "SmoothedHeStiction",
+    "SmoothedKanoStiction",
     "StepDisturbance",
+    "XchStiction",
     "from_mapping",
 ]
 

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
-from stiction_ros.errors import InputError
+from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.friction_parameters import FrictionPair
 
 
 @dataclasses.dataclass(frozen=True)
-class HeStiction(Behaviour):
+class HeStiction(FrictionPair):
     r"""Static and dynamic friction of a sliding-stem valve.
 
     .. math::
@@ -29,25 +29,7 @@ class HeStiction(Behaviour):
         InputError: a negative or non-finite friction, or f_D > f_S.
     """
 
-    effect: ClassVar[str] = "stiction"
     law: ClassVar[str | None] = "he"
-
-    static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
-    dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.dynamic_friction > self.static_friction:
-            raise InputError(
-                f"{self.dynamic_friction:g} is larger than f_s = {self.static_friction:g}",
-                where="f_d",
-                fix="dynamic friction cannot exceed static friction, so lower f_d or raise f_s",
-            )
-
-    @property
-    def jump(self) -> float:
-        """Smallest move of the stem, J = f_S − f_D, in %."""
-        return self.static_friction - self.dynamic_friction
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         """Return the stem position twice, as memory and as output, by (4)."""

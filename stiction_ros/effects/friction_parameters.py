@@ -1,0 +1,78 @@
+"""The two ways to write the friction of a valve: (f_S, f_D), and (S, J).
+
+They describe the same signature: S = f_S + f_D is the width of the band that OP crosses
+after a reversal before the stem moves, J = f_S − f_D the jump that the stem then makes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar, Self
+
+from stiction_ros.effects.behaviour import Behaviour, parameter
+from stiction_ros.errors import InputError
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionPair(Behaviour):
+    """A stiction law with static friction f_S and dynamic friction f_D, 0 ≤ f_D ≤ f_S.
+
+    Raises:
+        InputError: a negative or non-finite friction, or f_D > f_S.
+    """
+
+    effect: ClassVar[str] = "stiction"
+
+    static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
+    dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.dynamic_friction > self.static_friction:
+            raise InputError(
+                f"{self.dynamic_friction:g} is larger than f_s = {self.static_friction:g}",
+                where="f_d",
+                fix="dynamic friction cannot exceed static friction, so lower f_d or raise f_s",
+            )
+
+    @property
+    def jump(self) -> float:
+        """Smallest move of the stem under He's law, J = f_S − f_D, in %."""
+        return self.static_friction - self.dynamic_friction
+
+    @property
+    def stick_band(self) -> float:
+        """Deadband plus stickband, S = f_S + f_D, in %."""
+        return self.static_friction + self.dynamic_friction
+
+
+@dataclasses.dataclass(frozen=True)
+class SlipJumpPair(Behaviour):
+    """A stiction law with deadband plus stickband S and slip jump J.
+
+    J = 0 is a pure deadband, J < S the undershoot, J = S no offset, J > S the overshoot
+    case, whose dynamic friction f_D = (S − J)/2 is negative.
+
+    Raises:
+        InputError: a negative or non-finite S or J.
+    """
+
+    effect: ClassVar[str] = "stiction"
+
+    stick_band: float = parameter("s", "%", "deadband plus stickband S", low=0.0)
+    jump: float = parameter("j", "%", "slip jump J of the stem", low=0.0)
+
+    @classmethod
+    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
+        """Build from f_S and f_D in %: S = f_S + f_D, J = f_S − f_D."""
+        return cls(static_friction + dynamic_friction, static_friction - dynamic_friction)
+
+    @property
+    def static_friction(self) -> float:
+        """Lead of OP over the stem at which it slips, f_S = (S + J)/2, in %."""
+        return (self.stick_band + self.jump) / 2.0
+
+    @property
+    def dynamic_friction(self) -> float:
+        """Distance that the moving stem keeps from OP, f_D = (S − J)/2, in %."""
+        return (self.stick_band - self.jump) / 2.0
