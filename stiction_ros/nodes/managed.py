@@ -135,7 +135,7 @@ class ManagedNode(LifecycleNode):
     def _activate(self) -> None:
         self._ready = self._linked = False
         self._told_waiting = False
-        self._linking_since = time.monotonic()
+        self._link_begun = time.monotonic()
         self.activate()
         self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
 
@@ -202,7 +202,7 @@ class ManagedNode(LifecycleNode):
         first and then says that it is ready by announcing ``~/config``.
         """
         wanted = {name for name in self.settings.wait_for if name}
-        if not self._told_waiting and time.monotonic() > self._linking_since + LINK_PATIENCE:
+        if not self._told_waiting and time.monotonic() > self._link_begun + LINK_PATIENCE:
             self._told_waiting = True
             missing = sorted(wanted.difference(self.get_node_names()))
             which = ", ".join(missing) or ", ".join(sorted(wanted))

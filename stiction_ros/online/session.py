@@ -27,6 +27,7 @@ from stiction_ros.online.node_settings import (
     PlantNodeSettings,
     RecorderNodeSettings,
 )
+from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 
@@ -92,6 +93,14 @@ class Scenario:
                 where=f"{path}: controller: {controller.model}",
                 fix=f"use {', '.join(model.valve_names)} and {', '.join(model.outputs)}",
             )
+        for key in (field.name for field in dataclasses.fields(FitSchedule)):
+            told, awaited = getattr(checked["estimator"], key), getattr(controller, key)
+            if told != awaited:
+                raise InputError(
+                    f"is {told} for the estimator and {awaited} for the controller",
+                    where=f"{path}: {key}",
+                    fix="give both the same value",
+                )
         try:
             controller.design(process)
             checked["estimator"].options()

@@ -135,6 +135,12 @@ def test_a_wrong_scenario_gets_one_line_that_names_the_file(
     assert key.partition("_")[0] in line or str(value) in line
 
 
+@pytest.mark.parametrize("key", ["fit_first", "fit_every", "fit_latency"])
+def test_two_schedules_of_the_fits_are_refused(key: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"{key}: is 7 for the estimator and .* same value"):
+        Scenario.load(written(tmp_path, "estimator", key, 7))
+
+
 @pytest.mark.parametrize("node", ["plant", "controller", "estimator"])
 def test_a_missing_node_is_named(node: str, tmp_path: Path) -> None:
     path = written(tmp_path, "plant", "seed", 1)
