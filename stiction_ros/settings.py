@@ -118,7 +118,10 @@ def _check_one(entry: Setting, value: Any, place: str) -> Any:
     whole = entry.kind == "int"
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
         raise InputError(f"{value!r} is no {'whole ' if whole else ''}number", where=place)
-    fits = is_finite(value) or isinstance(value, float)  # lists of limits may hold inf
+    # Only what is infinite when not given, such as a limit, may be.
+    defaults = entry.default if isinstance(entry.default, tuple) else (entry.default,)
+    unlimited = any(isinstance(d, float) and math.isinf(d) for d in defaults)
+    fits = is_finite(value) or (unlimited and isinstance(value, float))
     if not fits or not entry.low <= value <= entry.high:
         shown = f"{value:g}" if fits else "the number"
         raise InputError(

@@ -146,3 +146,18 @@ def test_a_setting_knows_its_declaration() -> None:
         9,
         False,
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Unlimited:
+    weights: tuple[float, ...] = setting((1.0,), "weights", low=0.0)
+    limits: tuple[float, ...] = setting((math.inf,), "limits", low=0.0)
+
+
+def test_a_limit_may_be_infinite():
+    assert from_mapping(_Unlimited, {"limits": [math.inf]}, "x").limits == (math.inf,)
+
+
+def test_a_weight_may_not_be_infinite():
+    with pytest.raises(InputError, match="weights"):
+        from_mapping(_Unlimited, {"weights": [math.inf]}, "x")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.identify import add_columns, columns
+from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.records.open_record import is_bag, open_record
 
@@ -20,7 +21,12 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
     add_columns(parser)
-    parser.add_argument("--out", default="report", metavar="DIR", help="folder (default: report)")
+    parser.add_argument(
+        "--out",
+        default="report.html",
+        metavar="F.html",
+        help="the page, or a folder that gets figures and summary.json too (default: report.html)",
+    )
     parser.set_defaults(run=run)
 
 
@@ -29,11 +35,15 @@ def run(options: argparse.Namespace) -> int:
     from stiction_ros.report.record_report import report_record
     from stiction_ros.report.run_report import report_run
 
-    directory = Path(options.out)
-    directory.mkdir(parents=True, exist_ok=True)
-    if is_bag(options.record):
-        print(report_run(options.record, directory).page)
-        return 0
-    record = open_record(options.record, columns(options))
-    print(report_record(record, identify(record, IdentificationOptions()), directory))
+    out = Path(options.out)
+    try:
+        if is_bag(options.record):
+            print(report_run(options.record, out).page)
+        else:
+            record = open_record(options.record, columns(options))
+            print(report_record(record, identify(record, IdentificationOptions()), out))
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})", where=str(out), fix="choose another --out"
+        ) from None
     return 0

@@ -80,6 +80,7 @@ class ControlSettings:
             name: HorizonWeights(self.horizon, stage, np.diag(self._list(name, m)), terminal)
             for name in ("move_weights", "embedding_move_weights")
         }
+        _check_reach(model, self.horizon)
         output = np.column_stack([self._list("pv_low", p), self._list("pv_high", p)])
         if np.any(output[:, 0] >= output[:, 1]):
             raise InputError("pv_low is not below pv_high", where="pv_low")
@@ -107,3 +108,20 @@ class ControlSettings:
                 f"has {len(values)} entries", where=name, fix=f"give 1 or {count} entries"
             )
         return np.array(np.broadcast_to(np.array(values, dtype=float), count))
+
+
+def _check_reach(model: LoopModel, horizon: int) -> None:
+    """Raise InputError when a valve moves no output within the horizon."""
+    linear = model.process.linear(model.sample_time)
+    effect = linear.b
+    moved = np.zeros(effect.shape[1], dtype=bool)
+    for _ in range(horizon):
+        moved |= np.any(linear.c @ effect != 0.0, axis=0)
+        effect = linear.a @ effect
+    for name, reaches in zip(model.valve_names, moved, strict=True):
+        if not reaches:
+            raise InputError(
+                f"valve {name} moves no output within {horizon} samples",
+                where="horizon",
+                fix="make it longer than the dead time and the settling",
+            )

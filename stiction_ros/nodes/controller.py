@@ -15,7 +15,13 @@ from stiction_ros.config_files import find_config
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.managed import (
+    LATCHED_QOS,
+    LATCHED_READER_QOS,
+    READER_QOS,
+    SIGNAL_QOS,
+    ManagedNode,
+)
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, trajectory, values_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.live_controller import LiveController
@@ -65,7 +71,7 @@ class ControllerNode(ManagedNode):
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
         self.inlet(JointState, "dv", self._on_dv, READER_QOS)
         self.inlet(JointState, "stiction", self._on_stiction, READER_QOS, ("estimator",))
-        self.inlet(String, "loop_model", self._on_model, LATCHED_QOS, ("estimator",))
+        self.inlet(String, "loop_model", self._on_model, LATCHED_READER_QOS, ("estimator",))
 
     def configuration(self) -> dict[str, Any]:
         return {"model": self.model.to_mapping()}

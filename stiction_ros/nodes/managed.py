@@ -29,6 +29,11 @@ LATCHED_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+LATCHED_READER_QOS = QoSProfile(
+    depth=100,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
 ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
 LINK_PATIENCE = 5.0  # s until a node says whom it waits for
 LINK_PERIOD = 0.02  # s between two looks at the graph until all peers are there

@@ -75,6 +75,12 @@ class LiveController:
         Raises:
             InputError: settings that do not fit the model.
         """
+        if settings.fit_every < settings.fit_latency:
+            raise InputError(
+                f"{settings.fit_every} is less than fit_latency = {settings.fit_latency}",
+                where="fit_every",
+                fix="a fit must take effect before the next window ends",
+            )
         self.settings, self.model = settings, model
         self._design: ControlDesign = settings.design(model)
         self._known = model

@@ -59,3 +59,10 @@ def test_a_list_of_the_wrong_length_is_refused_by_name(name: str, values: Any) -
 def test_crossed_output_bounds_are_refused() -> None:
     with pytest.raises(InputError, match="pv_low"):
         ControlSettings(pv_low=(5.0,), pv_high=(5.0,)).design(TANK)
+
+
+def test_a_horizon_within_the_dead_time_is_refused() -> None:
+    example1 = LoopModel.load(find_config("example1_process.loop.yaml"))  # delay of 5 samples
+    with pytest.raises(InputError, match="V1 moves no output within 5 samples"):
+        ControlSettings(horizon=5).design(example1)
+    ControlSettings(horizon=6).design(example1)

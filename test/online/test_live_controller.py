@@ -344,3 +344,9 @@ def test_after_a_roll_back_new_settings_do_not_bring_the_worse_controller_back()
 
 def test_frictions_are_found_by_name() -> None:
     assert frictions_of(KNOWN, ("V0", "V1")) == (None, HeStiction(5.0, 2.0))
+
+
+def test_a_fit_must_take_effect_before_the_next_window_ends() -> None:
+    model = LoopModel.load(find_config("example1_process.loop.yaml"))
+    with pytest.raises(InputError, match="fit_every"):
+        LiveController(LiveControllerSettings(fit_every=4, fit_latency=5), model)

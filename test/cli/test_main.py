@@ -1,0 +1,98 @@
+"""The command `stiction`: exit codes, one-line errors, results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiction_ros.cli.main import COMMANDS, main, parser
+from stiction_ros.config_files import find_config
+from stiction_ros.effects import HeStiction
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short record of a sticky first-order loop under a sine of OP."""
+    random = np.random.default_rng(3)
+    time = np.arange(600)
+    op = 50.0 + 8.0 * np.sin(time / 17.0) + 4.0 * np.sin(time / 41.0)
+    stem = HeStiction(4.0, 1.0).simulate(op)
+    pv = np.zeros(600)
+    for k in range(1, 600):
+        pv[k] = 0.8 * pv[k - 1] + 0.2 * (stem[k - 1] - 50.0)
+    pv += 0.02 * random.standard_normal(600)
+    path = tmp_path_factory.mktemp("record") / "loop.csv"
+    rows = np.column_stack([time, op, pv])
+    np.savetxt(path, rows, delimiter=",", header="t,OP,PV", comments="")
+    return path
+
+
+@pytest.mark.parametrize("name", [m.__name__.rpartition(".")[2] for m in COMMANDS])
+def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        parser().parse_args([name, "--help"])
+    assert end.value.code == 0
+    assert "usage: stiction " + name in capsys.readouterr().out
+
+
+def test_identify_prints_the_contract_as_json(
+    record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["identify", str(record), "--na", "1", "--nb", "1", "--delay", "0:2", "--json", "-"]
+    assert main(arguments) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["record"] == str(record)
+    assert found["samples"] == 600
+    (valve,) = found["valves"]
+    assert valve["verdict"] == "sticky"
+    assert valve["f_s"] == pytest.approx(4.0, abs=0.2)
+    assert {"law", "f_s_interval", "f_d", "f_d_interval", "jump", "evidence"} <= valve.keys()
+    (output,) = found["outputs"]
+    wanted = {"name", "a", "b", "delay", "bias", "noise_std", "fit_one_step", "fit_free_run"}
+    assert wanted <= output.keys()
+
+
+def test_report_writes_one_page(record: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    assert main(["report", str(record), "--out", str(page)]) == 0
+    assert "sticky" in page.read_text(encoding="utf-8")
+
+
+WRONG_MODELS = {
+    "unknown key": ("limits:", "limitz:"),
+    "wrong shape": ("b: {V1: [0.002445, 0.007181, 0.001278]}", "b: {V1: 3}"),
+    "f_d above f_s": ("f_d: 2.0", "f_d: 9.0"),
+    "not finite": ("0.002445", ".nan"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_MODELS)
+def test_a_wrong_model_is_one_line_and_exit_2(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = find_config("siso.scenario.yaml")
+    for name in ("siso.set_points", "example1_process.loop", "siso.scenario"):
+        text = (source.parent / f"{name}.yaml").read_text(encoding="utf-8")
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    text = (source.parent / "example1.loop.yaml").read_text(encoding="utf-8")
+    before, after = WRONG_MODELS[case]
+    assert before in text
+    (tmp_path / "example1.loop.yaml").write_text(text.replace(before, after), encoding="utf-8")
+    assert main(["demo", str(tmp_path / "siso.scenario.yaml")]) == 2
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert "example1.loop.yaml" in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["identify", "no.csv"], ["report", "no.csv"], ["demo", "nowhere"], ["study", "no.yaml"]],
+)
+def test_what_is_missing_is_one_line_and_exit_2(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
