@@ -116,6 +116,11 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
             ]
             table.add_row(output, key, *cells)
     console.print(table)
+    for topic, count in summary["messages"].items():
+        # The recorder cannot hold its own last message.
+        lost = (count["published"] or 0) - count["recorded"] - (topic == "/diagnostics")
+        if lost > 0:
+            console.print(f"{name}: warning: {lost} messages of {topic} are not in the bag")
     if summary["status"] != "ok":
         console.print(f"{name}: {summary['reason']}")
     console.print(f"{directory / 'report.html'}")

@@ -238,6 +238,12 @@ def finish(
     for j, tag in enumerate(record.valves):
         if record.op[:, j].min() < 0.0 or record.op[:, j].max() > 100.0:
             notes.append(f"op of {tag} lies outside 0 to 100 %; friction is in the op's own units")
+    notes += [
+        f"delay of {valve} to {output.name} is the longest tried, try a wider range"
+        for output in outputs
+        for valve, delay in output.delay.items()
+        if delay == data.delay[1] > data.delay[0]
+    ]
     usable = all(np.isfinite(fit.loss) for fit in model.fits)
     return Identification(
         status=FitStatus.OK if usable else FitStatus.NO_MODEL,

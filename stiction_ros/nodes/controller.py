@@ -190,6 +190,7 @@ class ControllerNode(ManagedNode):
             if self._origin is not None:
                 self.stamp = self._origin + change.sample * self._step
             self._mode.publish(String(data=change.mode.value))
+            self.get_logger().info(f"sample {change.sample}: {change.mode}, {change.reason}")
             keys = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
             self.report([("mode", change.mode.value, [*keys, *self.live.known_friction()])])
         self._told = len(self.live.changes)

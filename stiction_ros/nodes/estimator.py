@@ -155,6 +155,8 @@ class EstimatorNode(ManagedNode):
         self._publish(stamp, [row[0] for row in rows], [(row[1], *row[2]) for row in rows])
         verdicts = ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
         self._said = f"last window: {verdicts}"
+        found = ", ".join(f"{name} {value:.3g}" for name, value, _ in rows)
+        self.get_logger().info(f"window to sample {update.end}: {verdicts}; {found}")
         keys: list[tuple[str, object]] = [("window_end", stamp)]
         for name, friction in update.trusted.items():
             keys.append((f"{name}.trusted_f_s", friction.static_friction))

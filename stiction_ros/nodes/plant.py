@@ -16,6 +16,8 @@ from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, va
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.node_settings import PlantNodeSettings
 
+LATE_SHARE = 0.01  # of the samples: more op that come too late are a warning
+
 
 class PlantNode(ManagedNode):
     """Thin shell around :class:`stiction_ros.loop.Plant`."""
@@ -39,6 +41,7 @@ class PlantNode(ManagedNode):
         self._step = round(self.model.sample_time * SECOND)
         self._start = round(settings.start_time * SECOND)
         self.stamp = self._start
+        self._late = 0
         self._every = -(-settings.samples // 100)  # a hundred lines of progress
         self._clock_out = self.outlet(Clock, "/clock", SIGNAL_QOS)
         self._pv = self.outlet(JointState, "pv", SIGNAL_QOS, ("controller", "estimator"))
@@ -70,7 +73,14 @@ class PlantNode(ManagedNode):
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         text = "finished" if self.finished else "running"
-        return "ok", text, [("sample", self.plant.sample), ("pace", self.settings.pace)]
+        keys = [
+            ("sample", self.plant.sample),
+            ("pace", self.settings.pace),
+            ("late_op", self._late),
+        ]
+        if self._late > LATE_SHARE * self.plant.sample:
+            return "warn", f"{text}, op comes after its sample has passed", keys
+        return "ok", text, keys
 
     def retune(self, settings: Any) -> None:
         if self._pacer is not None and settings.speed != self.settings.speed:
@@ -88,6 +98,8 @@ class PlantNode(ManagedNode):
             )
             return
         self._op = op
+        if self.settings.pace == "realtime" and to_ns(message.header.stamp) < self.stamp:
+            self._late += 1
         if self.settings.pace == "lockstep" and to_ns(message.header.stamp) == self.stamp:
             self._advance()
 

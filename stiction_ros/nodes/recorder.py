@@ -60,6 +60,7 @@ class RecorderNode(ManagedNode):
         if self.writer is not None:
             self.destroy_timer(self._discovery)
             self.writer.close()
+            self.get_logger().info(f"bag finished: {self.writer.directory}")
             self.writer = None
 
     def on_cleanup(self, state: Any) -> Any:

@@ -54,6 +54,9 @@ Samples = dict[int, dict[str, float]]
 """Stamp in ns to tag to value."""
 
 
+MOST_HELD = 0.01  # share of the samples at which a missing stem is held
+
+
 class LoopSignals:
     """Collects the signals of loops from their messages and joins them by stamp.
 
@@ -193,10 +196,16 @@ class LoopSignals:
     ) -> FloatArray | None:
         if not samples:
             return None
-        missing = sum(
-            1 for stamp in stamps.tolist() if not samples.get(stamp, {}).keys() >= set(tags)
-        )
-        if missing:
-            notes.append(f"stem is missing at {missing} of {len(stamps)} samples, left out")
+        known = {stamp: row for stamp, row in samples.items() if row.keys() >= set(tags)}
+        there = [stamp for stamp in stamps.tolist() if stamp in known]
+        missing = len(stamps) - len(there)
+        if not missing:
+            return self._at(stamps, samples, tags, "stem")
+        said = f"stem is missing at {missing} of {len(stamps)} samples"
+        if missing > max(1, len(stamps) * MOST_HELD):
+            notes.append(f"{said}, all of it is left out")
             return None
-        return self._at(stamps, samples, tags, "stem")
+        notes.append(f"{said}, the one before is held there")
+        given = np.array(there, dtype=np.int64)
+        before = np.maximum(np.searchsorted(given, stamps, side="right") - 1, 0)
+        return self._at(given, known, tags, "stem")[before]

@@ -68,7 +68,7 @@ def test_set_points_are_held_and_lone_samples_left_out(bag: Bag) -> None:
     assert record.notes == (
         "1 messages of pv or op without the other of their stamp left out",
         "no sp for the first 2 samples, the first one given is taken",
-        "stem is missing at 8 of 9 samples, left out",
+        "stem is missing at 8 of 9 samples, all of it is left out",
     )
 
 
