@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -185,7 +186,9 @@ class ManagedNode(LifecycleNode):
         self, kind: Any, topic: str, qos: QoSProfile, readers: tuple[str, ...] = ()
     ) -> Outlet:
         """Create a counted publisher; ``recorder`` is among the readers of every topic."""
-        publisher = self.create_publisher(kind, topic, qos)
+        # Readers warn of incompatible QoS; what a publisher hears of it costs time at every spin.
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        publisher = self.create_publisher(kind, topic, qos, event_callbacks=quiet)
         self.outlets[topic] = Outlet(publisher, (*readers, "recorder"))
         return self.outlets[topic]
 

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -98,7 +99,14 @@ class RecorderNode(ManagedNode):
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
         self._topics[name] = kind
-        self.create_subscription(_message_class(kind), name, self._writing(name), qos, raw=True)
+        self.create_subscription(
+            _message_class(kind),
+            name,
+            self._writing(name),
+            qos,
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
 
     def _writing(self, topic: str) -> Callable[[bytes, dict[str, int]], None]:
         """Return the callback of one topic; log time is simulated time where there is any."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -54,6 +55,8 @@ def run(
             node.start()
         if node.failure:
             return 2
+        gc.collect()
+        gc.freeze()  # what was imported stays: collections need not look at it again
         try:
             while not stop and not node.finished:
                 executor.spin_once(timeout_sec=0.1)
