@@ -85,9 +85,9 @@ def test_every_topic_is_recorded_whole(bag):
     assert {f"/{topic}" for topic in TOPICS} <= {t for t, n in log.recorded.items() if n}
 
 
-def test_only_the_recorders_last_diagnostics_are_missing(bag):
+def test_at_most_the_recorders_own_last_diagnostics_are_missing(bag):
     log = read_run(bag)
-    assert log.recorded["/diagnostics"] == log.published["/diagnostics"] - 1
+    assert 0 <= log.published["/diagnostics"] - log.recorded["/diagnostics"] <= 1
 
 
 @pytest.mark.parametrize("signal_name", ["op", "pv", "sp", "stem"])
