@@ -175,17 +175,15 @@ class LoopSignals:
         notes: list[str],
     ) -> FloatArray | None:
         """Return the last set-points given at or before each stamp."""
-        known = {stamp: row for stamp, row in samples.items() if row.keys() >= set(tags)}
+        known = _whole(samples, tags)
         if not known:
             if samples:
                 notes.append("sp has no value for every pv, left out")
             return None
-        given = np.array(sorted(known), dtype=np.int64)
-        index = np.searchsorted(given, stamps, side="right") - 1
-        if index[0] < 0:
-            late = int(np.count_nonzero(index < 0))
+        late = int(np.count_nonzero(stamps < min(known)))
+        if late:
             notes.append(f"no sp for the first {late} samples, the first one given is taken")
-        return self._at(given, known, tags, "sp")[np.maximum(index, 0)]
+        return self._latest(stamps, known, tags, "sp")
 
     def _stem(
         self,
@@ -196,16 +194,26 @@ class LoopSignals:
     ) -> FloatArray | None:
         if not samples:
             return None
-        known = {stamp: row for stamp, row in samples.items() if row.keys() >= set(tags)}
-        there = [stamp for stamp in stamps.tolist() if stamp in known]
+        known = _whole(samples, tags)
+        there = {stamp: known[stamp] for stamp in stamps.tolist() if stamp in known}
         missing = len(stamps) - len(there)
-        if not missing:
-            return self._at(stamps, samples, tags, "stem")
         said = f"stem is missing at {missing} of {len(stamps)} samples"
-        if missing > max(1, len(stamps) * MOST_HELD):
+        if not there or missing > max(1, len(stamps) * MOST_HELD):
             notes.append(f"{said}, all of it is left out")
             return None
-        notes.append(f"{said}, the one before is held there")
-        given = np.array(there, dtype=np.int64)
-        before = np.maximum(np.searchsorted(given, stamps, side="right") - 1, 0)
-        return self._at(given, known, tags, "stem")[before]
+        if missing:
+            notes.append(f"{said}, the one before is held there")
+        return self._latest(stamps, there, tags, "stem")
+
+    def _latest(
+        self, stamps: np.ndarray[Any, Any], known: Samples, tags: tuple[str, ...], signal: str
+    ) -> FloatArray:
+        """Return the values given last at or before each stamp; before the first, the first."""
+        given = np.array(sorted(known), dtype=np.int64)
+        index = np.searchsorted(given, stamps, side="right") - 1
+        return self._at(given, known, tags, signal)[np.maximum(index, 0)]
+
+
+def _whole(samples: Samples, tags: tuple[str, ...]) -> Samples:
+    """Return the messages that have a value for every tag, by stamp."""
+    return {stamp: row for stamp, row in samples.items() if row.keys() >= set(tags)}

@@ -160,3 +160,15 @@ def test_every_cut_of_a_finished_file_gives_a_prefix_or_an_error(bag: Bag) -> No
         except InputError:
             continue
         assert read == bag.written[: len(read)]
+
+
+def test_one_missing_stem_is_held_and_told(bag: Bag) -> None:
+    for k in range(5):
+        for topic, tag in (("/pv", "PV1"), ("/op", "V1"), ("/stem", "V1")):
+            if (topic, k) != ("/stem", 4):
+                bag.joint(topic, k * SECOND, {tag: float(k)})
+    bag.writer.close()
+    record = read_bag(bag.writer.directory)
+    assert record.stem is not None
+    assert record.stem[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 3.0]
+    assert record.notes == ("stem is missing at 1 of 5 samples, the one before is held there",)
