@@ -47,16 +47,24 @@ class HeStiction(FrictionPair):
     def simulate_grid(
         cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
+        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once.
+
+        Samples at which no stem of the grid can slip cost one comparison.
+        """
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
         stem = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
-        out = np.empty((len(values), len(static)))
+        stems, begins = [stem.copy()], [0]
+        low, high = _dead_zone(stem, static)
         for k, value in enumerate(values.tolist()):
+            if low <= value <= high:
+                continue
             error = value - stem
-            slips = np.abs(error) > static
-            np.copyto(stem, value - np.copysign(dynamic, error), where=slips)
-            out[k] = stem
-        return out
+            np.copyto(stem, value - np.copysign(dynamic, error), where=np.abs(error) > static)
+            stems.append(stem.copy())
+            begins.append(k)
+            low, high = _dead_zone(stem, static)
+        lengths = np.diff([*begins, len(values)])
+        return np.repeat(np.stack(stems, axis=1), lengths, axis=1).T
 
     def inverse(self, memory: Memory, wanted: float) -> float:
         """Return the OP that moves the stem to ``wanted`` if the valve can go there.
@@ -70,3 +78,12 @@ class HeStiction(FrictionPair):
             return float(memory)
         size = max(abs(move), self.jump * (1.0 + 1e-9) + 1e-9)
         return float(memory + np.copysign(size + self.dynamic_friction, move))
+
+
+def _dead_zone(stem: FloatArray, static: FloatArray) -> tuple[float, float]:
+    """Return OP values between which surely no stem slips."""
+    if not len(stem):
+        return -np.inf, np.inf
+    low, high = float((stem - static).max()), float((stem + static).min())
+    slack = 1e-9 * (1.0 + abs(low) + abs(high))
+    return low + slack, high - slack

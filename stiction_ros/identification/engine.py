@@ -207,7 +207,7 @@ def _valve(
     law: str,
 ) -> ValveEstimate:
     f_s, f_d = (float(value) for value in model.friction[j])
-    start = float(record.op[0, j] + model.start[j] * f_s)
+    start = float(record.op[0, j] + model.start[j])
     return ValveEstimate(
         name=record.valves[j],
         verdict=verdict,

@@ -37,10 +37,24 @@ def coarse_grid(limit: float) -> FloatArray:
     return np.unique(np.vstack([triangle(limit, 20), *fine]).round(12), axis=0)
 
 
-def around(centres: FloatArray, step: float, limit: float, half: int = 3) -> FloatArray:
-    """Return local grids of (2·half + 1)² rows round each centre, kept inside the triangle."""
+def even_grid(limit: float, steps: int) -> FloatArray:
+    """Return the triangle in even steps of J = f_S − f_D and S = f_S + f_D, limit / steps each."""
+    nodes = (np.arange(2 * steps) + 0.5) * (limit / steps)
+    jump, reverse = (part.ravel() for part in np.meshgrid(nodes, nodes, indexing="ij"))
+    inside = (reverse >= jump) & (jump + reverse <= 2.0 * limit)
+    jump, reverse = jump[inside], reverse[inside]
+    return 0.5 * np.column_stack([reverse + jump, reverse - jump])
+
+
+def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) -> FloatArray:
+    """Return grids of (2·half + 1)² rows round each centre, kept inside the triangle.
+
+    Even in the plane of J = f_S − f_D and S = f_S + f_D, along which the valleys of the
+    criterion run: a reversal slips once OP has turned by S, a repeated move by J.
+    """
     offsets = np.arange(-half, half + 1) * step
-    mesh = np.stack(np.meshgrid(offsets, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
+    jump, reverse = (part.ravel() for part in np.meshgrid(offsets, offsets, indexing="ij"))
+    mesh = 0.5 * np.column_stack([reverse + jump, reverse - jump])
     rows = (centres[:, None, :] + mesh[None]).reshape(-1, 2)
     static = np.clip(rows[:, 0], 0.0, limit)
     dynamic = np.clip(rows[:, 1], 0.0, static)
@@ -53,25 +67,6 @@ def simulate(
 ) -> FloatArray:
     """Return stems, shape (G, N), contiguous, for rows (f_S, f_D) and OP u, shape (N,)."""
     return np.ascontiguousarray(law.simulate_grid(grid, u, start).T)
-
-
-def switching_bounds(
-    stems: FloatArray, u: FloatArray, start: FloatArray, static: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return largest |e| at which each stem stayed and smallest |e| at which it slipped.
-
-    He's pattern, and so the whole simulation, is the same for every f_S between the two.
-
-    Args:
-        stems: shape (G, N), simulated with ``start`` and ``static``, shape (G,).
-        u: OP, shape (N,).
-    """
-    before = np.concatenate([start[:, None], stems[:, :-1]], axis=1)
-    error = np.abs(u[None, :] - before)
-    slips = error > static[:, None]
-    stayed = np.where(slips, 0.0, error).max(axis=1)
-    slipped = np.where(slips, error, np.inf).min(axis=1)
-    return stayed, slipped
 
 
 def count_moves(stems: FloatArray) -> FloatArray:

@@ -7,10 +7,22 @@ import dataclasses
 import numpy as np
 from scipy.stats import chi2
 
+from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.friction_grid import around, coarse_grid
+from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_search import (
+    PatternMap,
+    PatternScan,
+    PatternSearch,
+    nearby_delays,
+    points_of,
+    refine,
+)
+from stiction_ros.identification.patterns import resting_cells
+
+Interval = tuple[float, float]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,14 +37,21 @@ class FrictionIntervals:
         dynamic_estimate: f_D of the best fit at ``static_estimate``, %.
         zero_loss: how much worse f_S = 0 is, in units of −2 log likelihood.
         deadband_loss: how much worse the best f_D = f_S is, same units.
+        patterns: number of switching patterns enumerated round the best one; 0 when the
+            law has none or the valve does not slip.
+        closed: whether that enumeration reached rejected patterns on every side.
+        delays: per output, the delays of all patterns that are not rejected.
     """
 
-    static: tuple[float, float]
-    dynamic: tuple[float, float]
+    static: Interval
+    dynamic: Interval
     static_estimate: float
     dynamic_estimate: float
     zero_loss: float
     deadband_loss: float
+    patterns: int
+    closed: bool
+    delays: tuple[tuple[int, ...], ...]
 
 
 def friction_intervals(
@@ -40,51 +59,71 @@ def friction_intervals(
 ) -> FrictionIntervals:
     """Return the intervals of one valve round the model's friction."""
     limit = float(data.limit[valve])
-    centre = model.friction[valve]
     threshold = float(chi2.ppf(confidence, 1))
-    grids = [np.zeros((1, 2)), coarse_grid(limit), _deadbands(limit)]
-    step = limit / 30.0
-    for _ in range(7):
-        grids.append(around(centre[None, :], step, limit))
-        step /= 3.0
-    scan = scan_valve(data, model, orders, valve, np.vstack(grids), float(model.start[valve]))
+    near: PatternMap | None = None
+    if data.law is HeStiction:
+        _, near = refine(data, model, orders, valve, threshold, rounds=1)
+        scan = _far_patterns(data, model, orders, valve)
+        if near is not None:
+            scan = PatternScan.joined([scan, near.scan])
+    else:
+        scan = _grid_points(data, model, orders, valve)
+    start = float(model.start[valve])
+    zero = scan_valve(data, model, orders, valve, np.zeros((1, 2)), start)
+    scan = PatternScan.joined([point_patterns(zero), scan])
     scan = _without_standstill(data, model, orders, valve, scan, threshold)
-    for _ in range(2):
-        best = int(scan.loss.argmin())
-        middle = _pattern_middle(scan, best, limit)
-        line = _line(middle, float(scan.grid[best, 1]), limit)
-        scan = _joined(
-            scan, scan_valve(data, model, orders, valve, line, float(model.start[valve]))
-        )
-    best = int(scan.loss.argmin())
-    floor = float(scan.loss[best])
-    accepted = scan.loss <= floor + threshold
-    low = float(np.maximum(scan.stayed, scan.grid[:, 1])[accepted].min())
-    high = float(np.minimum(scan.slipped, limit)[accepted].max())
-    best_band = (_pattern_low(scan, best), min(float(scan.slipped[best]), limit))
-    static = (min(low, best_band[0]), max(high, best_band[1]))
-    estimate = 0.5 * (static[0] + static[1])
-    probe = _line(estimate, float(scan.grid[best, 1]), limit)
-    middle_scan = scan_valve(data, model, orders, valve, probe, float(model.start[valve]))
-    if float(middle_scan.loss.min()) > floor + threshold:
-        estimate = 0.5 * (best_band[0] + best_band[1])
-        probe = _line(estimate, float(scan.grid[best, 1]), limit)
-        middle_scan = scan_valve(data, model, orders, valve, probe, float(model.start[valve]))
-    deadband = (scan.grid[:, 0] == scan.grid[:, 1]) & np.isfinite(scan.loss)
+    floor = float(scan.loss.min())
+    accepted = np.flatnonzero(scan.loss <= floor + threshold)
+    ranges = [_accepted_ranges(scan, int(i), floor + threshold, limit) for i in accepted]
+    static = _hull([r[0] for r in ranges])
+    dynamic = _hull([r[1] for r in ranges])
+    estimate = _estimate(scan, accepted, static, limit)
     return FrictionIntervals(
         static=static,
-        dynamic=_dynamic_interval(scan, floor, threshold),
-        static_estimate=estimate,
-        dynamic_estimate=float(middle_scan.grid[int(middle_scan.loss.argmin()), 1]),
+        dynamic=dynamic,
+        static_estimate=estimate[0],
+        dynamic_estimate=estimate[1],
         zero_loss=float(scan.loss[0]) - floor,
-        deadband_loss=float(scan.loss[deadband].min()) - floor,
+        deadband_loss=_deadband_loss(scan) - floor,
+        patterns=0 if near is None else len(near.scan.loss),
+        closed=near is not None and near.closed,
+        delays=tuple(
+            tuple(sorted({int(d) for d in scan.delays[accepted, i]})) for i in range(len(data.y))
+        ),
     )
 
 
+def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
+    """Return the patterns of coarse grids over the whole triangle, with best f_D each."""
+    limit = float(data.limit[valve])
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    grid = np.vstack([coarse_grid(limit), _deadbands(limit)])
+    level = float(data.u[valve, 0] + model.start[valve])
+    cells = resting_cells(search.u, np.full(len(grid), level), points_of(grid))
+    return search.evaluate(cells)
+
+
+def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
+    """Return grids over the triangle, finer and finer towards the model; points, not cells."""
+    limit = float(data.limit[valve])
+    grids, step = [coarse_grid(limit), _deadbands(limit)], limit / 30.0
+    for _ in range(8):
+        grids.append(finer_grid(model.friction[valve][None, :], step, limit))
+        step /= 3.0
+    return point_patterns(
+        scan_valve(data, model, orders, valve, np.vstack(grids), float(model.start[valve]))
+    )
+
+
+def _deadbands(limit: float) -> FloatArray:
+    values = limit * (np.arange(1, 81) / 80.0) ** 2
+    return np.column_stack([values, values])
+
+
 def _without_standstill(
-    data: Data, model: Model, orders: Orders, valve: int, scan: ValveScan, threshold: float
-) -> ValveScan:
-    """Drop rows in which the stem hardly moves unless the exact fit does not reject them."""
+    data: Data, model: Model, orders: Orders, valve: int, scan: PatternScan, threshold: float
+) -> PatternScan:
+    """Drop patterns in which the stem hardly moves unless the exact fit does not reject them."""
     still = (scan.moves < data.min_moves) & (np.arange(len(scan.loss)) > 0)
     if not still.any():
         return scan
@@ -94,7 +133,7 @@ def _without_standstill(
         model,
         orders,
         valve,
-        scan.grid[index],
+        np.array(scan.middle(index, float(data.limit[valve]))),
         float(model.start[valve]),
         scan.delays[index],
         warm=False,
@@ -107,53 +146,55 @@ def _without_standstill(
     return dataclasses.replace(scan, loss=loss)
 
 
-def _deadbands(limit: float) -> FloatArray:
-    values = limit * (np.arange(1, 81) / 80.0) ** 2
-    return np.column_stack([values, values])
+def _accepted_ranges(
+    scan: PatternScan, index: int, highest: float, limit: float
+) -> tuple[Interval, Interval]:
+    """Return the f_S and the f_D of one pattern whose loss stays below ``highest``."""
+    dynamic = scan.accepted_dynamic(index, highest - float(scan.loss[index]))
+    low, high = scan.static_range(index, dynamic)
+    return (min(low, limit), min(high, limit)), dynamic
 
 
-def _line(static: float, dynamic: float, limit: float) -> FloatArray:
-    """Return rows of one f_S with f_D at geometric distances round ``dynamic``."""
-    offsets = limit * 2.0 ** -np.arange(2.0, 16.0, 0.5)
-    values = np.concatenate([[dynamic], dynamic + offsets, dynamic - offsets, [0.0, static]])
-    values = np.unique(np.clip(values, 0.0, static))
-    return np.column_stack([np.full(len(values), static), values])
+def _hull(intervals: list[Interval]) -> Interval:
+    return min(low for low, _ in intervals), max(high for _, high in intervals)
 
 
-def _pattern_low(scan: ValveScan, index: int) -> float:
-    return float(max(scan.stayed[index], scan.grid[index, 1]))
+def _estimate(
+    scan: PatternScan, accepted: FloatArray, static: Interval, limit: float
+) -> tuple[float, float]:
+    """Return (f_S, f_D): the middle of the interval where a pattern there is accepted."""
+    middle = 0.5 * (static[0] + static[1])
+    best = int(scan.loss.argmin())
+    f_s, f_d = scan.middle(best, limit)
+    order = accepted[np.argsort(scan.loss[accepted], kind="stable")]
+    for index in order:
+        level = float(scan.level[index])
+        low, high = scan.static_range(int(index), (level, level))
+        if low <= middle <= high:
+            return middle, level
+    return f_s, f_d
 
 
-def _pattern_middle(scan: ValveScan, index: int, limit: float) -> float:
-    return 0.5 * (_pattern_low(scan, index) + min(float(scan.slipped[index]), limit))
+def _deadband_loss(scan: PatternScan) -> float:
+    """Return the lowest loss of the patterns that allow J = 0, at f_D = f_S = S / 2."""
+    flat = scan.bounds[:, 0] <= 0.0
+    if not flat.any():
+        return float("inf")
+    low, high = 0.5 * scan.bounds[flat, 2], 0.5 * scan.bounds[flat, 3]
+    away = scan.level[flat] - np.clip(scan.level[flat], low, high)
+    return float((scan.loss[flat] + 0.5 * scan.curvature[flat] * away**2).min())
 
 
-def _joined(first: ValveScan, second: ValveScan) -> ValveScan:
-    fields = [field.name for field in dataclasses.fields(ValveScan)]
-    return ValveScan(
-        *(np.concatenate([getattr(first, name), getattr(second, name)]) for name in fields)
+def point_patterns(scan: ValveScan) -> PatternScan:
+    """Return grid points as patterns without extent."""
+    points = points_of(scan.grid)
+    f_d = scan.grid[:, 1]
+    return PatternScan(
+        np.column_stack([points[:, 0], points[:, 0], points[:, 1], points[:, 1]]),
+        np.column_stack([f_d, f_d]),
+        f_d,
+        np.zeros(len(f_d)),
+        scan.loss,
+        scan.delays,
+        scan.moves,
     )
-
-
-def _dynamic_interval(scan: ValveScan, floor: float, threshold: float) -> tuple[float, float]:
-    """Return where the profile over f_D crosses the threshold, interpolated."""
-    order = np.argsort(scan.grid[:, 1], kind="stable")
-    dynamic, excess = scan.grid[order, 1], scan.loss[order] - floor
-    values, groups = np.unique(dynamic, return_inverse=True)
-    profile = np.full(len(values), np.inf)
-    np.minimum.at(profile, groups, np.minimum(excess, 1e12))
-    inside = np.flatnonzero(profile <= threshold)
-    low, high = float(values[inside[0]]), float(values[inside[-1]])
-    if inside[0] > 0:
-        low = _crossing(values, profile, int(inside[0]), int(inside[0]) - 1, threshold)
-    if inside[-1] + 1 < len(values):
-        high = _crossing(values, profile, int(inside[-1]), int(inside[-1]) + 1, threshold)
-    return low, high
-
-
-def _crossing(
-    values: FloatArray, profile: FloatArray, inside: int, outside: int, threshold: float
-) -> float:
-    near, far = np.sqrt(max(profile[inside], 0.0)), np.sqrt(profile[outside])
-    share = float(np.clip((np.sqrt(threshold) - near) / max(far - near, 1e-12), 0.0, 1.0))
-    return float(values[inside] + share * (values[outside] - values[inside]))

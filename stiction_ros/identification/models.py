@@ -14,12 +14,11 @@ from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
 from stiction_ros.identification.friction_grid import (
     count_moves,
     simulate,
-    switching_bounds,
 )
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.scan import OutputScan
 
-BLOCK = 1_500_000
+BLOCK = 4_000_000
 DELAY_MARGIN = 2.0
 
 
@@ -60,7 +59,7 @@ class Model:
 
     Attributes:
         friction: (f_S, f_D) per valve, shape (m, 2), %.
-        start: stem before the first sample minus first OP, in units of f_S, shape (m,).
+        start: stem before the first sample minus first OP, %, shape (m,).
         stems: shape (m, N), about the mean of the OP.
         delays: one tuple of m delays per output.
         fits: one fit per output.
@@ -92,15 +91,12 @@ class ValveScan:
         loss: best over the delays, summed over outputs, shape (G,).
         delays: the best delay per output, shape (G, p).
         moves: shape (G,).
-        stayed, slipped: range of f_S with the same switching pattern, shape (G,).
     """
 
     grid: FloatArray
     loss: FloatArray
     delays: FloatArray
     moves: FloatArray
-    stayed: FloatArray
-    slipped: FloatArray
 
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
@@ -116,11 +112,38 @@ class ValveScan:
         return chosen
 
 
-def stem_of(data: Data, valve: int, friction: FloatArray, ratio: float) -> FloatArray:
+def stem_of(data: Data, valve: int, friction: FloatArray, start: float) -> FloatArray:
     """Return the stem of one valve, shape (N,)."""
     u = data.u[valve]
-    stems = simulate(data.law, friction[None, :], u, float(u[0] + ratio * friction[0]))
+    stems = simulate(data.law, friction[None, :], u, float(u[0] + start))
     return np.asarray(stems[0])
+
+
+def output_scans(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    criterion: Criterion,
+    delay: tuple[int, int],
+    free: FloatArray | None = None,
+) -> list[OutputScan]:
+    """Return one scan per output, the other valves of ``model`` fixed."""
+    others = [j for j in range(len(data.u)) if j != valve]
+    one = np.ones(1)
+    return [
+        OutputScan(
+            y,
+            model.stems[others],
+            tuple(delays[j] for j in others),
+            orders,
+            delay,
+            fit.noise if criterion is Criterion.INNOVATIONS else one,
+            fit.a if criterion is not Criterion.ONE_STEP else one,
+            free,
+        )
+        for y, fit, delays in zip(data.y, model.fits, model.delays, strict=True)
+    ]
 
 
 def scan_valve(
@@ -129,54 +152,49 @@ def scan_valve(
     orders: Orders,
     valve: int,
     grid: FloatArray,
-    ratios: FloatArray | float,
+    starts: FloatArray | float,
     criterion: Criterion = Criterion.INNOVATIONS,
     delay: tuple[int, int] | None = None,
 ) -> ValveScan:
     """Scan the friction of ``valve`` with the other valves of ``model`` fixed.
 
     Args:
-        ratios: start of the stem in units of f_S, shape (G,) or one for all.
+        starts: stem before the first sample minus first OP, %, shape (G,) or one for all.
         criterion: filter by 1, 1/A or D/A of the model's fits.
         delay: range of delays scanned; None is that of the data.
     """
-    others = [j for j in range(len(data.u)) if j != valve]
-    one = np.ones(1)
-    scans = [
-        OutputScan(
-            y,
-            model.stems[others],
-            tuple(delays[j] for j in others),
-            orders,
-            delay or data.delay,
-            fit.noise if criterion is Criterion.INNOVATIONS else one,
-            fit.a if criterion is not Criterion.ONE_STEP else one,
-        )
-        for y, fit, delays in zip(data.y, model.fits, model.delays, strict=True)
-    ]
+    return scan_criteria(data, model, orders, valve, grid, starts, (criterion,), delay)[0]
+
+
+def scan_criteria(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    grid: FloatArray,
+    starts: FloatArray | float,
+    criteria: tuple[Criterion, ...],
+    delay: tuple[int, int] | None = None,
+) -> list[ValveScan]:
+    """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
+    low, high = delay or data.delay
+    scans = [output_scans(data, model, orders, valve, c, (low, high)) for c in criteria]
     u = data.u[valve]
-    start = u[0] + np.broadcast_to(np.asarray(ratios, dtype=float), (len(grid),)) * grid[:, 0]
+    start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
     size = max(1, BLOCK // len(u))
-    loss, best, moves, stayed, slipped = [], [], [], [], []
-    for low in range(0, len(grid), size):
-        rows = slice(low, low + size)
+    loss = np.zeros((len(criteria), len(grid)))
+    best = np.zeros((len(criteria), len(grid), len(data.y)), dtype=int)
+    moves = np.zeros(len(grid))
+    for begin in range(0, len(grid), size):
+        rows = slice(begin, begin + size)
         stems = simulate(data.law, grid[rows], u, start[rows])
-        losses = [scan.loss(stems) for scan in scans]
-        loss.append(sum(values.min(axis=1) for values in losses))
-        best.append(np.stack([values.argmin(axis=1) for values in losses], axis=1))
-        moves.append(count_moves(stems))
-        bounds = switching_bounds(stems, u, start[rows], grid[rows, 0])
-        stayed.append(bounds[0])
-        slipped.append(bounds[1])
-    first = (delay or data.delay)[0]
-    return ValveScan(
-        grid,
-        np.concatenate(loss),
-        np.concatenate(best) + first,
-        np.concatenate(moves),
-        np.concatenate(stayed),
-        np.concatenate(slipped),
-    )
+        moves[rows] = count_moves(stems)
+        for c, outputs in enumerate(scans):
+            for i, scan in enumerate(outputs):
+                energy = scan.energy(stems)
+                best[c, rows, i] = energy.argmin(axis=1) + low
+                loss[c, rows] += scan.count * np.log(energy.min(axis=1) / scan.count)
+    return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(criteria))]
 
 
 def with_valve(
@@ -185,15 +203,15 @@ def with_valve(
     orders: Orders,
     valve: int,
     friction: FloatArray,
-    ratio: float,
+    first: float,
     delays: FloatArray,
     warm: bool = True,
 ) -> Model:
-    """Return the exact model with one valve's friction and delays replaced."""
+    """Return the exact model with one valve's friction, start and delays replaced."""
     stems = model.stems.copy()
-    stems[valve] = stem_of(data, valve, friction, ratio)
+    stems[valve] = stem_of(data, valve, friction, first)
     all_friction, start = model.friction.copy(), model.start.copy()
-    all_friction[valve], start[valve] = friction, ratio
+    all_friction[valve], start[valve] = friction, first
     return refit(
         data,
         dataclasses.replace(

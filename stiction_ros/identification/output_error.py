@@ -14,10 +14,13 @@ is n log(Σε²/n) + n κ Σw²/Σy² with a small κ: where the free run is goo
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import cho_solve, lapack, solve_triangular
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
@@ -25,6 +28,8 @@ from stiction_ros.effects.behaviour import FloatArray
 MAX_RADIUS = 0.9995
 FREE_RUN_WEIGHT = 0.02
 THIN = 4
+ROUGH_GAIN = 0.3
+FINE_GAIN = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +65,6 @@ class OutputFit:
         count: n, number of innovations.
         free_run: simulated output from sample k_0 − p on.
         innovations: from sample k_0 on, shape (n,).
-        converged: whether Gauss-Newton ended by its tolerance.
     """
 
     orders: Orders
@@ -74,7 +78,6 @@ class OutputFit:
     count: int
     free_run: FloatArray
     innovations: FloatArray
-    converged: bool
 
     @property
     def parameters(self) -> int:
@@ -111,7 +114,12 @@ def equation_error_start(
 
 
 class _Problem:
-    """Evaluates residuals and their derivative for given A and D."""
+    """Evaluates residuals and their derivative for given A and D.
+
+    The linear columns are lagged signals. Neighbouring lags of a slow signal are almost
+    parallel, so each is replaced by its differences: the same space, well conditioned, which
+    allows normal equations.
+    """
 
     def __init__(
         self, y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders
@@ -123,20 +131,31 @@ class _Problem:
         self.signals[: len(stems)] = stems
         self.signals[-2] = 1.0
         self.signals[-1, self.begin - orders.output + 1] = 1.0
+        self.groups = [(j, delay + 1, orders.input) for j, delay in enumerate(delays)]
+        self.groups += [(-2, 0, 1), (-1, 0, orders.output)]
+        self.size = sum(count for _, _, count in self.groups)
 
-    def columns(self, x: FloatArray) -> FloatArray:
-        """Return all lagged linear columns from filtered signals; shape (N − begin, q)."""
-        begin, end = self.begin, x.shape[1]
-        lags = [(j, d + i) for j, d in enumerate(self.delays) for i in self._input_lags()]
-        lags.append((-2, 0))
-        lags += [(-1, i) for i in range(self.orders.output)]
-        out = np.empty((end - begin, len(lags)), order="F")
-        for position, (row, lag) in enumerate(lags):
-            out[:, position] = x[row, begin - lag : end - lag]
+    def rows(self, x: FloatArray, begin: int) -> FloatArray:
+        """Return differences of the lagged signals from sample ``begin`` on; (q, N - begin)."""
+        end = x.shape[1]
+        out = np.empty((self.size, end - begin))
+        row = 0
+        for signal, lag, count in self.groups:
+            lags = [x[signal, begin - lag - i : end - lag - i] for i in range(count)]
+            for i in range(count):
+                out[row] = lags[0]
+                lags = [now - before for now, before in itertools.pairwise(lags)]
+                row += 1
         return out
 
-    def _input_lags(self) -> range:
-        return range(1, self.orders.input + 1)
+    def coefficients(self, theta: FloatArray) -> FloatArray:
+        """Return the coefficients of the lagged signals from those of their differences."""
+        out = np.zeros(self.size)
+        row = 0
+        for _, _, count in self.groups:
+            out[row : row + count] = _difference_table(count).T @ theta[row : row + count]
+            row += count
+        return out
 
     def evaluate(self, a: FloatArray, noise: FloatArray, weight: float = 0.0) -> _Point:
         """Return the variable-projection solution at (A, D).
@@ -144,26 +163,59 @@ class _Problem:
         Args:
             weight: price of Σw², on every ``THIN``-th sample; 0 for innovations only.
         """
+        first, begin = self.orders.first, self.begin
         factor = float(np.sqrt(THIN * weight))
-        p = self.orders.noise
-        plain = self.columns(lfilter([1.0], a, self.signals, axis=1))
-        scale = np.sqrt(np.einsum("ij,ij->j", plain, plain)) + 1e-300
-        plain /= scale
-        whitened = lfilter(noise, [1.0], plain, axis=0)[p:]
-        target = lfilter(noise, [1.0], self.y[self.begin :])[p:]
+        plain = self.rows(lfilter([1.0], a, self.signals, axis=1), begin)
+        rows = self.rows(lfilter(noise, a, self.signals, axis=1), first)
+        target = lfilter(noise, [1.0], self.y[begin:])[first - begin :]
         count = len(target)
         if weight > 0.0:
-            whitened = np.vstack([whitened, factor * plain[p::THIN]])
-            target = np.concatenate([target, factor * self.y[self.begin + p :: THIN]])
-        q, r = np.linalg.qr(whitened)
-        diagonal = np.abs(np.diag(r))
-        keep = diagonal > 1e-9 * max(float(diagonal.max()), 1e-300)
+            thinned = slice(first - begin, None, THIN)
+            rows = np.hstack([rows, factor * plain[:, thinned]])
+            target = np.concatenate([target, factor * self.y[first::THIN]])
+        theta, root, keep = _least_squares(rows, target)
         if not keep.all():
-            plain, scale = plain[:, keep], scale[keep]
-            q, r = np.linalg.qr(whitened[:, keep])
-        theta = solve_triangular(r, q.T @ target)
-        residual = target - q @ (q.T @ target)
-        return _Point(a, noise, theta / scale, keep, q, plain @ theta, residual, count, factor)
+            rows = rows[keep]
+        residual = target - theta[keep] @ rows
+        return _Point(a, noise, theta, rows, root, theta @ plain, residual, count, factor)
+
+
+def _least_squares(
+    rows: FloatArray, target: FloatArray
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return theta (q,), the Cholesky factor of the kept rows' Gram matrix, and which are kept.
+
+    Rows that depend on those before them are dropped; their theta is 0.
+    """
+    gram = rows @ rows.T
+    right = rows @ target
+    scale = np.sqrt(np.diag(gram)) + 1e-300
+    keep = scale > 1e-12 * scale.max()
+    while True:
+        size = scale[keep]
+        scaled = gram[np.ix_(keep, keep)] / np.outer(size, size)
+        root, info = lapack.dpotrf(scaled, lower=1)
+        bad = int(info) - 1
+        if info == 0:
+            small = np.flatnonzero(np.diag(root) < 1e-6)
+            if not len(small):
+                break
+            bad = int(small[0])
+        keep[np.flatnonzero(keep)[bad]] = False
+    root *= size[:, None]
+    theta = np.zeros(len(rows))
+    theta[keep] = cho_solve((root, True), right[keep], check_finite=False)
+    return theta, root, keep
+
+
+@functools.cache
+def _difference_table(count: int) -> FloatArray:
+    """Return T with differences = T · lags, shape (count, count)."""
+    table = np.zeros((count, count))
+    for i in range(count):
+        for j in range(i + 1):
+            table[i, j] = (-1.0) ** j * math.comb(i, j)
+    return table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -171,8 +223,8 @@ class _Point:
     a: FloatArray
     noise: FloatArray
     theta: FloatArray
-    keep: NDArray[np.bool_]
-    q: FloatArray
+    rows: FloatArray
+    root: FloatArray
     free_run: FloatArray
     residual: FloatArray
     count: int
@@ -201,36 +253,48 @@ def ar_fit(w: FloatArray, order: int) -> FloatArray:
     return np.concatenate([[1.0], -solution])
 
 
-def _jacobian(problem: _Problem, point: _Point) -> FloatArray:
-    """Return d(residual)/d(a, d) with the linear part projected out; Kaufman's form."""
+def _normal_equations(problem: _Problem, point: _Point) -> tuple[FloatArray, FloatArray]:
+    """Return Gram matrix and gradient over (a, d) with the linear part projected out.
+
+    Kaufman's form of the derivative of the variable projection.
+    """
     orders, p = problem.orders, problem.orders.noise
-    count = len(problem.y) - problem.begin
+    count = point.count
     # dŷ/da_i = −q^-i ŷ/A; what started before `begin` lies in the span of the initial terms.
-    slope = lfilter([1.0], point.a, point.free_run)
-    jacobian = np.zeros((len(point.residual), orders.output + p), order="F")
+    lead = np.zeros(orders.output)
+    slope = np.concatenate([lead, lfilter(point.noise, point.a, point.free_run)])
+    jacobian = np.empty((orders.output + p, len(point.residual)))
     for i in range(1, orders.output + 1):
-        shifted = np.concatenate([np.zeros(i), slope[: count - i]])
-        jacobian[: point.count, i - 1] = lfilter(point.noise, [1.0], shifted)[p:]
-        if point.factor > 0.0:
-            jacobian[point.count :, i - 1] = point.factor * shifted[p::THIN]
+        begin = orders.output + p - i
+        jacobian[i - 1, :count] = slope[begin : begin + count]
+    if point.factor > 0.0:
+        plain = np.concatenate([lead, lfilter([1.0], point.a, point.free_run)])
+        for i in range(1, orders.output + 1):
+            begin = orders.output + p - i
+            jacobian[i - 1, count:] = point.factor * plain[begin : begin + count : THIN]
     w = problem.y[problem.begin :] - point.free_run
     for i in range(1, p + 1):
-        jacobian[: point.count, orders.output + i - 1] = w[p - i : count - i]
-    return np.asarray(jacobian - point.q @ (point.q.T @ jacobian))
+        jacobian[orders.output + i - 1, :count] = w[p - i : p - i + count]
+        jacobian[orders.output + i - 1, count:] = 0.0
+    cross = solve_triangular(point.root, point.rows @ jacobian.T, lower=True, check_finite=False)
+    return jacobian @ jacobian.T - cross.T @ cross, jacobian @ point.residual
 
 
-def _descend(problem: _Problem, point: _Point, max_iterations: int) -> tuple[_Point, bool]:
-    """Levenberg-Marquardt over (a, d) from ``point``, Σw² priced by its innovations."""
+def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: float) -> _Point:
+    """Levenberg-Marquardt over (a, d) from ``point``, Σw² priced by its innovations.
+
+    Ends when an iteration lowers the criterion by less than ``least_gain``.
+    """
     na = problem.orders.output
     damping = 1e-3
     innovations = point.innovations
     weight = FREE_RUN_WEIGHT * float(innovations @ innovations) / problem.energy
     point = problem.evaluate(point.a, point.noise, weight)
     for _ in range(max_iterations):
-        jacobian = _jacobian(problem, point)
-        scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
-        jacobian /= scale
-        gram, gradient = jacobian.T @ jacobian, jacobian.T @ point.residual
+        gram, gradient = _normal_equations(problem, point)
+        scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-300
+        gram /= np.outer(scale, scale)
+        gradient /= scale
         improved = False
         while damping < 1e6:
             system = gram + damping * np.eye(len(gram))
@@ -246,12 +310,12 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int) -> tuple[_Po
                     break
             damping *= 5.0
         if not improved:
-            return point, True
+            return point
         gain = 1.0 - candidate.energy / point.energy
         point, damping = candidate, max(damping / 10.0, 1e-9)
-        if gain * point.count < 1e-3:
-            return point, True
-    return point, False
+        if gain * point.count < least_gain:
+            break
+    return point
 
 
 def fit_output(
@@ -284,12 +348,11 @@ def fit_output(
         refined = _steiglitz_mcbride(problem, white)
         noise = ar_fit(y[problem.begin :] - refined.free_run, orders.noise)
         starts = [problem.evaluate(a, padded), problem.evaluate(refined.a, noise)]
-    results = []
-    for point in starts:
-        # Twice: the second time Σw² is priced by the innovations of a good model.
-        point, _ = _descend(problem, point, max_iterations)
-        results.append(_finished(problem, *_descend(problem, point, max_iterations)))
-    return min(results, key=lambda fit: fit.loss)
+    # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
+    # priced anew by the innovations of a good model.
+    rough = [_descend(problem, point, max_iterations, ROUGH_GAIN) for point in starts]
+    best = min(rough, key=lambda point: _loss(problem, point))
+    return _finished(problem, _descend(problem, best, max_iterations, FINE_GAIN))
 
 
 def _steiglitz_mcbride(problem: _Problem, point: _Point, iterations: int = 4) -> _Point:
@@ -304,15 +367,19 @@ def _steiglitz_mcbride(problem: _Problem, point: _Point, iterations: int = 4) ->
     return best
 
 
-def _finished(problem: _Problem, point: _Point, converged: bool) -> OutputFit:
-    orders, valves = problem.orders, len(problem.delays)
-    theta = np.zeros(len(point.keep))
-    theta[point.keep] = point.theta
+def _loss(problem: _Problem, point: _Point) -> float:
+    """Return n log(Σε²/n) + n κ Σw²/Σy²."""
     innovations = point.innovations
-    count = point.count
     energy = max(float(innovations @ innovations), 1e-300)
     w = problem.y[problem.orders.first :] - point.free_run[problem.orders.noise :]
     penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
+    return point.count * (float(np.log(energy / point.count)) + penalty)
+
+
+def _finished(problem: _Problem, point: _Point) -> OutputFit:
+    orders, valves = problem.orders, len(problem.delays)
+    theta = problem.coefficients(point.theta)
+    innovations = point.innovations
     return OutputFit(
         orders=orders,
         delays=problem.delays,
@@ -320,10 +387,9 @@ def _finished(problem: _Problem, point: _Point, converged: bool) -> OutputFit:
         b=theta[: valves * orders.input].reshape(valves, orders.input),
         constant=float(theta[valves * orders.input]),
         noise=point.noise,
-        loss=count * (float(np.log(energy / count)) + penalty),
-        energy=energy,
-        count=count,
+        loss=_loss(problem, point),
+        energy=max(float(innovations @ innovations), 1e-300),
+        count=point.count,
         free_run=point.free_run,
         innovations=innovations,
-        converged=converged,
     )

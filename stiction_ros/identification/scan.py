@@ -25,6 +25,8 @@ class OutputScan:
         orders: n_a, n_b, p and the window.
         delay: inclusive range of the scanned valve's delay.
         numerator, denominator: D and A of the prefilter; ones for the one-step criterion.
+        free: a signal in the stem whose size is unknown, shape (N,); what it explains at any
+            delay is projected out.
     """
 
     def __init__(
@@ -36,6 +38,7 @@ class OutputScan:
         delay: tuple[int, int],
         numerator: FloatArray,
         denominator: FloatArray,
+        free: FloatArray | None = None,
     ) -> None:
         self.orders, self.delay = orders, delay
         self.numerator, self.denominator = numerator, denominator
@@ -45,6 +48,10 @@ class OutputScan:
         for stem, lag in zip(self._filtered(others), other_delays, strict=True):
             columns += [stem[first - lag - i : count - lag - i] for i in range(1, orders.input + 1)]
         columns.append(self._filtered(np.ones(count))[first:])
+        self.lags = range(delay[0] + 1, delay[1] + orders.input + 1)
+        if free is not None:
+            filtered = self._filtered(free)
+            columns += [filtered[first - lag : count - lag] for lag in self.lags]
         impulse = np.zeros(count)
         impulse[first - orders.noise - len(denominator)] = 1.0
         impulse = self._filtered(impulse)
@@ -56,52 +63,106 @@ class OutputScan:
         rest = target[first:] - basis @ (basis.T @ target[first:])
         self.count = count - first
         self.rest_energy = max(float(rest @ rest), 1e-300)
-        self.projector = np.ascontiguousarray(np.column_stack([basis, rest]))
+        # One column block per lag, so that all projections are one matrix product.
+        self.width = basis.shape[1] + 1
+        projector = np.zeros((count, len(self.lags), self.width))
+        for position, lag in enumerate(self.lags):
+            projector[first - lag : count - lag, position, :-1] = basis
+            projector[first - lag : count - lag, position, -1] = rest
+        self.projector = projector.reshape(count, -1)
 
     def _filtered(self, x: FloatArray) -> FloatArray:
         if len(self.numerator) == 1 and len(self.denominator) == 1:
             return x
         return np.asarray(lfilter(self.numerator, self.denominator, x, axis=-1))
 
-    def loss(self, stems: FloatArray) -> FloatArray:
-        """Return n log(SE / n), shape (G, T), for stems of shape (G, N) and T delays."""
+    def energy(self, stems: FloatArray) -> FloatArray:
+        """Return SE, shape (G, T), for stems of shape (G, N) and T delays."""
         x = self._filtered(stems)
-        low, high = self.delay
-        nb, first, count = self.orders.input, self.orders.first, x.shape[1]
-        lags = range(low + 1, high + nb + 1)
-        projected = np.stack([x[:, first - i : count - i] @ self.projector for i in lags])
-        products = self._autocorrelations(x, lags)
-        size, delays = len(x), high - low + 1
-        gram = np.empty((delays, size, nb, nb))
-        right = np.empty((delays, size, nb))
-        for t in range(delays):
-            right[t] = projected[t : t + nb, :, -1].T
-            for i in range(nb):
-                for j in range(i, nb):
-                    part = np.einsum("gq,gq->g", projected[t + i, :, :-1], projected[t + j, :, :-1])
-                    gram[t, :, i, j] = gram[t, :, j, i] = products[j - i][t + i] - part
-        floor = np.stack([products[0][t : t + nb].max(axis=0) for t in range(delays)])
-        diagonal = np.arange(nb)
-        gram[..., diagonal, diagonal] += 1e-10 * floor[..., None] + 1e-200
-        solution = np.linalg.solve(gram, right[..., None])[..., 0]
-        explained = np.einsum("tgi,tgi->gt", right, solution)
-        energy = np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy)
-        return np.asarray(self.count * np.log(energy / self.count))
+        projected = self._projected(x)
+        return self._energy(self._gram(x, x, projected, projected), projected[..., -1])
 
-    def _autocorrelations(self, x: FloatArray, lags: range) -> list[FloatArray]:
-        """Return, per difference d < n_b, sums of x[k−l] x[k−l−d] for all lags l; (L, G)."""
+    def patterns(self, bases: FloatArray, signs: FloatArray) -> PatternEnergy:
+        """Return SE of the stems base − level · sign as a function of the level.
+
+        Args:
+            bases, signs: shape (G, N).
+        """
+        x, s = self._filtered(bases), self._filtered(signs)
+        px, ps = self._projected(x), self._projected(s)
+        cross = self._gram(x, s, px, ps)
+        return PatternEnergy(
+            self,
+            (self._gram(x, x, px, px), cross + cross.transpose(1, 0, 2), self._gram(s, s, ps, ps)),
+            (px[..., -1], ps[..., -1]),
+        )
+
+    def _gram(self, x: FloatArray, s: FloatArray, px: FloatArray, ps: FloatArray) -> FloatArray:
+        gram = self._products(x, s)
+        if x is s:  # a ridge, as a stem that stands still says nothing
+            diagonal = np.arange(len(gram))
+            gram[diagonal, diagonal] *= 1.0 + 1e-13
+            gram[diagonal, diagonal] += 1e-200
+        gram -= np.einsum("lgq,mgq->lmg", px[..., :-1], ps[..., :-1], optimize=True)
+        return gram
+
+    def _projected(self, x: FloatArray) -> FloatArray:
+        """Return the products of lagged signals with basis and rest, shape (L, G, q + 1)."""
+        product = (x @ self.projector).reshape(len(x), len(self.lags), self.width)
+        return np.ascontiguousarray(product.transpose(1, 0, 2))
+
+    def _energy(self, gram: FloatArray, right: FloatArray) -> FloatArray:
+        """Return SE, shape (G, T), from Gram (L, L, G) and right-hand side (L, G)."""
+        nb, size = self.orders.input, right.shape[1]
+        delays = len(self.lags) - nb + 1
+        lag = np.arange(delays)[:, None] + np.arange(nb)
+        matrix = gram[lag[:, :, None], lag[:, None, :]].transpose(3, 0, 1, 2)
+        vector = right[lag].transpose(2, 0, 1)
+        solution = np.linalg.solve(matrix, vector[..., None])[..., 0]
+        explained = np.einsum("gti,gti->gt", vector, solution).reshape(size, delays)
+        return np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy)
+
+    def _products(self, x: FloatArray, s: FloatArray) -> FloatArray:
+        """Return sums of x[k − l] s[k − m] over the window, shape (L, L, G), |l − m| < n_b."""
         first, count = self.orders.first, x.shape[1]
-        result = []
+        out = np.zeros((len(self.lags), len(self.lags), len(x)))
         for d in range(self.orders.input):
-            i = lags[0]
-            now = np.einsum(
-                "gn,gn->g", x[:, first - i : count - i], x[:, first - i - d : count - i - d]
-            )
-            sums = [now]
-            for i in lags[:-1]:
-                last = count - 1 - i
-                now = now + x[:, first - i - 1] * x[:, first - i - 1 - d]
-                now = now - x[:, last] * x[:, last - d]
-                sums.append(now)
-            result.append(np.stack(sums))
-        return result
+            pairs = [(x, s)] if d == 0 or x is s else [(x, s), (s, x)]
+            for swap, (one, two) in enumerate(pairs):
+                lag = self.lags[0]
+                now = np.einsum(
+                    "gn,gn->g", one[:, first - lag : count - lag],
+                    two[:, first - lag - d : count - lag - d],
+                )
+                for position in range(len(self.lags) - d):
+                    row, column = position, position + d
+                    if swap:
+                        row, column = column, row
+                    out[row, column] = now
+                    if x is s:
+                        out[column, row] = now
+                    last, before = count - 1 - lag, first - lag - 1
+                    now = now + one[:, before] * two[:, before - d] - one[:, last] * two[:, last - d]
+                    lag += 1
+        return out
+
+
+class PatternEnergy:
+    """SE of switching patterns as a function of f_D; the stem is affine in it."""
+
+    def __init__(
+        self,
+        scan: OutputScan,
+        grams: tuple[FloatArray, FloatArray, FloatArray],
+        rights: tuple[FloatArray, FloatArray],
+    ) -> None:
+        self._scan, self._grams, self._rights = scan, grams, rights
+
+    def __call__(self, levels: FloatArray) -> FloatArray:
+        """Return SE, shape (G, F, T), for f_D of shape (G, F)."""
+        (xx, cross, ss), (x, s) = self._grams, self._rights
+        parts = [
+            self._scan._energy(xx - f * cross + f**2 * ss, x - f * s)  # noqa: SLF001
+            for f in levels.T
+        ]
+        return np.stack(parts, axis=1)

@@ -1,173 +1,140 @@
-"""Coordinate search over the valves' friction.
+"""Search over the valves' friction: grids first, then exact switching patterns.
 
 A valve's friction is found by scanning the triangle with everything else fixed
-(:mod:`.scan`); candidates are judged by the exact fit under the noise model
-(:mod:`.output_error`).
+(:mod:`.scan`), closer and closer round the best points; candidates are judged by the exact
+fit under the noise model (:mod:`.output_error`); the best ends in the best switching pattern
+of its neighbourhood (:mod:`.pattern_search`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.friction_grid import around, coarse_grid
+from stiction_ros.identification.friction_grid import coarse_grid, even_grid, finer_grid
 from stiction_ros.identification.models import (
     Criterion,
     Data,
     Model,
-    ValveScan,
+    scan_criteria,
     scan_valve,
     with_valve,
 )
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_search import (
+    PatternSearch,
+    best_in_cells,
+    nearby_delays,
+    refine,
+)
 
-CLOUD = 260
+STEPS = 50
+COARSE = 0.05
+APART = 0.03
+FINEST = 0.004
+COMB = 0.0012
+FIRST_PARENTS = 20
+RIVALS = 2
 PARENTS = 6
-SWEEPS = 6
-PATIENCE = 2
+SWEEPS = 5
+REJECTED = 4.0
 
 
 def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     """Return the best model over the whole triangle of one valve; never worse than ``model``."""
-    limit = float(data.limit[valve])
+    best = model
+    limit, start = float(data.limit[valve]), float(model.start[valve])
     grid = coarse_grid(limit)
-    best, parents = model, []
-    for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
-        scan = scan_valve(data, model, orders, valve, grid, 0.0, criterion)
-        chosen = scan.best(6, data.min_moves, limit / 25.0)
-        parents += [np.append(grid[index], 0.0) for index in chosen]
-        for index in chosen[:2]:
-            rival = with_valve(
-                data, model, orders, valve, grid[index], 0.0, scan.delays[index], warm=False
-            )
-            best = min(best, rival, key=lambda candidate: candidate.loss)
+    fine = np.vstack([grid, even_grid(limit, STEPS)])
+    one_step = scan_valve(data, model, orders, valve, fine, start, Criterion.ONE_STEP)
+    others = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
+    scans = [one_step, *scan_criteria(data, model, orders, valve, grid, start, others)]
+    rivals = []
+    for criterion, scan in zip((Criterion.ONE_STEP, *others), scans, strict=True):
+        parents = scan.grid[scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)]
+        rivals.append(descend(data, model, orders, valve, parents, criterion, data.delay, False))
+    for rival in sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]:
+        if rival.friction[valve, 0] > 0.0:
+            closer = comb(data, rival, orders, valve)
+            best = min(best, closer, key=lambda candidate: candidate.loss)
     if best.friction[valve, 0] == 0.0:
         return best
-    failures = 0
-    for sweep in range(SWEEPS):
+    best, _ = refine(data, best, orders, valve, REJECTED)
+    for _ in range(SWEEPS):
         before = best.loss
-        if sweep == 0:
-            rows = np.array(parents)
-            for criterion in (Criterion.ONE_STEP, Criterion.FREE_RUN):
-                best = evolve(data, best, orders, valve, rows, 0, criterion)
-        else:
-            scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
-            chosen = scan.best(4, data.min_moves, limit / 25.0)
-            parents = [np.append(grid[index], best.start[valve]) for index in chosen]
-        parents.append(np.append(best.friction[valve], best.start[valve]))
-        best = evolve(data, best, orders, valve, np.array(parents), sweep)
-        if failures == PATIENCE - 1 and best.loss > before - 1.0:
-            best = comb(data, best, orders, valve)
-        failures = failures + 1 if best.loss > before - 1.0 else 0
-        if failures == PATIENCE:
+        scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
+        chosen = grid[scan.best(PARENTS - 2, data.min_moves, COARSE * limit)]
+        parents = np.vstack([best.friction[valve], chosen])
+        delay = nearby_delays(data, best, valve)
+        best = descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, delay)
+        best = comb(data, best, orders, valve)
+        best, _ = refine(data, best, orders, valve, REJECTED)
+        if best.loss > before - 1.0:
             break
     return best
 
 
-def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
-    """Try every point of a dense local grid, then refine the best ones.
-
-    With many slips the right switching pattern can be narrower than 0.2 % of the span and
-    its neighbours much worse than a wrong pattern further off, so clouds may pass it by.
-    """
-    limit, start = float(data.limit[valve]), float(model.start[valve])
-    step = 1.2 * data.resolution * limit
-    grid = around(model.friction[valve][None, :], step, limit, half=20)
-    delay = _delay_range(data, model, valve)
-    best = model
-    for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
-        scan = scan_valve(data, model, orders, valve, grid, start, criterion, delay)
-        chosen = scan.best(PARENTS, data.min_moves, 2.0 * step)
-        rows = np.column_stack([grid[chosen], np.full(len(chosen), start)])
-        if len(rows):
-            best = evolve(data, best, orders, valve, rows, 5, criterion)
-    return best
-
-
-def evolve(
+def descend(
     data: Data,
     model: Model,
     orders: Orders,
     valve: int,
     parents: FloatArray,
-    seed: int,
-    criterion: Criterion = Criterion.INNOVATIONS,
+    criterion: Criterion,
+    delay: tuple[int, int],
+    warm: bool = True,
 ) -> Model:
-    """Refine (f_S, f_D, start) by shrinking clouds of points round the best ones.
-
-    The criterion is piecewise constant in f_S with many local minima on the way down, so
-    several parents are kept apart from each other in every round. Deterministic for a seed.
+    """Scan finer and finer round several parents (f_S, f_D); return the better model.
 
     Args:
-        parents: rows (f_S, f_D, start ratio).
+        parents: shape (G, 2).
+        delay: range of delays scanned.
+        warm: start the exact fit from that of ``model``.
     """
-    generator = np.random.default_rng(seed)
-    limit = float(data.limit[valve])
-    local = criterion is Criterion.INNOVATIONS
-    delay = _delay_range(data, model, valve) if local else data.delay
-    scale = limit / (25.0 * (1.0, 2.5, 1.0, 6.0, 1.0, 15.0)[seed])
-    while True:
-        rows = offspring(generator, parents, CLOUD, scale, limit)
-        friction, starts = rows[:, :2], rows[:, 2]
-        scan = scan_valve(data, model, orders, valve, friction, starts, criterion, delay)
-        chosen = scan.best(PARENTS, data.min_moves, 0.4 * scale)
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    if not len(parents):
+        return model
+    patterns = None
+    if data.law is HeStiction:
+        patterns = PatternSearch(data, model, orders, valve, delay, criterion=criterion)
+        parents, _ = best_in_cells(patterns, parents, start)
+    step = APART * limit
+    while step > FINEST * limit:
+        step /= 3.0
+        grid = finer_grid(parents, step, limit)
+        scan = scan_valve(data, model, orders, valve, grid, start, criterion, delay)
+        chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
         if not chosen:
             return model
-        parents = rows[chosen]
-        if scale < data.resolution * limit:
-            break
-        scale /= 2.5
-    best = model
-    for index in chosen[:2]:
-        best = _better(data, best, orders, valve, scan, index, float(rows[index, 2]))
-    return best
-
-
-def offspring(
-    generator: np.random.Generator, parents: FloatArray, count: int, scale: float, limit: float
-) -> FloatArray:
-    """Return the parents and about ``count`` points round them, rows (f_S, f_D, start)."""
-    copies = max(1, count // len(parents))
-    rows = np.repeat(parents, copies, axis=0)
-    size = scale * generator.choice([0.2, 1.0], (len(rows), 1))
-    move = generator.standard_normal((len(rows), 2))
-    # A reversal slips once u has turned by f_S + f_D, a repeated move by J = f_S − f_D: the
-    # valleys of the criterion run along constant sums and constant differences.
-    kind = generator.integers(0, 6, len(rows))
-    move[kind == 0, 1] = 0.0
-    move[kind == 1, 0] = 0.0
-    move[kind == 2, 1] = move[kind == 2, 0]
-    sums = (kind == 3) | (kind == 4)
-    move[sums, 1] = -move[sums, 0]
-    size = np.where(sums[:, None], 2.0 * size, size)
-    rows[:, :2] += size * move
-    rows[:, 0] = np.clip(rows[:, 0], 1e-6 * limit, limit)
-    rows[:, 1] = np.clip(rows[:, 1], 0.0, rows[:, 0])
-    shake = generator.standard_normal(len(rows)) * np.minimum(1.0, 8.0 * scale / limit)
-    shake *= generator.random(len(rows)) < 0.5
-    rows[:, 2] = np.clip(rows[:, 2] + shake, -1.0, 1.0)
-    return np.vstack([parents, rows])
-
-
-def _delay_range(data: Data, model: Model, valve: int) -> tuple[int, int]:
-    now = [row[valve] for row in model.delays]
-    return max(data.delay[0], min(now) - 1), min(data.delay[1], max(now) + 1)
-
-
-def _better(
-    data: Data,
-    model: Model,
-    orders: Orders,
-    valve: int,
-    scan: ValveScan,
-    index: int,
-    ratio: float | None = None,
-) -> Model:
-    """Return the exact model at one row of a scan if it beats ``model``, else ``model``."""
-    start = float(model.start[valve]) if ratio is None else ratio
-    friction, delays = scan.grid[index], scan.delays[index]
-    rival = with_valve(data, model, orders, valve, friction, start, delays)
+        parents, delays = grid[chosen], scan.delays[chosen]
+        if patterns is not None:
+            parents, cells = best_in_cells(patterns, parents, start)
+            order = np.argsort(cells.loss, kind="stable")
+            parents, delays = parents[order], cells.delays[order]
+    rival = with_valve(data, model, orders, valve, parents[0], start, delays[0], warm=warm)
     return min(model, rival, key=lambda candidate: candidate.loss)
+
+
+def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+    """Try a dense grid round the model and refine its best points; return the better model.
+
+    With many slips the right switching pattern can be narrower than 0.1 % of the span and
+    its neighbours much worse than a wrong pattern further off.
+    """
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    delay, step = nearby_delays(data, model, valve), COMB * limit
+    grid, half, best = model.friction[valve][None, :], 15, model
+    for _ in range(2):
+        grid = finer_grid(grid, step, limit, half)
+        scan = scan_valve(data, model, orders, valve, grid, start, delay=delay)
+        chosen = scan.best(PARENTS, data.min_moves, 2.0 * step)
+        grid, half, step = grid[chosen], 3, step / 3.0
+    for index in chosen[:2]:
+        friction, delays = scan.grid[index], scan.delays[index]
+        rival = with_valve(data, model, orders, valve, friction, start, delays)
+        best = min(best, rival, key=lambda candidate: candidate.loss)
+    return best
 
 
 def search(data: Data, model: Model, orders: Orders, sweeps: int = 3) -> Model:

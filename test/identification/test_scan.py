@@ -18,12 +18,28 @@ def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int
     orders = Orders(na, nb, 2, 20)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 200)), (), orders, (0, 4), one, one)
-    loss = scan.loss(stems)
+    energy = scan.energy(stems)
     for g in range(3):
         for delay in range(5):
             columns = [y[20 - i : 200 - i] for i in range(1, na + 1)]
             columns += [stems[g, 20 - delay - i : 200 - delay - i] for i in range(1, nb + 1)]
             matrix = np.column_stack([*columns, np.ones(180)])
             rest = y[20:] - matrix @ np.linalg.lstsq(matrix, y[20:], rcond=None)[0]
-            expected = 180 * np.log(rest @ rest / 180)
-            assert loss[g, delay] == pytest.approx(expected, abs=1e-4)
+            assert energy[g, delay] == pytest.approx(rest @ rest, rel=1e-6)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 1000), nb=st.integers(1, 3), p=st.integers(0, 2))
+def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p: int) -> None:
+    generator = np.random.default_rng(seed)
+    y = generator.standard_normal(150)
+    other = generator.standard_normal((1, 150)).cumsum(axis=1)
+    bases = generator.standard_normal((4, 150)).cumsum(axis=1)
+    signs = generator.choice([-1.0, 0.0, 1.0], (4, 150))
+    levels = generator.random((4, 3))
+    a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
+    scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
+    energy = scan.patterns(bases, signs)(levels)
+    for f in range(3):
+        expected = scan.energy(bases - levels[:, f : f + 1] * signs)
+        assert energy[:, f] == pytest.approx(expected, rel=1e-7)

@@ -1,0 +1,387 @@
+"""The best switching pattern near a model, and all patterns that the record does not reject.
+
+Patterns are listed exactly (:mod:`.patterns`) in a rectangle of the (J, S) plane round the
+model; f_D is minimised over inside every cell. The rectangle grows until no accepted pattern
+touches its edge. So within it the optimum is exact under the given prefilter D/A; the
+remaining frictions are searched on grids (:mod:`.search`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.models import Criterion, Data, Model, output_scans, with_valve
+from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.patterns import (
+    Beginning,
+    Cells,
+    beginning_of,
+    cells_at,
+    levels_of,
+    resting_cells,
+)
+from stiction_ros.identification.scan import PatternEnergy
+
+BLOCK = 1_500_000
+MOST_CELLS = 3000
+GROWTHS = 14
+MARGIN = 6.0
+ZOOMS = 16
+ROUNDS = 4
+MOST_LEVELS = 60
+LEAST_GAIN = 1e-4
+
+
+@dataclasses.dataclass(frozen=True)
+class PatternScan:
+    """Evaluated cells.
+
+    Attributes:
+        bounds: rows (J low, J high, S low, S high), %, shape (G, 4).
+        dynamic: range of f_D in the cell, shape (G, 2).
+        level: best f_D in the cell, shape (G,).
+        curvature: second derivative of the loss in f_D, shape (G,).
+        loss: n log(SE / n) at the best f_D and delays, summed over outputs, shape (G,).
+        delays: best delay per output, shape (G, p).
+        moves: number of stem moves, shape (G,).
+    """
+
+    bounds: FloatArray
+    dynamic: FloatArray
+    level: FloatArray
+    curvature: FloatArray
+    loss: FloatArray
+    delays: FloatArray
+    moves: FloatArray
+
+    @staticmethod
+    def joined(parts: list[PatternScan]) -> PatternScan:
+        """Return all cells of several scans."""
+        names = [field.name for field in dataclasses.fields(PatternScan)]
+        return PatternScan(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+    def static_range(self, index: int, dynamic: tuple[float, float]) -> tuple[float, float]:
+        """Return the values of f_S in a cell for f_D in a range, %."""
+        jl, jh, sl, sh = self.bounds[index]
+        low = float(np.clip(0.5 * (sl - jl), *dynamic))
+        high = float(np.clip(0.5 * (sh - jh), *dynamic)) if np.isfinite(jh) else dynamic[1]
+        return max(jl + low, sl - low, low), min(jh + high, sh - high)
+
+    def middle(self, index: int, limit: float) -> tuple[float, float]:
+        """Return f_S in the middle of a cell at its best f_D, and that f_D, %."""
+        f_d = float(self.level[index])
+        low, high = self.static_range(index, (f_d, f_d))
+        return 0.5 * (low + min(high, limit)), f_d
+
+    def accepted_dynamic(self, index: int, allowance: float) -> tuple[float, float]:
+        """Return the values of f_D in a cell whose loss exceeds its best by ``allowance``."""
+        curvature = max(float(self.curvature[index]), 1e-300)
+        reach = float(np.sqrt(2.0 * max(allowance, 0.0) / curvature))
+        low, high = self.dynamic[index]
+        level = self.level[index]
+        return float(max(low, level - reach)), float(min(high, level + reach))
+
+
+class PatternSearch:
+    """Evaluates patterns of one valve under one criterion, everything else fixed."""
+
+    def __init__(
+        self,
+        data: Data,
+        model: Model,
+        orders: Orders,
+        valve: int,
+        delay: tuple[int, int],
+        begin: Beginning | None = None,
+        criterion: Criterion = Criterion.INNOVATIONS,
+    ) -> None:
+        """Build the criterion; with ``begin`` the stem before its first slip is left free."""
+        self.u = data.u[valve]
+        free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
+        self.limit = float(data.limit[valve])
+        self.delay = delay
+        self.scans = output_scans(data, model, orders, valve, criterion, delay, free)
+
+    def evaluate(self, cells: Cells) -> PatternScan:
+        """Return the loss of every cell at its best f_D."""
+        size = max(1, BLOCK // len(self.u))
+        parts = [self._evaluate(cells.part(slice(i, i + size))) for i in range(0, len(cells.bounds), size)]
+        return PatternScan.joined(parts)
+
+    def _evaluate(self, cells: Cells) -> PatternScan:
+        dynamic = cells.dynamic
+        dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
+        level, curvature, loss, delays = self._minimised(cells.bases, cells.signs, dynamic)
+        moves = (np.diff(cells.bases, axis=1) != 0.0).sum(axis=1).astype(float)
+        return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
+
+    def best_level(self, friction: FloatArray) -> float:
+        """Return the stem before the first sample that suits (f_S, f_D) best, %."""
+        f_s, f_d = (float(value) for value in friction)
+        ranges = levels_of(self.u, f_s, MOST_LEVELS)
+        point = np.array([[f_s - f_d, f_s + f_d]])
+        cells = resting_cells(self.u, ranges.mean(axis=1), np.repeat(point, len(ranges), axis=0))
+        before = cells.signs == 0.0
+        bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
+        level, _, loss, _ = self._minimised(bases, -before.astype(float), ranges)
+        best = int(loss.argmin())
+        inside = 1e-9 * (ranges[best, 1] - ranges[best, 0])
+        return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
+
+    def realised(
+        self, scan: PatternScan, index: int, begin: Beginning
+    ) -> tuple[FloatArray, float]:
+        """Return (f_S, f_D) of a cell and the stem before the first sample minus u_0, %.
+
+        The best level under the given first slip is taken, and of the cell's f_S the middle
+        of those with which a valve at that level first slips there; if there is none, the
+        middle of all with their own best level.
+        """
+        f_d = float(scan.level[index])
+        low, high = scan.static_range(index, (f_d, f_d))
+        high = min(high, self.limit)
+        cells = cells_at(self.u, begin, points_of(np.array([[0.5 * (low + high), f_d]])))
+        before = cells.signs == 0.0
+        bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
+        around = begin.level + 0.1 * self.limit * np.array([[-1.0, 1.0]])
+        level = float(self._minimised(bases, -before.astype(float), around)[0][0])
+        least = float(np.abs(self.u[: begin.first] - level).max(initial=0.0))
+        most = float(begin.direction * (self.u[begin.first] - level))
+        if max(low, least) < min(high, most):
+            static = 0.5 * (max(low, least) + min(high, most))
+        else:
+            static = 0.5 * (low + high)
+            level = self.best_level(np.array([static, f_d]))
+        return np.array([static, f_d]), level - float(self.u[0])
+
+    def _minimised(
+        self, bases: FloatArray, signs: FloatArray, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Minimise over the level x in base − x · sign, per pattern inside its range.
+
+        Returns:
+            Best level (G,), second derivative (G,), loss (G,), delays (G, p).
+        """
+        energies = [scan.patterns(bases, signs) for scan in self.scans]
+        low, high = ranges[:, 0], ranges[:, 1]
+        rows = np.arange(len(bases))
+        for _ in range(ZOOMS):
+            levels = low[:, None] + np.linspace(0.0, 1.0, 5) * (high - low)[:, None]
+            loss, delays = self._loss_at(energies, levels)
+            best = loss.argmin(axis=1)
+            middle = np.clip(best, 1, 3)
+            left, centre, right = (loss[rows, middle + i] for i in (-1, 0, 1))
+            step = np.maximum(0.25 * (high - low), 1e-300)
+            low, high = levels[rows, middle - 1], levels[rows, middle + 1]
+            second = np.maximum(left - 2.0 * centre + right, 0.0)
+            if second.max() < 1.0:  # the parabola through three points is exact enough
+                break
+        slope = 0.5 * (left - right)
+        shift = slope / np.maximum(second, 1e-300)
+        inside = (np.abs(shift) < 1.0) & (second > 0.0)
+        level = levels[rows, best]
+        level = np.where(inside, levels[rows, middle] + shift * step, level)
+        lowest = np.where(inside, centre - 0.5 * slope * shift, loss[rows, best])
+        return level, second / step**2, lowest, delays[rows, best]
+
+    def _loss_at(
+        self, energies: list[PatternEnergy], levels: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return loss (G, F) and best delays (G, F, p) at levels (G, F)."""
+        loss, delays = np.zeros(levels.shape), []
+        for scan, energy in zip(self.scans, energies, strict=True):
+            values = energy(levels)
+            delays.append(values.argmin(axis=2) + self.delay[0])
+            loss += scan.count * np.log(values.min(axis=2) / scan.count)
+        return loss, np.stack(delays, axis=2)
+
+    def enumerate(self, begin: Beginning, rectangle: FloatArray, most: int) -> PatternScan | None:
+        """Return all cells that meet the rectangle (J low, J high, S low, S high).
+
+        Args:
+            most: largest number of cells; None comes back when there are more.
+        """
+        todo = self._admissible(rectangle[None, :])
+        found: list[PatternScan] = [self._nothing()]
+        count = 0
+        while len(todo):
+            count += len(todo)
+            if count > most:
+                return None
+            cells = cells_at(self.u, begin, _points(todo))
+            found.append(self.evaluate(cells))
+            todo = self._admissible(_remainders(todo, cells.bounds))
+        return PatternScan.joined(found)
+
+    def _nothing(self) -> PatternScan:
+        flat = np.empty(0)
+        delays = np.empty((0, len(self.scans)), dtype=int)
+        return PatternScan(np.empty((0, 4)), np.empty((0, 2)), flat, flat, flat, delays, flat)
+
+    def _admissible(self, rectangles: FloatArray) -> FloatArray:
+        """Return the rectangles that hold frictions 0 ≤ f_D ≤ f_S ≤ limit."""
+        smallest = 1e-12 * self.limit
+        jl, jh, sl, sh = rectangles.T
+        fits = (jh - jl > smallest) & (sh - sl > smallest) & (sh > jl)
+        fits &= jl + sl < 2.0 * self.limit
+        return rectangles[fits]
+
+
+def points_of(friction: FloatArray) -> FloatArray:
+    """Return rows (J, S) of rows (f_S, f_D)."""
+    static, dynamic = friction[:, 0], friction[:, 1]
+    return np.column_stack([static - dynamic, static + dynamic])
+
+
+def _points(rectangles: FloatArray) -> FloatArray:
+    """Return one point (J, S) with S ≥ J inside every rectangle, the middle where possible."""
+    jl, jh, sl, sh = rectangles.T
+    jump, reverse = 0.5 * (jl + jh), 0.5 * (sl + sh)
+    outside = reverse < jump
+    jump = np.where(outside, jl + 0.1 * (np.minimum(jh, sh) - jl), jump)
+    reverse = np.where(outside, sh - 0.1 * (sh - np.maximum(sl, jl)), reverse)
+    return np.column_stack([jump, reverse])
+
+
+def _remainders(rectangles: FloatArray, cells: FloatArray) -> FloatArray:
+    """Return up to four rectangles per row: what its cell does not cover."""
+    jl, jh, sl, sh = rectangles.T
+    cl, ch = np.maximum(cells[:, 0], jl), np.minimum(cells[:, 1], jh)
+    dl, dh = np.maximum(cells[:, 2], sl), np.minimum(cells[:, 3], sh)
+    return np.concatenate(
+        [
+            np.column_stack([jl, cl, sl, sh]),
+            np.column_stack([ch, jh, sl, sh]),
+            np.column_stack([cl, ch, sl, dl]),
+            np.column_stack([cl, ch, dh, sh]),
+        ]
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class PatternMap:
+    """The enumerated neighbourhood of a model.
+
+    Attributes:
+        scan: all cells met.
+        rectangle: (J low, J high, S low, S high) that was enumerated, %.
+        closed: whether every pattern at its edge is rejected.
+    """
+
+    scan: PatternScan
+    rectangle: FloatArray
+    closed: bool
+
+
+def neighbourhood(
+    search: PatternSearch, begin: Beginning, friction: FloatArray, threshold: float, most: int
+) -> PatternMap | None:
+    """Enumerate round (f_S, f_D), outwards until all patterns at the edge are rejected.
+
+    Args:
+        threshold: excess of the loss over the best from which a pattern is rejected.
+        most: largest number of cells.
+    """
+    centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
+    scan = search.evaluate(cells_at(search.u, begin, centre[None, :]))
+    reach = 0.002 * search.limit
+    rectangle = np.array(
+        [centre[0] - reach, centre[0] + reach, centre[1] - reach, centre[1] + reach]
+    )
+    rectangle[[0, 2]] = np.maximum(rectangle[[0, 2]], 0.0)
+    first = search.enumerate(begin, rectangle, most)
+    if first is None:
+        return PatternMap(scan, np.repeat(centre, 2), closed=False)
+    scan = PatternScan.joined([scan, first])
+    for _ in range(GROWTHS):
+        wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
+        if (wider == rectangle).all():
+            return PatternMap(scan, rectangle, closed=True)
+        for strip in _remainders(wider[None, :], rectangle[None, :]):
+            more = search.enumerate(begin, strip, most - len(scan.loss))
+            if more is None:
+                return PatternMap(scan, rectangle, closed=False)
+            scan = PatternScan.joined([scan, more])
+        rectangle = wider
+    return PatternMap(scan, rectangle, closed=False)
+
+
+def _grown(
+    scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float
+) -> FloatArray:
+    """Return the rectangle with every edge moved out that an accepted cell touches."""
+    accepted = scan.bounds[scan.loss <= scan.loss.min() + threshold]
+    jl, jh, sl, sh = rectangle
+    meets = (accepted[:, 0] < jh) & (accepted[:, 1] > jl) & (accepted[:, 2] < sh) & (accepted[:, 3] > sl)
+    accepted = accepted[meets]
+    wide, high = max(0.3 * (jh - jl), 1e-4 * limit), max(0.3 * (sh - sl), 1e-4 * limit)
+    out = rectangle.copy()
+    if len(accepted):
+        lowest, highest = accepted.min(axis=0), accepted.max(axis=0)
+        if lowest[0] <= jl:
+            out[0] = max(0.0, lowest[0] - wide)
+        if highest[1] >= jh:
+            out[1] = min(limit, highest[1] + wide)
+        if lowest[2] <= sl:
+            out[2] = max(0.0, lowest[2] - high)
+        if highest[3] >= sh:
+            out[3] = min(2.0 * limit, highest[3] + high)
+    return np.array([min(out[0], jl), max(out[1], jh), min(out[2], sl), max(out[3], sh)])
+
+
+def refine(
+    data: Data, model: Model, orders: Orders, valve: int, threshold: float, rounds: int = ROUNDS
+) -> tuple[Model, PatternMap | None]:
+    """Return the model with the best pattern of its neighbourhood, and that neighbourhood.
+
+    Repeated with the prefilter of the better model until nothing changes. The map is None
+    for a valve without friction or one that never slips.
+    """
+    reachable = None
+    for _ in range(rounds):
+        if model.friction[valve, 0] <= 0.0:
+            return model, None
+        delay = nearby_delays(data, model, valve)
+        plain = PatternSearch(data, model, orders, valve, delay)
+        level = plain.best_level(model.friction[valve])
+        begin = beginning_of(plain.u, level, float(model.friction[valve, 0]))
+        if begin.first == len(plain.u):
+            return model, None
+        search = PatternSearch(data, model, orders, valve, delay, begin)
+        reachable = neighbourhood(search, begin, model.friction[valve], threshold, MOST_CELLS)
+        loss = np.where(reachable.scan.moves >= data.min_moves, reachable.scan.loss, np.inf)
+        best = int(loss.argmin())
+        if not np.isfinite(loss[best]):
+            break
+        friction, start = plain.realised(reachable.scan, best, begin)
+        rival = with_valve(data, model, orders, valve, friction, start, reachable.scan.delays[best])
+        if rival.loss > model.loss - LEAST_GAIN:
+            break
+        model = rival
+    return model, reachable
+
+
+def best_in_cells(
+    search: PatternSearch, friction: FloatArray, start: float
+) -> tuple[FloatArray, PatternScan]:
+    """Return rows (f_S, f_D) moved to the best of their cells, and the cells.
+
+    Where a valve slips seldom a cell is wide and f_D at a grid point far from the best.
+
+    Args:
+        friction: rows (f_S, f_D), shape (G, 2).
+        start: stem before the first sample minus u_0, %.
+    """
+    levels = np.full(len(friction), float(search.u[0]) + start)
+    scan = search.evaluate(resting_cells(search.u, levels, points_of(friction)))
+    rows = [scan.middle(index, search.limit) for index in range(len(friction))]
+    return np.array(rows), scan
+
+
+def nearby_delays(data: Data, model: Model, valve: int) -> tuple[int, int]:
+    """Return the delays of a valve in a model, one sample more to either side."""
+    now = [row[valve] for row in model.delays]
+    return max(data.delay[0], min(now) - 1), min(data.delay[1], max(now) + 1)
