@@ -292,7 +292,7 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: 
     point = problem.evaluate(point.a, point.noise, weight)
     for _ in range(max_iterations):
         gram, gradient = _normal_equations(problem, point)
-        scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-300
+        scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-150
         gram /= np.outer(scale, scale)
         gradient /= scale
         improved = False
