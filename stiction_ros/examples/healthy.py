@@ -56,7 +56,7 @@ class _Disturbed:
         return self._controller(dataclasses.replace(measurement, pv=pv), sp)
 
 
-def healthy_loop(family: str, seed: int) -> Example:
+def healthy_loop(seed: int, family: str = "tight") -> Example:
     """Return a loop with an ideal valve that oscillates.
 
     A second-order process with dead time under PI control; process, delay, tuning, sample
@@ -65,10 +65,10 @@ def healthy_loop(family: str, seed: int) -> Example:
     defaults of the identification.
 
     Args:
+        seed: of everything.
         family: ``tight`` is tuned close to the limit of stability, with a white load that
             excites it; ``sine`` has a sine and ``coloured`` first-order autoregressive noise
             as a load or added to PV.
-        seed: of everything.
 
     Raises:
         InputError: unknown ``family``.
