@@ -60,31 +60,25 @@ def print_study(
 ) -> None:
     """Print one line per seed and what the seeds say together."""
     table = Table(title=title, title_justify="left")
-    for name in ("seed", "valve", "f_S %", "interval", "f_D %", "interval", "delay"):
+    for name in ("seed", "valve", "f_S %", "f_D %", "delay"):
         table.add_column(name)
-    for name in ("stem error %²", "SE", "SE, true stems", "s"):
+    for name in ("stem error %²", "SE", "s"):
         table.add_column(name, justify="right")
     for seed, comparison, found in rows:
         columns = [
-            (
-                f"{valve.name} {valve.verdict}",
-                f"{valve.static_friction.found:.3f}",
-                interval(valve.static_friction, 3),
-                f"{valve.dynamic_friction.found:.3f}",
-                interval(valve.dynamic_friction, 3),
-            )
-            for valve in comparison.valves
+            (f"{v.name} {v.verdict}", marked(v.static_friction), marked(v.dynamic_friction))
+            for v in comparison.valves
         ]
         table.add_row(
             str(seed),
             *("\n".join(column) for column in zip(*columns, strict=True)),
             " ".join(str(channel.delay.found) for channel in comparison.channels),
-            f"{comparison.stem_error:.4g}",
+            f"{comparison.stem_error:.3g}",
             f"{comparison.square_error:.5g}",
-            f"{comparison.true_stem_square_error:.5g}",
             f"{found.seconds:.1f}",
         )
     console.print(table)
+    console.print("* the truth lies outside the 95 % interval")
     for finding in findings:
         console.print(str(finding))
 
@@ -119,6 +113,11 @@ def equation(a: Sequence[float], b: Mapping[str, Sequence[float]]) -> str:
     """Return coefficients a of (8a) and b of (8b) with four digits."""
     parts = [f"a {numbers(a)}"]
     return "; ".join(parts + [f"b of {valve} {numbers(values)}" for valve, values in b.items()])
+
+
+def marked(against: Against) -> str:
+    """Return what was found, with * where the truth lies outside its interval."""
+    return f"{against.found:.3f}{' *' if against.inside is False else ''}"
 
 
 def numbers(values: Sequence[float]) -> str:

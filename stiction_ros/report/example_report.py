@@ -183,7 +183,7 @@ def _draw_estimates(
     model = output.to_json()
     run = free_run(model, stems, fitted_start(model, stems, measured))[part]
     one_step = one_step_estimate(record, found.stem, output)[part]
-    axis.plot(at, measured[part], color=SKY, linewidth=2.2, alpha=0.8, label="PV, measured")
+    axis.plot(at, measured[part], color=SKY, linewidth=3.0, alpha=0.6, label="PV, measured")
     if record.sp is not None:
         axis.plot(at, record.sp[part, i], color=INK, drawstyle="steps-post", label="SP")
     axis.plot(at, one_step, color=BLUE, linewidth=0.8, label="one-step estimate")
