@@ -37,6 +37,16 @@ class _Process:
     time_constants: tuple[float, float]
     delay: int
 
+    @classmethod
+    def drawn(cls, random: np.random.Generator) -> _Process:
+        """Draw a gain of 0.2 to 5 of either sign, 4 to 40 samples, a delay of 1 to 8."""
+        slow = float(random.uniform(4.0, 40.0))
+        size = math.exp(random.uniform(math.log(0.2), math.log(5.0)))
+        gain = float(random.choice((-1.0, 1.0))) * size
+        return cls(
+            gain, (slow, slow * float(random.uniform(0.05, 0.9))), int(random.integers(1, 9))
+        )
+
     def coefficients(self) -> tuple[FloatArray, FloatArray]:
         """Return a₁ a₂ and b₁ b₂ of (8a) and (8b), zero-order hold."""
         slow, fast = self.time_constants
@@ -61,8 +71,8 @@ def healthy_loop(seed: int, family: str = "tight") -> Example:
 
     A second-order process with dead time under PI control; process, delay, tuning, sample
     time, set-point moves (or none), noise and 1000 to 2500 samples are drawn by ``seed``. The
-    whole record is scaled such that OP spans 10 to 60 %. Orders and delay are left to the
-    defaults of the identification.
+    whole record is scaled such that OP has a standard deviation of 2 to 10 %. Orders and
+    delay are left to the defaults of the identification.
 
     Args:
         seed: of everything.
@@ -78,16 +88,10 @@ def healthy_loop(seed: int, family: str = "tight") -> Example:
             f"unknown value {family!r}", where="family", fix=f"use {' or '.join(FAMILIES)}"
         )
     random = np.random.default_rng([seed, FAMILIES.index(family)])
-    slow = float(random.uniform(4.0, 40.0))
-    sign = float(random.choice((-1.0, 1.0)))
-    process = _Process(
-        sign * math.exp(random.uniform(math.log(0.2), math.log(5.0))),
-        (slow, slow * float(random.uniform(0.05, 0.9))),
-        int(random.integers(1, 9)),
-    )
+    process = _Process.drawn(random)
     samples = int(random.integers(1000, 2501))
     sample_time = float(random.choice((1.0, 2.0, 5.0, 10.0, 30.0)))
-    integral_time = slow * float(random.uniform(0.6, 1.6))
+    integral_time = process.time_constants[0] * float(random.uniform(0.6, 1.6))
     if family == "tight":
         decay = float(random.uniform(60.0, 400.0))
         gain = _gain_of(process, integral_time, math.exp(-1.0 / decay))
@@ -99,7 +103,7 @@ def healthy_loop(seed: int, family: str = "tight") -> Example:
     loop = _loop(process, PiTuning(gain, integral_time * sample_time), sample_time, noise)
     schedule = _set_points(random, samples, sample_time, abs(process.gain))
     record = _run(loop, schedule, disturbance, samples, int(random.integers(2**31)))
-    record = _scaled(record, float(random.uniform(10.0, 60.0)))
+    record = _scaled(record, float(random.uniform(2.0, 10.0)))
     return Example("healthy", family, seed, record, loop, IdentificationOptions())
 
 
@@ -125,11 +129,11 @@ def _disturbance(
 def _set_points(
     random: np.random.Generator, samples: int, sample_time: float, unit: float
 ) -> SetPoints:
-    """Return a schedule with no move, or with three to eight of 0.5 to 3 % of travel in size."""
+    """Return a schedule with no move, or with three to eight of 0.3 to 2 % of travel in size."""
     count = 0 if random.random() < 0.3 else int(random.integers(3, 9))
     chosen = random.choice(np.arange(50, samples - 50), count, replace=False)
     times = np.concatenate([[0.0], np.sort(chosen) * sample_time])
-    sizes = random.uniform(0.5, 3.0, count) * random.choice((-1.0, 1.0), count) * unit
+    sizes = random.uniform(0.3, 2.0, count) * random.choice((-1.0, 1.0), count) * unit
     values = MIDDLE + np.concatenate([[0.0], sizes])
     return SetPoints(("PV1",), times, values[:, None])
 
@@ -168,13 +172,13 @@ def _run(
     return dataclasses.replace(run.record, pv=run.record.pv + disturbance[:, None])
 
 
-def _scaled(record: Record, span: float) -> Record:
-    """Return the record with all deviations scaled such that OP spans ``span`` %.
+def _scaled(record: Record, spread: float) -> Record:
+    """Return the record with all deviations scaled for a standard deviation of OP, %.
 
     The loop is linear and nothing limits OP, so this is the same loop with larger or smaller
     noise, disturbance and set-point moves.
     """
-    factor = span / float(np.ptp(record.op))
+    factor = spread / float(record.op.std())
 
     def scaled(values: FloatArray | None) -> FloatArray | None:
         return None if values is None else MIDDLE + factor * (values - MIDDLE)
