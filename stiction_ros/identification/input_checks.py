@@ -9,9 +9,9 @@ closer to SP than the column called PV and has no lasting offset from it, they a
 
 With integral action :math:`\sum a_i = 0` and :math:`\sum b_i \neq 0`. A process has noise, so
 this is the only exact relation in a record, and the side on which the coefficients add up to
-zero belongs to OP. A record without any noise, of an integrating process whose PV answers OP
-within the sample, looks the same the other way round: there the set-point alone decides.
-Where OP carries noise or is rounded or compressed, there is no exact relation and no evidence.
+zero belongs to OP. Where OP carries noise or is rounded or compressed, there is no exact
+relation and no evidence; nor where a column follows exactly from the past, as then there is no
+noise and the process may obey an exact relation of its own.
 """
 
 from __future__ import annotations
@@ -60,6 +60,13 @@ class Evidence:
     rule: SwapRule
     reason: str
     ratio: float
+
+
+class _Past(enum.Enum):
+    """What a column is computed from; the value is the least lag of the other columns."""
+
+    AND_PRESENT = 0
+    ALONE = 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,9 +146,21 @@ def _controller_ratio(record: Record) -> float | None:
     of_pv = [_exact_relation(column, op) for column in pv.T]
     ratios = [_over(found.others, found.own) for found in of_op if found is not None]
     ratios += [_over(found.own, found.others) for found in of_pv if found is not None]
+    if ratios and _follows_from_the_past(op, pv):
+        return None
     if ratios and max(ratios) <= 1.0 / SIDES:
         return max(ratios)
     return min(ratios) if ratios and min(ratios) >= SIDES else None
+
+
+def _follows_from_the_past(op: FloatArray, pv: FloatArray) -> bool:
+    """Tell whether a column is an exact function of earlier samples alone."""
+    directions = [(column, pv) for column in op.T] + [(column, op) for column in pv.T]
+    return any(
+        _fit(own, others, order, _Past.ALONE) is not None
+        for own, others in directions
+        for order in range(1, MAX_ORDER + 1)
+    )
 
 
 def _over(numerator: float, denominator: float) -> float:
@@ -178,15 +197,20 @@ def _share(coefficients: FloatArray) -> float:
     return float(abs(coefficients.sum()) / max(float(np.abs(coefficients).sum()), 1e-300))
 
 
-def _fit(own: FloatArray, others: FloatArray, order: int) -> FloatArray | None:
+def _fit(
+    own: FloatArray, others: FloatArray, order: int, past: _Past = _Past.AND_PRESENT
+) -> FloatArray | None:
     """Return the coefficients of an exact relation of ``order``, or None.
 
-    They are a₁ … a_n with the sign turned, then b₀ … b_n of each other column.
+    They are a₁ … a_n with the sign turned, then b₀ … b_n of each other column. With the past
+    alone b₀ is left out, and the relation need not be unique.
     """
     count = len(own) - order
     columns = [own[order - i : order - i + count] for i in range(1, order + 1)]
     columns += [
-        other[order - i : order - i + count] for other in others.T for i in range(order + 1)
+        other[order - i : order - i + count]
+        for other in others.T
+        for i in range(past.value, order + 1)
     ]
     width = max(3 * len(columns), 30)
     if count < 2 * width:
@@ -197,7 +221,7 @@ def _fit(own: FloatArray, others: FloatArray, order: int) -> FloatArray | None:
     for first in np.unique(np.linspace(0, count - width, WINDOWS).astype(int)):
         rows = slice(first, first + width)
         theta, _, _, singular = np.linalg.lstsq(regressors[rows], target[rows], rcond=None)
-        if singular[-1] <= SINGULAR * singular[0]:
+        if past is _Past.AND_PRESENT and singular[-1] <= SINGULAR * singular[0]:
             continue
         if np.abs(regressors[rows] @ theta - target[rows]).max() > EXACT:
             continue

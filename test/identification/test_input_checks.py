@@ -137,6 +137,22 @@ def test_a_pv_far_from_its_set_point_is_no_swap() -> None:
     assert swapped_columns(lost) is None
 
 
+@pytest.mark.parametrize("pole", [0.9, 1.0])
+@pytest.mark.parametrize("ahead", [0, 1])
+def test_a_record_without_noise_says_nothing(pole: float, ahead: int) -> None:
+    samples, integral = 600, 20.0
+    op, pv = np.full(samples, 50.0), np.full(samples, 30.0)
+    sp = 30.0 + 3.0 * (np.arange(samples) * 4 // samples % 2)
+    for k in range(1, samples):
+        pv[k] = 30.0 + pole * (pv[k - 1] - 30.0) + 0.1 * (op[k - 1] - 50.0)
+        error, before = sp[k] - pv[k], sp[k - 1] - pv[k - 1]
+        op[k] = op[k - 1] + 0.5 * (error - before + error / integral)
+    # One sample ahead, PV answers OP at once.
+    op, pv = op[: samples - ahead, None], pv[ahead:, None]
+    record = Record("quiet", 1.0, ("V1",), ("PV1",), op, pv)
+    assert swapped_columns(record) is None
+
+
 def test_constant_or_few_samples_say_nothing() -> None:
     record = without_sp(pi_loop(1))
     assert swapped_columns(record.part(0, 12)) is None
