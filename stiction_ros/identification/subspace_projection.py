@@ -112,7 +112,7 @@ def _oblique(
     mapping = l32 @ np.linalg.pinv(l22, rcond=RANK)
     weight = np.eye(len(future))
     if method is SubspaceMethod.CVA:
-        weight = _inverse_root(l32 @ l32.T + l33 @ l33.T)
+        weight = _inverse_root(np.hstack([l32, l33]))
     body = mapping @ np.hstack([l21, l22]) if method is SubspaceMethod.N4SID else weight @ l32
     left, values, _ = np.linalg.svd(body, full_matrices=False)
     return mapping, left.T @ weight, values
@@ -134,8 +134,8 @@ def _predictor(u: FloatArray, y: FloatArray, s: int) -> tuple[FloatArray, FloatA
     return mapping, left.T, values
 
 
-def _inverse_root(matrix: FloatArray) -> FloatArray:
-    """Return the symmetric inverse square root on the range of a positive matrix."""
-    values, vectors = np.linalg.eigh(matrix)
-    keep = values > RANK**2 * values[-1]
-    return np.asarray((vectors[:, keep] / np.sqrt(values[keep])) @ vectors[:, keep].T)
+def _inverse_root(factor: FloatArray) -> FloatArray:
+    """Return the symmetric inverse square root of F Fᵀ on its range."""
+    left, values, _ = np.linalg.svd(factor, full_matrices=False)
+    keep = values > RANK * values[0]
+    return np.asarray((left[:, keep] / values[keep]) @ left[:, keep].T)
