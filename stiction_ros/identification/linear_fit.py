@@ -36,6 +36,9 @@ from stiction_ros.identification.subspace_projection import SubspaceMethod
 from stiction_ros.records.record import Record
 
 DEFAULT_ORDERS = (1, 2, 3)
+CLOSED_LOOP = (
+    "the record has set-points, so a controller was at work; the method predictor allows for it",
+)
 Progress = Callable[[float], None]
 
 
@@ -122,6 +125,8 @@ def fit_linear(
         for j, valve in enumerate(found.valves)
         if found.delay[i, j] == high > low
     )
+    if options.kind is LinearKind.STATE_SPACE and options.method is not SubspaceMethod.PREDICTOR:
+        notes += CLOSED_LOOP if record.sp is not None else ()
     seconds = time.perf_counter() - begun
     return dataclasses.replace(found, seconds=seconds, notes=(*record.notes, *notes))
 
