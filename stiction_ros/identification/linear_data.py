@@ -126,7 +126,8 @@ def prepare_linear(record: Record, stem: FloatArray | None = None) -> LinearData
 
 def nrmse_fit(y: FloatArray, predicted: FloatArray) -> float:
     """Return the fit 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %; −inf where ŷ is not finite."""
-    error = float(np.linalg.norm(y - predicted))
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.linalg.norm(y - predicted))
     if not np.isfinite(error):
         return float("-inf")
     return 100.0 * (1.0 - error / max(float(np.linalg.norm(y - y.mean())), 1e-300))

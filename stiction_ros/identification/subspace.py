@@ -30,6 +30,7 @@ from stiction_ros.identification.state_space_fit import (
     Refinement,
     predict,
     realise,
+    realise_by_shift,
     refine,
     with_best_gain,
     with_initial_state,
@@ -42,6 +43,8 @@ from stiction_ros.identification.subspace_projection import (
 from stiction_ros.processes import LinearModel
 
 DEFAULT_HORIZON = 15
+UNSTABLE_MARGIN = 20.0
+"""Lead of an unstable order in the criterion that casts doubt on the stable one taken."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,7 +113,8 @@ class StateSpaceFit:
     """A state-space model in engineering units; arrays read-only.
 
     Attributes:
-        status: ``OK``; ``UNSTABLE`` where |λ| ≥ 1; ``NO_MODEL`` where the states vanish.
+        status: ``OK``; ``CONSTRAINED`` where an unstable order does clearly better one step
+            ahead; ``UNSTABLE`` where |λ| ≥ 1; ``NO_MODEL`` where the states vanish.
         reason: one sentence; empty when ok.
         a, b, c, k: A (n, n), B (n, m) per %, C (p, n) and K (n, p), in engineering units.
         x0: state at the first sample after the delays, shape (n,).
@@ -194,8 +198,9 @@ def fit_state_space(data: LinearData, options: SubspaceOptions | None = None) ->
     if len(delay) != m:
         raise InputError(f"{len(delay)} delays for {m} valves", where="delay", fix=f"give {m}")
     u, y = _aligned(data, delay)
-    most = options.order if options.order is not None else options.max_order
-    horizon = _horizon(data, u.shape[1], options, most)
+    horizon = _horizon(data, u.shape[1], options)
+    # The shifted observability matrix must still show every state.
+    most = options.order or min(options.max_order, (horizon - 1) * len(y))
     sequence = state_sequence(u, y, horizon, most, options.method)
     if len(sequence.states) < (options.order or 1):
         return _no_model(data, delay, sequence, options)
@@ -207,7 +212,27 @@ def fit_state_space(data: LinearData, options: SubspaceOptions | None = None) ->
     fits = [_one_order(sequence, n, u, y, refinement) for n in orders]
     stable = [fit for fit in fits if fit[0].radius < 1.0]
     best = min(stable or fits, key=lambda fit: fit[1].value(options.criterion))
-    return _finish(data, delay, sequence, best[0], tuple(row for _, row in fits), options.method)
+    status = _judge(best[1], [row for _, row in fits], options.criterion)
+    found = _finish(data, delay, sequence, best[0], status, options.method)
+    return dataclasses.replace(found, rivals=tuple(row for _, row in fits))
+
+
+def _judge(
+    taken: OrderRival, rivals: list[OrderRival], criterion: OrderCriterion
+) -> tuple[LinearStatus, str]:
+    """Return status and reason of the order taken."""
+    if taken.radius >= 1.0:
+        reason = f"largest pole |λ| = {taken.radius:.4f}; try another order"
+        return LinearStatus.UNSTABLE, reason
+    limit = taken.value(criterion) - UNSTABLE_MARGIN
+    better = [str(row.order) for row in rivals if row.value(criterion) < limit]
+    if better:
+        reason = (
+            f"order {', '.join(better)} fits one step ahead better but is unstable; the record "
+            "may not tell the process from the controller"
+        )
+        return LinearStatus.CONSTRAINED, reason
+    return LinearStatus.OK, ""
 
 
 def _aligned(data: LinearData, delay: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
@@ -217,24 +242,23 @@ def _aligned(data: LinearData, delay: tuple[int, ...]) -> tuple[FloatArray, Floa
     return u, data.y[:, longest:]
 
 
-def _horizon(data: LinearData, samples: int, options: SubspaceOptions, order: int) -> int:
+def _horizon(data: LinearData, samples: int, options: SubspaceOptions) -> int:
     """Return block rows that the order needs and the record allows."""
-    width = len(data.u) + len(data.y)
-    least = -(-order // len(data.y)) + 1
+    width, p = len(data.u) + len(data.y), len(data.y)
+    least = -(-(options.order or 1) // p) + 1
     allowed = samples // (4 * width + 2)
-    if options.horizon is not None:
-        wanted = options.horizon
-    else:
-        wanted = max(min(DEFAULT_HORIZON, allowed), least)
+    wanted = options.horizon or max(min(DEFAULT_HORIZON, allowed), least)
     if wanted < least:
         raise InputError(
-            f"{wanted} is too short for order {order}", where="horizon", fix=f"use {least} or more"
+            f"{wanted} is too short for order {options.order}",
+            where="horizon",
+            fix=f"use {least} or more",
         )
     if samples < 2 * wanted * (width + 1) + 10:
         raise InputError(
-            f"{samples} samples are too few for order {order} and horizon {wanted}",
+            f"{samples} samples are too few for a horizon of {wanted}",
             where=data.name,
-            fix="take a longer record or a lower order",
+            fix="take a longer record, a lower order or a shorter horizon",
         )
     return wanted
 
@@ -242,19 +266,29 @@ def _horizon(data: LinearData, samples: int, options: SubspaceOptions, order: in
 def _one_order(
     sequence: StateSequence, order: int, u: FloatArray, y: FloatArray, error: Refinement
 ) -> tuple[Realisation, OrderRival]:
-    model = with_best_gain(realise(sequence, order, u, y), sequence, u, y)
-    model = refine(model, u, y, error)
+    """Return the realisation by regression; that by shift where only this one is stable."""
+    first = _scored(realise(sequence, order, u, y), sequence, u, y, error)
+    if first[0].radius < 1.0:
+        return first
+    second = _scored(realise_by_shift(sequence, order, u, y), sequence, u, y, error)
+    return second if second[0].radius < 1.0 else first
+
+
+def _scored(
+    model: Realisation, sequence: StateSequence, u: FloatArray, y: FloatArray, error: Refinement
+) -> tuple[Realisation, OrderRival]:
+    model = refine(with_best_gain(model, sequence, u, y), u, y, error)
     if model.radius >= 1.0 and error is Refinement.FREE_RUN:
         model = refine(model, u, y, Refinement.ONE_STEP)
-    model = with_best_gain(model, sequence, u, y)
-    model = with_initial_state(model, u, y)
-    p, first = len(y), sequence.horizon
+    model = with_initial_state(with_best_gain(model, sequence, u, y), u, y)
+    p, first, order = len(y), sequence.horizon, len(model.a)
     one_step, free = (predict(model, u, y, flag) for flag in (True, False))
-    error_now = (y - one_step)[:, first:]
-    count = error_now.shape[1]
-    spread = np.linalg.slogdet(error_now @ error_now.T / count + TINY * np.eye(p))[1]
-    parameters = order * (len(u) + 2 * p) + p
-    aic, bic = information(float(np.exp(spread)), count, parameters)
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = (y - one_step)[:, first:]
+        covariance = left @ left.T / left.shape[1] + TINY * np.eye(p)
+    usable = bool(np.isfinite(covariance).all())
+    spread = float(np.exp(np.linalg.slogdet(covariance)[1])) if usable else np.inf
+    aic, bic = information(spread, left.shape[1], order * (len(u) + 2 * p) + p)
     fits = [
         float(np.mean([nrmse_fit(y[i, first:], run[i, first:]) for i in range(p)]))
         for run in (one_step, free)
@@ -267,10 +301,10 @@ def _finish(
     delay: tuple[int, ...],
     sequence: StateSequence,
     model: Realisation,
-    rivals: tuple[OrderRival, ...],
+    status: tuple[LinearStatus, str],
     method: SubspaceMethod,
 ) -> StateSpaceFit:
-    """Return the model in engineering units."""
+    """Return the model in engineering units, without its rivals."""
     u, y = _aligned(data, delay)
     one_step, free = (predict(model, u, y, flag) for flag in (True, False))
     first = sequence.horizon
@@ -278,10 +312,9 @@ def _finish(
         np.array([nrmse_fit(y[i, first:], run[i, first:]) for i in range(len(y))])
         for run in (one_step, free)
     ]
-    stable = model.radius < 1.0
     return StateSpaceFit(
-        status=LinearStatus.OK if stable else LinearStatus.UNSTABLE,
-        reason="" if stable else f"largest pole |λ| = {model.radius:.4f}; try another order",
+        status=status[0],
+        reason=status[1],
         a=_fixed(model.a),
         b=_fixed(model.b / data.u_scale),
         c=_fixed(model.c * data.y_scale[:, None]),
@@ -295,7 +328,7 @@ def _finish(
         noise_std=_fixed((y - one_step)[:, first:].std(axis=1) * data.y_scale),
         fit_one_step=_fixed(scores[0]),
         fit_free_run=_fixed(scores[1]),
-        rivals=rivals,
+        rivals=(),
         method=method,
     )
 

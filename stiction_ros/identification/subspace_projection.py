@@ -44,11 +44,16 @@ class StateSequence:
 
     Attributes:
         states: shape (n_max, N − s + 1); column 0 belongs to sample s.
+        observability: C, C Ã, … C Ã^(s−1) stacked, shape (s p, n_max), with Ã = A, or
+            A − K C where ``predicting``.
+        predicting: whether the projection is that of ``PREDICTOR``.
         singular_values: all of the weighted projection, falling.
         horizon: s.
     """
 
     states: FloatArray
+    observability: FloatArray
+    predicting: bool
     singular_values: FloatArray
     horizon: int
 
@@ -77,15 +82,19 @@ def state_sequence(
         max_order: most states returned.
         method: see :class:`SubspaceMethod`.
     """
-    if method is SubspaceMethod.PREDICTOR:
+    predicting = method is SubspaceMethod.PREDICTOR
+    if predicting:
         mapping, left, values = _predictor(u, y, horizon)
+        weight = np.eye(len(mapping))
     else:
-        mapping, left, values = _oblique(u, y, horizon, method)
+        mapping, left, values, weight = _oblique(u, y, horizon, method)
     rank = int(np.count_nonzero(values > RANK * values[0]))
     n = min(max_order, rank)
-    to_state = (left[:n] @ mapping) / np.sqrt(values[:n])[:, None]
+    root = np.sqrt(values[:n])
+    to_state = (left[:, :n].T @ weight @ mapping) / root[:, None]
     past = hankel_rows(np.vstack([u, y]), 0, horizon, u.shape[1] - horizon + 1)
-    return StateSequence(to_state @ past, values, horizon)
+    observability = np.linalg.pinv(weight, rcond=RANK) @ left[:, :n] * root
+    return StateSequence(to_state @ past, observability, predicting, values, horizon)
 
 
 def _lower(blocks: list[FloatArray]) -> FloatArray:
@@ -96,8 +105,8 @@ def _lower(blocks: list[FloatArray]) -> FloatArray:
 
 def _oblique(
     u: FloatArray, y: FloatArray, s: int, method: SubspaceMethod
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (G, Uᵀ W₁, singular values) with the projection G W_p.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return (G, U, singular values, W₁) with the projection G W_p.
 
     A row of ones stands beside the future inputs, so that a constant disturbs nothing.
     """
@@ -115,11 +124,11 @@ def _oblique(
         weight = _inverse_root(np.hstack([l32, l33]))
     body = mapping @ np.hstack([l21, l22]) if method is SubspaceMethod.N4SID else weight @ l32
     left, values, _ = np.linalg.svd(body, full_matrices=False)
-    return mapping, left.T @ weight, values
+    return mapping, left, values, weight
 
 
 def _predictor(u: FloatArray, y: FloatArray, s: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (Γ L, Uᵀ, singular values) from the ARX predictor of order s."""
+    """Return (Γ L, U, singular values) from the ARX predictor of order s."""
     p, q = len(y), len(u) + len(y)
     columns = u.shape[1] - s
     past = hankel_rows(np.vstack([u, y]), 0, s, columns)
@@ -131,7 +140,7 @@ def _predictor(u: FloatArray, y: FloatArray, s: int) -> tuple[FloatArray, FloatA
     for j in range(s):
         mapping[j * p : (j + 1) * p, j * q :] = markov[:, : (s - j) * q]
     left, values, _ = np.linalg.svd(mapping @ l22, full_matrices=False)
-    return mapping, left.T, values
+    return mapping, left, values
 
 
 def _inverse_root(factor: FloatArray) -> FloatArray:

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear_data import LinearStatus, OrderCriterion, prepare_linear
+from stiction_ros.identification.state_space_fit import realise_by_shift
 from stiction_ros.identification.subspace import StateSpaceFit, SubspaceOptions, fit_state_space
-from stiction_ros.identification.subspace_projection import SubspaceMethod
+from stiction_ros.identification.subspace_projection import SubspaceMethod, state_sequence
 from stiction_ros.records.record import Record
 
 OBLIQUE = [SubspaceMethod.N4SID, SubspaceMethod.MOESP, SubspaceMethod.CVA]
@@ -156,6 +157,38 @@ def test_growing_record_is_reported_unstable() -> None:
     assert fit.status is LinearStatus.UNSTABLE
     assert abs(fit.poles[0]) == pytest.approx(1.03, abs=1e-3)
     assert fit.reason
+
+
+def test_stable_order_that_loses_to_an_unstable_one_is_doubtful() -> None:
+    # OP is a function of PV but for rounding: the record tells no process from the controller.
+    random = np.random.default_rng(1)
+    op, pv, state, upset = np.zeros(1200), np.zeros(1200), 0.0, 0.0
+    for k in range(1200):
+        upset = 0.97 * upset + 0.1 * random.standard_normal()
+        pv[k] = state + upset
+        before = (op[k - 1], pv[k - 1]) if k else (0.0, 0.0)
+        op[k] = before[0] - 1.5 * (pv[k] - before[1] + pv[k] / 20.0)
+        state = 0.8 * state + 0.2 * op[k]
+    noise = 1e-4 * random.standard_normal((2, 1200, 1))
+    record = Record("PI", 1.0, ("V1",), ("PV1",), op[:, None] + noise[0], pv[:, None] + noise[1])
+    fit = fitted(record, method=SubspaceMethod.PREDICTOR)
+    unstable = [row.bic for row in fit.rivals if row.radius >= 1.0]
+    assert fit.status is LinearStatus.CONSTRAINED
+    assert "unstable" in fit.reason
+    assert np.abs(fit.poles).max() < 1.0
+    assert min(unstable) < min(row.bic for row in fit.rivals if row.radius < 1.0) - 20.0
+
+
+@pytest.mark.parametrize("method", list(SubspaceMethod))
+def test_shifted_observability_shows_the_poles(method: SubspaceMethod) -> None:
+    random = np.random.default_rng(0)
+    system = systems.random_system(random, 2, 1, 1)
+    record = systems.experiment(system, random, 800, noise=0.05)
+    data = prepare_linear(record)
+    sequence = state_sequence(data.u, data.y, 10, 2, method)
+    model = realise_by_shift(sequence, 2, data.u, data.y)
+    found, truth = np.sort(np.linalg.eigvals(model.a).real), np.sort(np.linalg.eigvals(system.a))
+    assert found == pytest.approx(truth, abs=0.05)
 
 
 def test_more_states_than_the_record_shows_is_no_model() -> None:
