@@ -36,6 +36,7 @@ from stiction_ros.identification.subspace_projection import SubspaceMethod
 from stiction_ros.records.record import Record
 
 DEFAULT_ORDERS = (1, 2, 3)
+CONTROLLER_SHARE = 0.98
 CLOSED_LOOP = (
     "the record has set-points, so a controller was at work; the method predictor allows for it",
 )
@@ -127,8 +128,33 @@ def fit_linear(
     )
     if options.kind is LinearKind.STATE_SPACE and options.method is not SubspaceMethod.PREDICTOR:
         notes += CLOSED_LOOP if record.sp is not None else ()
+    shares = controller_share(record.op, record.pv)
+    notes += tuple(
+        f"a PI law of PV explains the moves of {valve} (R² {share:.3f}): the record tells no "
+        "process from its controller, take one with set-point moves"
+        for valve, share in zip(record.valves, shares, strict=True)
+        if share > CONTROLLER_SHARE
+    )
     seconds = time.perf_counter() - begun
     return dataclasses.replace(found, seconds=seconds, notes=(*record.notes, *notes))
+
+
+def controller_share(op: FloatArray, pv: FloatArray) -> FloatArray:
+    """Return how much of the moves of each OP a PI law of the PVs alone explains.
+
+    Args:
+        op: shape (N, m).
+        pv: shape (N, p).
+
+    Returns:
+        R² of Δu_k on PV at k and k − 1, shape (m,). Near 1 the record lacks set-point moves,
+        and a model of it may be the controller turned upside down.
+    """
+    moves = np.diff(op, axis=0)
+    columns = np.hstack([pv[1:], pv[:-1], np.ones((len(moves), 1))])
+    left = moves - columns @ np.linalg.lstsq(columns, moves, rcond=None)[0]
+    spread = np.sum((moves - moves.mean(axis=0)) ** 2, axis=0)
+    return np.asarray(1.0 - np.sum(left**2, axis=0) / np.maximum(spread, 1e-300))
 
 
 def _state_space(data: LinearData, options: LinearOptions) -> StateSpaceFit:

@@ -18,7 +18,7 @@ from stiction_ros.identification.linear_data import (
     nrmse_fit,
     prepare_linear,
 )
-from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
+from stiction_ros.identification.linear_fit import LinearOptions, controller_share, fit_linear
 from stiction_ros.identification.linear_result import LinearIdentification
 from stiction_ros.identification.subspace import SubspaceOptions, fit_state_space
 from stiction_ros.identification.subspace_projection import SubspaceMethod
@@ -175,6 +175,22 @@ def test_records_with_set_points_get_a_word_of_caution() -> None:
     options = LinearOptions(order=2, method=SubspaceMethod.PREDICTOR)
     assert any("predictor" in note for note in fit_linear(record, LinearOptions(order=2)).notes)
     assert fit_linear(record, options).notes == ()
+
+
+@pytest.mark.parametrize(("excitation", "said"), [(0.0, True), (0.5, False)])
+def test_record_that_only_shows_its_controller_is_named(excitation: float, said: bool) -> None:
+    random = np.random.default_rng(1)
+    extra = excitation * random.standard_normal(800)
+    op, pv, state, upset = np.zeros(800), np.zeros(800), 0.0, 0.0
+    for k in range(1, 800):
+        upset = 0.97 * upset + 0.1 * random.standard_normal()
+        pv[k] = state + upset
+        op[k] = op[k - 1] - 1.5 * (pv[k] - pv[k - 1] + pv[k] / 20.0) + extra[k]
+        state = 0.8 * state + 0.2 * op[k]
+    record = Record("PI", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
+    notes = fit_linear(record, LinearOptions(kind=LinearKind.ARX, output_order=1)).notes
+    assert any("PI law" in note for note in notes) is said
+    assert bool(controller_share(record.op, record.pv)[0] > 0.999) is said
 
 
 def test_unstable_model_makes_no_loop() -> None:
