@@ -38,7 +38,7 @@ class OrderOptions:
         delay: inclusive range of t_d, samples, for every valve.
         criterion: AIC or BIC.
         judged: error of the criterion; None takes the one-step error for ARMAX and the free
-            run for ARX, whose one-step error picks too long a delay when noise is added to PV.
+            run for ARX, whose one-step error misleads when noise is added to PV.
 
     Raises:
         InputError: no order, state space as kind, or a range that holds no delay.
