@@ -12,12 +12,21 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from stiction_ros import __version__
-from stiction_ros.cli import bench, demo, identify, report, study
+from stiction_ros.cli import (
+    bench,
+    demo,
+    example,
+    experiment,
+    fit_linear,
+    identify,
+    report,
+    study,
+)
 from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, report, study, bench)
+COMMANDS = (demo, identify, fit_linear, example, experiment, report, study, bench)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import multiprocessing
-import os
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import functools
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.json_output import write_json
-from stiction_ros.cli.progress import bar
 from stiction_ros.cli.scenarios import find
+from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.online.session import Scenario, run_live
 
 
@@ -53,24 +51,12 @@ def add(commands: Any) -> None:
         "--seeds", type=seed_range, default=(11, 20), metavar="A:B", help="inclusive (11:20)"
     )
     parser.add_argument("--ideal-valves", action="store_true", help="valves that follow OP")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="processes")
+    add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write all summaries; - for stdout")
     parser.set_defaults(run=run)
 
 
-def seed_range(text: str) -> tuple[int, int]:
-    """Return ``A:B`` (or one number) as an inclusive range."""
-    low, _, high = text.partition(":")
-    try:
-        first, last = int(low), int(high or low)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no range, write A:B") from None
-    if not 0 <= first <= last:
-        raise argparse.ArgumentTypeError(f"{text!r} holds no seed")
-    return first, last
-
-
-def run_seed(scenario: Scenario, seed: int, ideal_valves: bool) -> Outcome:
+def run_seed(scenario: Scenario, seed: int, *, ideal_valves: bool) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_ros.report.live_log import log_of
     from stiction_ros.report.story import tell
@@ -84,18 +70,8 @@ def run_seed(scenario: Scenario, seed: int, ideal_valves: bool) -> Outcome:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     scenario = Scenario.load(find(options.scenario))
-    seeds = range(options.seeds[0], options.seeds[1] + 1)
-    outcomes = []
-    context = multiprocessing.get_context("spawn")
-    with (
-        bar(f"{scenario.name}: {len(seeds)} seeds") as show,
-        ProcessPoolExecutor(max(options.jobs, 1), mp_context=context) as pool,
-    ):
-        futures = [pool.submit(run_seed, scenario, s, options.ideal_valves) for s in seeds]
-        for done in as_completed(futures):
-            outcomes.append(done.result())
-            show(len(outcomes) / len(seeds))
-    outcomes.sort(key=lambda outcome: outcome.seed)
+    work = functools.partial(run_seed, scenario, ideal_valves=options.ideal_valves)
+    outcomes = run_seeds(work, options.seeds, options.jobs, scenario.name)
     if options.json is not None:
         write_json(options.json, [outcome.summary for outcome in outcomes])
     if options.json != "-":

@@ -6,6 +6,7 @@ from stiction_ros.loop.closed_loop import (
     PiController,
     simulate_closed_loop,
 )
+from stiction_ros.loop.excitation import prbs_experiment, random_binary, simulate_open_loop
 from stiction_ros.loop.model import Disturbance, LoopModel, PiTuning, Valve
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
@@ -21,5 +22,8 @@ __all__ = [
     "Plant",
     "SetPoints",
     "Valve",
+    "prbs_experiment",
+    "random_binary",
     "simulate_closed_loop",
+    "simulate_open_loop",
 ]

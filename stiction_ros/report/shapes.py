@@ -16,7 +16,6 @@ from stiction_ros.report.drawing import (
     GREY,
     INK,
     ORANGE,
-    VERMILION,
     TimeAxis,
     data_limits,
     panels,
@@ -90,7 +89,7 @@ def draw_responses(
             axis = axes[row, column]
             if truth is not None:
                 known = true_response(truth, row, column, length)
-                axis.plot(at, known, color=VERMILION, linestyle=(0, (5, 3)), label="true")
+                axis.plot(at, known, color=ORANGE, linewidth=3.2, alpha=0.7, label="true")
             axis.plot(at, step_response(output, valve, length), color=BLUE, label="identified")
             axis.set_title(f"{valve} → {output['name']}")
             if column == 0:

@@ -18,7 +18,7 @@ from stiction_ros.records.record import Record
 from stiction_ros.records.run_log import RunLog
 from stiction_ros.report.scoring import Phase, Phases, phases, round_length, score
 
-_TANK_UNITS = {"C": "kg/m³", "T": "°C"}
+TANK_UNITS = {"C": "kg/m³", "T": "°C"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,7 +113,7 @@ def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = No
         truth,
         seed,
         repeat,
-        _TANK_UNITS if tank else {},
+        TANK_UNITS if tank else {},
     )
 
 

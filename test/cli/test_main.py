@@ -30,7 +30,9 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", [m.__name__.rpartition(".")[2] for m in COMMANDS])
+@pytest.mark.parametrize(
+    "name", [m.__name__.rpartition(".")[2].replace("_", "-") for m in COMMANDS]
+)
 def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         parser().parse_args([name, "--help"])

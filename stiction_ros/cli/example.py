@@ -1,0 +1,211 @@
+"""``stiction example``: loops whose truth is known, identified and compared with it."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from stiction_ros.cli.example_tables import print_outcome, print_study
+from stiction_ros.cli.json_output import write_json
+from stiction_ros.cli.progress import bar
+from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.errors import InputError
+from stiction_ros.examples import (
+    FAMILIES,
+    NOISES,
+    PLANTS,
+    Comparison,
+    Example,
+    compare,
+    example1,
+    example2,
+    healthy_loop,
+    tally,
+)
+from stiction_ros.identification import Identification, IdentificationOptions, identify
+from stiction_ros.records.csv_writer import write_csv
+
+NAMES = {
+    "1": "example1",
+    "2": "example2",
+    "example1": "example1",
+    "example2": "example2",
+    "healthy": "healthy",
+}
+METHODS = ("exact", "nlp", "grid")
+# Name of the example: the option that chooses its variant, and what may be chosen.
+VARIANTS = {
+    "example1": ("noise", NOISES),
+    "example2": ("plant", PLANTS),
+    "healthy": ("family", FAMILIES),
+}
+MAKERS: Mapping[str, Callable[[int, str], Example]] = {
+    "example1": example1,
+    "example2": example2,
+    "healthy": healthy_loop,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """What to make and how to identify it.
+
+    Attributes:
+        name, variant: of the example.
+        output_order, input_order: in place of the example's own, None to keep them.
+        method: search of the identification.
+    """
+
+    name: str
+    variant: str
+    output_order: int | None = None
+    input_order: int | None = None
+    method: str = "exact"
+
+    def make(self, seed: int) -> Example:
+        """Return the example of one seed with the orders and the method chosen."""
+        example = MAKERS[self.name](seed, self.variant)
+        changes: dict[str, Any] = {}
+        if self.output_order is not None:
+            changes |= {"output_order": self.output_order, "input_order": self.input_order}
+        elif self.input_order is not None:
+            raise InputError("needs --na as well", where="--nb")
+        if self.method != "exact":
+            known = {field.name for field in dataclasses.fields(IdentificationOptions)}
+            if "method" not in known:
+                raise InputError(f"method {self.method} is not available", where="--method")
+            changes["method"] = self.method
+        return dataclasses.replace(example, options=dataclasses.replace(example.options, **changes))
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """One seed: the example, its identification, and both side by side."""
+
+    example: Example
+    found: Identification
+    comparison: Comparison
+
+    def to_json(self) -> dict[str, Any]:
+        """Return one run as JSON data."""
+        return {
+            "example": self.example.name,
+            "variant": self.example.variant,
+            "seed": self.example.seed,
+            **self.comparison.to_json(),
+            "identification": self.found.to_json(),
+        }
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "example",
+        help="identify a loop whose truth is known, and compare",
+        description="Make a record whose truth is known, identify it and print both side by "
+        "side: the paper's Examples 1 and 2, or loops without friction that oscillate for "
+        "another reason. With --seeds: how often the identification is right.",
+    )
+    parser.add_argument("name", choices=tuple(NAMES), metavar="NAME", help=", ".join(NAMES))
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
+    parser.add_argument("--seeds", type=seed_range, metavar="A:B", help="many, inclusive")
+    add_jobs(parser)
+    for name, (option, known) in VARIANTS.items():
+        parser.add_argument(f"--{option}", choices=known, help=f"{name} (default: {known[0]})")
+    parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: the example's)")
+    parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
+    parser.add_argument("--method", default="exact", choices=METHODS, help="search (exact)")
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument(
+        "--out", metavar="DIR", help="write record.csv, result.json and report.html there"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    choice = _choice(options)
+    if options.seeds is None:
+        return _run_one(choice, options)
+    if options.out is not None:
+        raise InputError("is for one seed", where="--out", fix="use --seed, or --json")
+    return _run_many(choice, options)
+
+
+def solve(choice: Choice, seed: int) -> Outcome:
+    """Make, identify and compare one seed; a worker process can run it."""
+    example = choice.make(seed)
+    found = identify(example.record, example.options)
+    return Outcome(example, found, compare(example, found))
+
+
+def _choice(options: argparse.Namespace) -> Choice:
+    name = NAMES[options.name]
+    for owner, (option, _) in VARIANTS.items():
+        if owner != name and getattr(options, option) is not None:
+            raise InputError(f"belongs to {owner}", where=f"--{option}", fix="leave it out")
+    option, known = VARIANTS[name]
+    variant = getattr(options, option) or known[0]
+    if options.seed < 0:
+        raise InputError(f"{options.seed} is negative", where="--seed")
+    return Choice(name, variant, options.na, options.nb, options.method)
+
+
+def _run_one(choice: Choice, options: argparse.Namespace) -> int:
+    with bar(f"{choice.name}: simulating") as show:
+        example = choice.make(options.seed)
+        show(0.1, f"{choice.name}: identifying")
+        found = identify(example.record, example.options, lambda share: show(0.1 + 0.9 * share))
+    outcome = Outcome(example, found, compare(example, found))
+    if options.json is not None:
+        write_json(options.json, outcome.to_json())
+    if options.json != "-":
+        print_outcome(Console(), outcome.example, outcome.comparison, outcome.found)
+    if options.out is not None:
+        print(f"report: {_write(outcome, Path(options.out))}", file=sys.stderr)
+    return 0
+
+
+def _run_many(choice: Choice, options: argparse.Namespace) -> int:
+    work = functools.partial(solve, choice)
+    title = f"{choice.name}, {choice.variant}"
+    outcomes = run_seeds(work, options.seeds, options.jobs, title)
+    findings = tally(choice.name, [outcome.comparison for outcome in outcomes])
+    if options.json is not None:
+        document = {
+            "example": choice.name,
+            "variant": choice.variant,
+            "findings": [finding.to_json() for finding in findings],
+            "runs": [outcome.to_json() for outcome in outcomes],
+        }
+        write_json(options.json, document)
+    if options.json != "-":
+        rows = [(o.example.seed, o.comparison, o.found) for o in outcomes]
+        print_study(Console(), title, rows, findings)
+    return 0
+
+
+def _write(outcome: Outcome, directory: Path) -> Path:
+    from stiction_ros.report.example_report import report_example
+
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        write_csv(outcome.example.record, directory / "record.csv")
+        page = report_example(
+            outcome.example, outcome.found, outcome.comparison, directory / "report.html"
+        )
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})",
+            where=str(directory),
+            fix="choose another --out",
+        ) from None
+    write_json(str(directory / "result.json"), outcome.to_json())
+    return page

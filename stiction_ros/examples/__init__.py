@@ -1,0 +1,23 @@
+"""Loops whose truth is known: the paper's two examples and loops without friction."""
+
+from __future__ import annotations
+
+from stiction_ros.examples.comparison import Comparison, compare
+from stiction_ros.examples.example import Example
+from stiction_ros.examples.healthy import FAMILIES, healthy_loop
+from stiction_ros.examples.paper import NOISES, PLANTS, example1, example2
+from stiction_ros.examples.tally import Finding, tally
+
+__all__ = [
+    "FAMILIES",
+    "NOISES",
+    "PLANTS",
+    "Comparison",
+    "Example",
+    "Finding",
+    "compare",
+    "example1",
+    "example2",
+    "healthy_loop",
+    "tally",
+]

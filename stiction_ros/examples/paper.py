@@ -1,0 +1,77 @@
+"""The records of the paper's Examples 1 and 2 (Section 4), one per seed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError
+from stiction_ros.examples.example import Example
+from stiction_ros.identification import IdentificationOptions
+from stiction_ros.loop import LoopModel, SetPoints
+from stiction_ros.online.session import Scenario, run_live
+from stiction_ros.processes import NoiseEntry
+from stiction_ros.records import Record
+
+NOISES = tuple(entry.value for entry in NoiseEntry)
+PLANTS = ("linear", "tank")
+EXAMPLE1_SAMPLES = 2500
+EXAMPLE2_SAMPLES = 620
+
+
+def example1(seed: int, noise: str = "measurement") -> Example:
+    """Return Example 1: process (18), He's valve with f_S = 5 and f_D = 2, 2500 samples of 1 s.
+
+    The stiction-unaware MPC (19) controls; the set-point moves every 250 s, as the cycle
+    may stop by itself. Orders are known, n_a = n_b = 3, the delay is one of 0 to 10.
+
+    Args:
+        seed: of the white noise, σ = 0.01.
+        noise: ``measurement`` adds it to PV as in (2), ``equation`` is v of (9).
+
+    Raises:
+        InputError: unknown ``noise``.
+    """
+    _check(noise, NOISES, "noise")
+    scenario = Scenario.load(find_config("siso.scenario.yaml"))
+    document = scenario.plant.to_mapping()
+    document["process"]["outputs"][0]["noise"]["enters"] = noise
+    plant = LoopModel.from_mapping(document)
+    schedule = SetPoints.load(find_config("example1.set_points.yaml"), plant.outputs)
+    scenario = dataclasses.replace(scenario, plant=plant, set_points=schedule)
+    record = _record(scenario, seed, EXAMPLE1_SAMPLES)
+    options = IdentificationOptions(output_order=3, input_order=3, delay=(0, 10))
+    return Example("example1", noise, seed, record, plant, options)
+
+
+def example2(seed: int, plant: str = "linear") -> Example:
+    """Return Example 2: two valves, V1 with f_S = 8 and f_D = 1, 620 samples of 1 min.
+
+    The stiction-unaware MPC on (A.3) controls, with set-point moves of both outputs and
+    white noise of variance 1e-4 on both. Delays are known to be 0, orders are left to BIC.
+
+    Args:
+        seed: of the noise.
+        plant: ``linear`` is (A.3), ``tank`` the nonlinear tank (A.1).
+
+    Raises:
+        InputError: unknown ``plant``.
+    """
+    _check(plant, PLANTS, "plant")
+    scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    model = scenario.plant
+    if plant == "linear":
+        frictions = {valve.name: valve.effects for valve in model.valves}
+        model = scenario.process.with_valve_effects(frictions)
+    record = _record(dataclasses.replace(scenario, plant=model), seed, EXAMPLE2_SAMPLES)
+    return Example("example2", plant, seed, record, model, IdentificationOptions(delay=(0, 0)))
+
+
+def _record(scenario: Scenario, seed: int, samples: int) -> Record:
+    run = run_live(scenario, seed=seed, samples=samples, identify=False)
+    return run.run.record
+
+
+def _check(value: str, known: tuple[str, ...], where: str) -> None:
+    if value not in known:
+        raise InputError(f"unknown value {value!r}", where=where, fix=f"use {' or '.join(known)}")

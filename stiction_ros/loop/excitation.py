@@ -1,0 +1,100 @@
+"""Open-loop experiments: random binary moves of the valves, and what the plant answers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction_ros.effects import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop.model import LoopModel
+from stiction_ros.loop.plant import Plant
+from stiction_ros.records import Record
+
+SWITCH_PROBABILITY = 0.05
+LEVELS = (40.0, 60.0)
+
+
+def random_binary(
+    random: np.random.Generator,
+    samples: int,
+    valves: int,
+    switch_probability: float = SWITCH_PROBABILITY,
+    levels: tuple[float, float] = LEVELS,
+) -> FloatArray:
+    """Return independent random binary sequences, shape (samples, valves), %.
+
+    Each valve starts at either level with equal chance and changes to the other one with
+    ``switch_probability`` at every further sample, as in Appendix A.
+
+    Args:
+        random: source of chance.
+        samples: N ≥ 1.
+        valves: m ≥ 1.
+        switch_probability: between 0 and 1, neither included.
+        levels: low and high, %.
+
+    Raises:
+        InputError: a value out of range.
+    """
+    if samples < 1 or valves < 1:
+        raise InputError(f"{samples} samples of {valves} valves", where="samples", fix="use 1 up")
+    if not 0.0 < switch_probability < 1.0:
+        raise InputError(
+            f"{switch_probability} is no probability of a switch",
+            where="switch_probability",
+            fix="use more than 0 and less than 1",
+        )
+    low, high = levels
+    if not (np.isfinite(levels).all() and low < high):
+        raise InputError(f"{low:g}:{high:g} are no levels", where="levels", fix="use LO:HI")
+    switches = random.random((samples, valves)) < switch_probability
+    switches[0] = random.random(valves) < 0.5
+    return np.where(np.cumsum(switches, axis=0) % 2 == 1, high, low)
+
+
+def simulate_open_loop(model: LoopModel, op: FloatArray, seed: int) -> Record:
+    """Return the record of the plant of ``model`` under given controller outputs.
+
+    Args:
+        model: plant and starting point.
+        op: controller outputs, shape (N, m), %.
+        seed: of the plant's noise.
+
+    Raises:
+        InputError: OP of another shape or not finite.
+    """
+    op = np.asarray(op, dtype=float)
+    if op.ndim != 2 or op.shape[1] != len(model.valves):
+        raise InputError(f"op has shape {op.shape}, not (N, {len(model.valves)})", where=model.name)
+    if not np.isfinite(op).all():
+        raise InputError("op is not finite", where=model.name)
+    plant = Plant(model, seed)
+    pv, stem = np.empty((len(op), len(model.outputs))), np.empty_like(op)
+    for k, row in enumerate(op):
+        pv[k] = plant.measure().pv
+        stem[k] = plant.apply(row)
+    return Record(
+        model.name, model.sample_time, model.valve_names, model.outputs, op, pv, None, stem
+    )
+
+
+def prbs_experiment(
+    model: LoopModel,
+    samples: int,
+    seed: int,
+    switch_probability: float = SWITCH_PROBABILITY,
+    levels: tuple[float, float] = LEVELS,
+) -> Record:
+    """Return the identification experiment of Appendix A on the plant of ``model``.
+
+    Every valve moves by :func:`random_binary`, in open loop. The moves and the noise come from
+    one seed but do not depend on each other.
+
+    Raises:
+        InputError: as :func:`random_binary`; a negative seed.
+    """
+    if seed < 0:
+        raise InputError(f"{seed} is negative", where="seed")
+    moves = np.random.default_rng([seed, 1])
+    op = random_binary(moves, samples, len(model.valves), switch_probability, levels)
+    return simulate_open_loop(model, op, seed)
