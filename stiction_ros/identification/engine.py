@@ -15,9 +15,10 @@ from stiction_ros.identification.intervals import FrictionIntervals, friction_in
 from stiction_ros.identification.models import (
     Data,
     Model,
+    improve_delays,
     linear_model,
-    neighbouring_delays,
     refit,
+    settle_delays,
     stem_of,
 )
 from stiction_ros.identification.options import IdentificationOptions
@@ -61,7 +62,7 @@ def identify(
     report(0.02)
     orders, linear, model = choose(data, options, len(record))
     report(0.6)
-    model = neighbouring_delays(data, model, orders)
+    model = settle_delays(data, model, orders)
     rivals = [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))]
     report(0.8)
     valves, model = estimate_valves(record, data, model, orders, rivals, options)
@@ -104,7 +105,6 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
         limit=limit,
         delay=options.delay,
         min_moves=options.min_moves,
-        resolution=options.resolution,
     )
 
 
@@ -153,12 +153,12 @@ def linear_rivals(
         raised = dataclasses.replace(
             orders, output=orders.output + extra, input=orders.input + extra
         )
-        rival = linear_model(data, raised, freed)
-        rivals.append(rival)
-        if rival.delays != linear.delays:
-            own = dataclasses.replace(freed, delays=linear.delays)
+        for delays in {freed.delays, linear.delays}:
+            own = dataclasses.replace(freed, delays=delays)
             rivals.append(refit(data, own, raised, warm=False))
-    return rivals
+    best = min(range(len(rivals)), key=lambda index: rivals[index].bic)
+    raised = rivals[best].fits[0].orders
+    return [*rivals, improve_delays(data, rivals[best], raised)]
 
 
 def estimate_valves(

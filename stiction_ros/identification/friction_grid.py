@@ -41,9 +41,38 @@ def even_grid(limit: float, steps: int) -> FloatArray:
     """Return the triangle in even steps of J = f_S − f_D and S = f_S + f_D, limit / steps each."""
     nodes = (np.arange(2 * steps) + 0.5) * (limit / steps)
     jump, reverse = (part.ravel() for part in np.meshgrid(nodes, nodes, indexing="ij"))
+    return _rows(jump, reverse, limit)
+
+
+def line_grid(limit: float, lines: int, steps: int) -> FloatArray:
+    """Return dense lines through the triangle, along S at few J and along J at few S.
+
+    A valve that slips seldom has patterns that are narrow in one direction only.
+
+    Args:
+        lines: number of lines in either direction.
+        steps: points on limit %.
+    """
+    fine = (np.arange(2 * steps) + 0.5) * (limit / steps)
+    few = (np.arange(lines) + 0.5) / lines
+    pairs = [np.meshgrid(few * limit, fine), np.meshgrid(fine, 2.0 * few * limit)]
+    jump, reverse = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in (0, 1))
+    return _rows(jump, reverse, limit)
+
+
+def cross_grid(friction: FloatArray, limit: float, steps: int) -> FloatArray:
+    """Return the lines of the same S and of the same J as (f_S, f_D), limit / steps apart."""
+    jump, reverse = friction[0] - friction[1], friction[0] + friction[1]
+    fine = (np.arange(2 * steps) + 0.5) * (limit / steps)
+    jumps = np.concatenate([fine, np.full(len(fine), jump)])
+    reverses = np.concatenate([np.full(len(fine), reverse), fine])
+    return _rows(jumps, reverses, limit)
+
+
+def _rows(jump: FloatArray, reverse: FloatArray, limit: float) -> FloatArray:
+    """Return rows (f_S, f_D) of the points (J, S) inside the triangle."""
     inside = (reverse >= jump) & (jump + reverse <= 2.0 * limit)
-    jump, reverse = jump[inside], reverse[inside]
-    return 0.5 * np.column_stack([reverse + jump, reverse - jump])
+    return 0.5 * np.column_stack([reverse + jump, reverse - jump])[inside]
 
 
 def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) -> FloatArray:

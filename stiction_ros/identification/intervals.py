@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from stiction_ros.effects import HeStiction
@@ -40,7 +41,6 @@ class FrictionIntervals:
         patterns: number of switching patterns enumerated round the best one; 0 when the
             law has none or the valve does not slip.
         closed: whether that enumeration reached rejected patterns on every side.
-        delays: per output, the delays of all patterns that are not rejected.
     """
 
     static: Interval
@@ -51,32 +51,32 @@ class FrictionIntervals:
     deadband_loss: float
     patterns: int
     closed: bool
-    delays: tuple[tuple[int, ...], ...]
 
 
 def friction_intervals(
     data: Data, model: Model, orders: Orders, valve: int, confidence: float
 ) -> FrictionIntervals:
-    """Return the intervals of one valve round the model's friction."""
+    """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
-    threshold = float(chi2.ppf(confidence, 1))
+    threshold = float(chi2.ppf(confidence, 2))
     near: PatternMap | None = None
     if data.law is HeStiction:
-        _, near = refine(data, model, orders, valve, threshold, rounds=1)
+        model, near = refine(data, model, orders, valve, threshold, wander=0)
         scan = _far_patterns(data, model, orders, valve)
         if near is not None:
             scan = PatternScan.joined([scan, near.scan])
     else:
         scan = _grid_points(data, model, orders, valve)
     start = float(model.start[valve])
-    zero = scan_valve(data, model, orders, valve, np.zeros((1, 2)), start)
+    ranges = nearby_delays(data, model, valve, 0)
+    zero = scan_valve(data, model, orders, valve, np.zeros((1, 2)), start, ranges=ranges)
     scan = PatternScan.joined([point_patterns(zero), scan])
     scan = _without_standstill(data, model, orders, valve, scan, threshold)
     floor = float(scan.loss.min())
     accepted = np.flatnonzero(scan.loss <= floor + threshold)
-    ranges = [_accepted_ranges(scan, int(i), floor + threshold, limit) for i in accepted]
-    static = _hull([r[0] for r in ranges])
-    dynamic = _hull([r[1] for r in ranges])
+    parts = [_accepted_ranges(scan, int(i), floor + threshold, limit) for i in accepted]
+    static = _hull([part[0] for part in parts])
+    dynamic = _hull([part[1] for part in parts])
     estimate = _estimate(scan, accepted, static, limit)
     return FrictionIntervals(
         static=static,
@@ -87,16 +87,13 @@ def friction_intervals(
         deadband_loss=_deadband_loss(scan) - floor,
         patterns=0 if near is None else len(near.scan.loss),
         closed=near is not None and near.closed,
-        delays=tuple(
-            tuple(sorted({int(d) for d in scan.delays[accepted, i]})) for i in range(len(data.y))
-        ),
     )
 
 
 def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
     """Return the patterns of coarse grids over the whole triangle, with best f_D each."""
     limit = float(data.limit[valve])
-    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve, 0))
     grid = np.vstack([coarse_grid(limit), _deadbands(limit)])
     level = float(data.u[valve, 0] + model.start[valve])
     cells = resting_cells(search.u, np.full(len(grid), level), points_of(grid))
@@ -111,7 +108,15 @@ def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> Patter
         grids.append(finer_grid(model.friction[valve][None, :], step, limit))
         step /= 3.0
     return point_patterns(
-        scan_valve(data, model, orders, valve, np.vstack(grids), float(model.start[valve]))
+        scan_valve(
+            data,
+            model,
+            orders,
+            valve,
+            np.vstack(grids),
+            float(model.start[valve]),
+            ranges=nearby_delays(data, model, valve, 0),
+        )
     )
 
 
@@ -160,7 +165,7 @@ def _hull(intervals: list[Interval]) -> Interval:
 
 
 def _estimate(
-    scan: PatternScan, accepted: FloatArray, static: Interval, limit: float
+    scan: PatternScan, accepted: NDArray[np.intp], static: Interval, limit: float
 ) -> tuple[float, float]:
     """Return (f_S, f_D): the middle of the interval where a pattern there is accepted."""
     middle = 0.5 * (static[0] + static[1])

@@ -19,7 +19,10 @@ from stiction_ros.identification.output_error import Orders, OutputFit, fit_outp
 from stiction_ros.identification.scan import OutputScan
 
 BLOCK = 4_000_000
-DELAY_MARGIN = 2.0
+DELAY_MARGIN = 10.8
+
+
+DelayRanges = tuple[tuple[int, int], ...]
 
 
 class Criterion(enum.Enum):
@@ -41,7 +44,6 @@ class Data:
         limit: largest f_S per valve, %, shape (m,).
         delay: inclusive range of t_d.
         min_moves: fewest stem moves of an accepted candidate.
-        resolution: final step of the grid as a share of the limit.
     """
 
     y: FloatArray
@@ -50,7 +52,11 @@ class Data:
     limit: FloatArray
     delay: tuple[int, int]
     min_moves: int
-    resolution: float
+
+    @property
+    def delays(self) -> DelayRanges:
+        """The range of t_d for each output."""
+        return (self.delay,) * len(self.y)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,7 +131,7 @@ def output_scans(
     orders: Orders,
     valve: int,
     criterion: Criterion,
-    delay: tuple[int, int],
+    ranges: DelayRanges,
     free: FloatArray | None = None,
 ) -> list[OutputScan]:
     """Return one scan per output, the other valves of ``model`` fixed."""
@@ -142,7 +148,7 @@ def output_scans(
             fit.a if criterion is not Criterion.ONE_STEP else one,
             free,
         )
-        for y, fit, delays in zip(data.y, model.fits, model.delays, strict=True)
+        for y, fit, delays, delay in zip(data.y, model.fits, model.delays, ranges, strict=True)
     ]
 
 
@@ -154,16 +160,16 @@ def scan_valve(
     grid: FloatArray,
     starts: FloatArray | float,
     criterion: Criterion = Criterion.INNOVATIONS,
-    delay: tuple[int, int] | None = None,
+    ranges: DelayRanges | None = None,
 ) -> ValveScan:
     """Scan the friction of ``valve`` with the other valves of ``model`` fixed.
 
     Args:
         starts: stem before the first sample minus first OP, %, shape (G,) or one for all.
         criterion: filter by 1, 1/A or D/A of the model's fits.
-        delay: range of delays scanned; None is that of the data.
+        ranges: delays scanned, one range per output; None is that of the data for all.
     """
-    return scan_criteria(data, model, orders, valve, grid, starts, (criterion,), delay)[0]
+    return scan_criteria(data, model, orders, valve, grid, starts, (criterion,), ranges)[0]
 
 
 def scan_criteria(
@@ -174,11 +180,11 @@ def scan_criteria(
     grid: FloatArray,
     starts: FloatArray | float,
     criteria: tuple[Criterion, ...],
-    delay: tuple[int, int] | None = None,
+    ranges: DelayRanges | None = None,
 ) -> list[ValveScan]:
     """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
-    low, high = delay or data.delay
-    scans = [output_scans(data, model, orders, valve, c, (low, high)) for c in criteria]
+    ranges = ranges or data.delays
+    scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
     u = data.u[valve]
     start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
     size = max(1, BLOCK // len(u))
@@ -192,7 +198,7 @@ def scan_criteria(
         for c, outputs in enumerate(scans):
             for i, scan in enumerate(outputs):
                 energy = scan.energy(stems)
-                best[c, rows, i] = energy.argmin(axis=1) + low
+                best[c, rows, i] = energy.argmin(axis=1) + ranges[i][0]
                 loss[c, rows] += scan.count * np.log(energy.min(axis=1) / scan.count)
     return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(criteria))]
 
@@ -280,26 +286,52 @@ def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
     return model
 
 
-def neighbouring_delays(data: Data, model: Model, orders: Orders) -> Model:
-    """Try each channel's delay earlier and later by the exact fit.
+def settle_delays(data: Data, model: Model, orders: Orders) -> Model:
+    """Choose each channel's delay by the exact fit: the longest that is not rejected.
 
-    A leading coefficient that the data cannot tell from zero counts as delay: of delays that
-    fit equally well (within ``DELAY_MARGIN``) the longest is kept.
+    A leading coefficient that the record cannot tell from zero counts as delay: a shorter
+    delay must lower −2 log likelihood by more than ``DELAY_MARGIN``, the 99.9 % point of its
+    gain by one coefficient that is zero.
     """
-    for i, y in enumerate(data.y):
+    for i in range(len(data.y)):
         for j in range(len(data.u)):
-            for shift, margin in ((-1, -DELAY_MARGIN), (1, DELAY_MARGIN)):
-                best = model.fits[i].loss
-                while True:
-                    row = list(model.delays[i])
-                    row[j] += shift
-                    if not data.delay[0] <= row[j] <= data.delay[1]:
-                        break
-                    fit = fit_output(y, model.stems, tuple(row), orders)
-                    if fit.loss > best + margin:
-                        break
-                    best = min(best, fit.loss)
-                    delays, fits = list(model.delays), list(model.fits)
-                    delays[i], fits[i] = tuple(row), fit
-                    model = dataclasses.replace(model, delays=tuple(delays), fits=tuple(fits))
+            rivals = _neighbours(data, model, orders, i, j)
+            best = min(rivals.values(), key=lambda fit: fit.loss)
+            near = [d for d, fit in rivals.items() if fit.loss <= best.loss + DELAY_MARGIN]
+            chosen = rivals[max(near)]
+            delays, fits = list(model.delays), list(model.fits)
+            delays[i], fits[i] = chosen.delays, chosen
+            model = dataclasses.replace(model, delays=tuple(delays), fits=tuple(fits))
     return model
+
+
+def _neighbours(data: Data, model: Model, orders: Orders, i: int, j: int) -> dict[int, OutputFit]:
+    """Return fits by delay of channel (i, j), out from the present one until rejected."""
+    now = model.delays[i][j]
+    rivals = {now: model.fits[i]}
+    for shift in (-1, 1):
+        best, delay = model.fits[i].loss, now + shift
+        while data.delay[0] <= delay <= data.delay[1]:
+            row = list(model.delays[i])
+            row[j] = delay
+            fit = fit_output(data.y[i], model.stems, tuple(row), orders)
+            rivals[delay] = fit
+            if fit.loss > best + DELAY_MARGIN:
+                break
+            best, delay = min(best, fit.loss), delay + shift
+    return rivals
+
+
+def alternative_delays(
+    data: Data, model: Model, orders: Orders, margin: float
+) -> list[list[tuple[int, ...]]]:
+    """Return, per output and valve, all delays whose loss is within ``margin`` of the best."""
+    found = []
+    for i in range(len(data.y)):
+        row = []
+        for j in range(len(data.u)):
+            rivals = _neighbours(data, model, orders, i, j)
+            best = min(fit.loss for fit in rivals.values())
+            row.append(tuple(sorted(d for d, f in rivals.items() if f.loss <= best + margin)))
+        found.append(row)
+    return found

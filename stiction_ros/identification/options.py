@@ -19,7 +19,6 @@ class IdentificationOptions:
         friction_limit: largest f_S searched, %; None is the OP span of each valve.
         noise_order: order p of the autoregressive noise on the free-run error.
         confidence: level of the intervals.
-        resolution: final step of the friction grid as a share of the OP span.
         bic_margin: BIC by which friction must beat the friction-free rival to be believed.
         min_moves: fewest stem moves from which anything may be concluded.
         negligible_friction: f_S up to this is healthy, %.
@@ -36,7 +35,6 @@ class IdentificationOptions:
     friction_limit: float | None = None
     noise_order: int = 6
     confidence: float = 0.95
-    resolution: float = 0.0005
     bic_margin: float = 20.0
     min_moves: int = 6
     negligible_friction: float = 0.3

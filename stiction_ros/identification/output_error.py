@@ -142,7 +142,7 @@ class _Problem:
         row = 0
         for signal, lag, count in self.groups:
             lags = [x[signal, begin - lag - i : end - lag - i] for i in range(count)]
-            for i in range(count):
+            for _ in range(count):
                 out[row] = lags[0]
                 lags = [now - before for now, before in itertools.pairwise(lags)]
                 row += 1
@@ -292,7 +292,8 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: 
     point = problem.evaluate(point.a, point.noise, weight)
     for _ in range(max_iterations):
         gram, gradient = _normal_equations(problem, point)
-        scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-150
+        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        scale[scale < 1e-100] = 1.0  # a coefficient without influence stays where it is
         gram /= np.outer(scale, scale)
         gradient /= scale
         improved = False

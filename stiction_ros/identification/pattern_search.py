@@ -13,7 +13,14 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.models import Criterion, Data, Model, output_scans, with_valve
+from stiction_ros.identification.models import (
+    Criterion,
+    Data,
+    DelayRanges,
+    Model,
+    output_scans,
+    with_valve,
+)
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.patterns import (
     Beginning,
@@ -32,7 +39,7 @@ MARGIN = 6.0
 ZOOMS = 16
 ROUNDS = 4
 MOST_LEVELS = 60
-LEAST_GAIN = 1e-4
+LEAST_GAIN = 0.02
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +101,7 @@ class PatternSearch:
         model: Model,
         orders: Orders,
         valve: int,
-        delay: tuple[int, int],
+        ranges: DelayRanges,
         begin: Beginning | None = None,
         criterion: Criterion = Criterion.INNOVATIONS,
     ) -> None:
@@ -102,13 +109,16 @@ class PatternSearch:
         self.u = data.u[valve]
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.delay = delay
-        self.scans = output_scans(data, model, orders, valve, criterion, delay, free)
+        self.ranges = ranges
+        self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D."""
         size = max(1, BLOCK // len(self.u))
-        parts = [self._evaluate(cells.part(slice(i, i + size))) for i in range(0, len(cells.bounds), size)]
+        parts = [
+            self._evaluate(cells.part(slice(i, i + size)))
+            for i in range(0, len(cells.bounds), size)
+        ]
         return PatternScan.joined(parts)
 
     def _evaluate(self, cells: Cells) -> PatternScan:
@@ -131,9 +141,7 @@ class PatternSearch:
         inside = 1e-9 * (ranges[best, 1] - ranges[best, 0])
         return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
 
-    def realised(
-        self, scan: PatternScan, index: int, begin: Beginning
-    ) -> tuple[FloatArray, float]:
+    def realised(self, scan: PatternScan, index: int, begin: Beginning) -> tuple[FloatArray, float]:
         """Return (f_S, f_D) of a cell and the stem before the first sample minus u_0, %.
 
         The best level under the given first slip is taken, and of the cell's f_S the middle
@@ -192,9 +200,9 @@ class PatternSearch:
     ) -> tuple[FloatArray, FloatArray]:
         """Return loss (G, F) and best delays (G, F, p) at levels (G, F)."""
         loss, delays = np.zeros(levels.shape), []
-        for scan, energy in zip(self.scans, energies, strict=True):
+        for scan, energy, delay in zip(self.scans, energies, self.ranges, strict=True):
             values = energy(levels)
-            delays.append(values.argmin(axis=2) + self.delay[0])
+            delays.append(values.argmin(axis=2) + delay[0])
             loss += scan.count * np.log(values.min(axis=2) / scan.count)
         return loss, np.stack(delays, axis=2)
 
@@ -309,13 +317,16 @@ def neighbourhood(
     return PatternMap(scan, rectangle, closed=False)
 
 
-def _grown(
-    scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float
-) -> FloatArray:
+def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float) -> FloatArray:
     """Return the rectangle with every edge moved out that an accepted cell touches."""
     accepted = scan.bounds[scan.loss <= scan.loss.min() + threshold]
     jl, jh, sl, sh = rectangle
-    meets = (accepted[:, 0] < jh) & (accepted[:, 1] > jl) & (accepted[:, 2] < sh) & (accepted[:, 3] > sl)
+    meets = (
+        (accepted[:, 0] < jh)
+        & (accepted[:, 1] > jl)
+        & (accepted[:, 2] < sh)
+        & (accepted[:, 3] > sl)
+    )
     accepted = accepted[meets]
     wide, high = max(0.3 * (jh - jl), 1e-4 * limit), max(0.3 * (sh - sl), 1e-4 * limit)
     out = rectangle.copy()
@@ -333,24 +344,28 @@ def _grown(
 
 
 def refine(
-    data: Data, model: Model, orders: Orders, valve: int, threshold: float, rounds: int = ROUNDS
+    data: Data, model: Model, orders: Orders, valve: int, threshold: float, wander: int = 1
 ) -> tuple[Model, PatternMap | None]:
     """Return the model with the best pattern of its neighbourhood, and that neighbourhood.
 
     Repeated with the prefilter of the better model until nothing changes. The map is None
     for a valve without friction or one that never slips.
+
+    Args:
+        threshold: excess of the loss over the best from which a pattern is rejected.
+        wander: how many samples delays may change in one round.
     """
     reachable = None
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         if model.friction[valve, 0] <= 0.0:
             return model, None
-        delay = nearby_delays(data, model, valve)
-        plain = PatternSearch(data, model, orders, valve, delay)
+        ranges = nearby_delays(data, model, valve, wander)
+        plain = PatternSearch(data, model, orders, valve, ranges)
         level = plain.best_level(model.friction[valve])
         begin = beginning_of(plain.u, level, float(model.friction[valve, 0]))
         if begin.first == len(plain.u):
             return model, None
-        search = PatternSearch(data, model, orders, valve, delay, begin)
+        search = PatternSearch(data, model, orders, valve, ranges, begin)
         reachable = neighbourhood(search, begin, model.friction[valve], threshold, MOST_CELLS)
         loss = np.where(reachable.scan.moves >= data.min_moves, reachable.scan.loss, np.inf)
         best = int(loss.argmin())
@@ -362,6 +377,13 @@ def refine(
             break
         model = rival
     return model, reachable
+
+
+def nearby_delays(data: Data, model: Model, valve: int, wander: int = 1) -> DelayRanges:
+    """Return, per output, the delays of a valve within ``wander`` samples of the model's."""
+    low, high = data.delay
+    now = [row[valve] for row in model.delays]
+    return tuple((max(low, d - wander), min(high, d + wander)) for d in now)
 
 
 def best_in_cells(
@@ -379,9 +401,3 @@ def best_in_cells(
     scan = search.evaluate(resting_cells(search.u, levels, points_of(friction)))
     rows = [scan.middle(index, search.limit) for index in range(len(friction))]
     return np.array(rows), scan
-
-
-def nearby_delays(data: Data, model: Model, valve: int) -> tuple[int, int]:
-    """Return the delays of a valve in a model, one sample more to either side."""
-    now = [row[valve] for row in model.delays]
-    return max(data.delay[0], min(now) - 1), min(data.delay[1], max(now) + 1)

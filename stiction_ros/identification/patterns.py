@@ -21,6 +21,10 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 
 
+SWARM = 2
+FEW = 40
+
+
 @dataclasses.dataclass(frozen=True)
 class Beginning:
     """The stem before and at its first slip.
@@ -115,11 +119,18 @@ def _cells(
 def _simulate(
     u: FloatArray, points: FloatArray, base: FloatArray, sign: FloatArray, begin: Beginning | None
 ) -> tuple[FloatArray, FloatArray]:
+    """Return u at the last slip and its direction, both of shape (G, N)."""
+    if len(points) <= FEW:
+        rows = [
+            _simulate_one(u, float(point[0]), float(point[1]), level, begin)
+            for point, level in zip(points, base.tolist(), strict=True)
+        ]
+        return np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
     jump, reverse = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
     values, bases, signs, begins = u.tolist(), [base], [sign], [0]
-    k = 0
+    after = 0
     if begin is not None:
-        k = begin.first + 1
+        after = begin.first + 1
         if begin.first < len(u):
             base, sign = np.full_like(base, u[begin.first]), np.full_like(sign, begin.direction)
             bases.append(base)
@@ -127,9 +138,10 @@ def _simulate(
             begins.append(begin.first)
     high, low = _thresholds(base, sign, jump, reverse)
     ceiling, floor = high.min(), low.max()
-    for k in range(k, len(values)):
+    busy = 0
+    for k in range(after, len(values)):
         value = values[k]
-        if floor <= value <= ceiling:
+        if not busy and floor <= value <= ceiling:
             continue
         up, down = value > high, value < low
         base = np.where(up | down, value, base)
@@ -138,7 +150,9 @@ def _simulate(
         signs.append(sign)
         begins.append(k)
         high, low = _thresholds(base, sign, jump, reverse)
-        ceiling, floor = high.min(), low.max()
+        busy = busy - 1 if busy else SWARM  # slips come in swarms
+        if not busy:
+            ceiling, floor = high.min(), low.max()
     lengths = np.diff([*begins, len(values)])
     return (
         np.repeat(np.stack(bases, axis=1), lengths, axis=1),
@@ -146,13 +160,44 @@ def _simulate(
     )
 
 
+def _simulate_one(
+    u: FloatArray, jump: float, reverse: float, level: float, begin: Beginning | None
+) -> tuple[FloatArray, FloatArray]:
+    values, bases, signs, begins = u.tolist(), [level], [0.0], [0]
+    after = 0
+    half = 0.5 * (jump + reverse)
+    high, low = level + half, level - half
+    if begin is not None:
+        after = begin.first + 1
+        if begin.first < len(u):
+            bases.append(values[begin.first])
+            signs.append(begin.direction)
+            begins.append(begin.first)
+            high, low = _edges(bases[-1], signs[-1], jump, reverse)
+    for k in range(after, len(values)):
+        value = values[k]
+        if low <= value <= high:
+            continue
+        bases.append(value)
+        signs.append(1.0 if value > high else -1.0)
+        begins.append(k)
+        high, low = _edges(value, signs[-1], jump, reverse)
+    lengths = np.diff([*begins, len(values)])
+    return np.repeat(bases, lengths), np.repeat(signs, lengths)
+
+
+def _edges(base: float, sign: float, jump: float, reverse: float) -> tuple[float, float]:
+    return (base + jump, base - reverse) if sign > 0.0 else (base + reverse, base - jump)
+
+
 def _thresholds(
     base: FloatArray, sign: FloatArray, jump: FloatArray, reverse: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return OP above and below which the stems slip; f_S before the first slip."""
     half = 0.5 * (jump + reverse)
-    lead = 0.5 * sign * (jump - reverse)
-    return base + half + lead, base - half + lead
+    up = np.where(sign > 0.0, jump, np.where(sign < 0.0, reverse, half))
+    down = np.where(sign > 0.0, reverse, np.where(sign < 0.0, jump, half))
+    return base + up, base - down
 
 
 def _bounds(u: FloatArray, bases: FloatArray, signs: FloatArray) -> FloatArray:

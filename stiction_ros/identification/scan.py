@@ -131,7 +131,8 @@ class OutputScan:
             for swap, (one, two) in enumerate(pairs):
                 lag = self.lags[0]
                 now = np.einsum(
-                    "gn,gn->g", one[:, first - lag : count - lag],
+                    "gn,gn->g",
+                    one[:, first - lag : count - lag],
                     two[:, first - lag - d : count - lag - d],
                 )
                 for position in range(len(self.lags) - d):
@@ -142,7 +143,9 @@ class OutputScan:
                     if x is s:
                         out[column, row] = now
                     last, before = count - 1 - lag, first - lag - 1
-                    now = now + one[:, before] * two[:, before - d] - one[:, last] * two[:, last - d]
+                    now = (
+                        now + one[:, before] * two[:, before - d] - one[:, last] * two[:, last - d]
+                    )
                     lag += 1
         return out
 
@@ -161,8 +164,5 @@ class PatternEnergy:
     def __call__(self, levels: FloatArray) -> FloatArray:
         """Return SE, shape (G, F, T), for f_D of shape (G, F)."""
         (xx, cross, ss), (x, s) = self._grams, self._rights
-        parts = [
-            self._scan._energy(xx - f * cross + f**2 * ss, x - f * s)  # noqa: SLF001
-            for f in levels.T
-        ]
+        parts = [self._scan._energy(xx - f * cross + f**2 * ss, x - f * s) for f in levels.T]
         return np.stack(parts, axis=1)

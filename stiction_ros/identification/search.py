@@ -12,10 +12,17 @@ import numpy as np
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.friction_grid import coarse_grid, even_grid, finer_grid
+from stiction_ros.identification.friction_grid import (
+    coarse_grid,
+    cross_grid,
+    even_grid,
+    finer_grid,
+    line_grid,
+)
 from stiction_ros.identification.models import (
     Criterion,
     Data,
+    DelayRanges,
     Model,
     scan_criteria,
     scan_valve,
@@ -30,6 +37,9 @@ from stiction_ros.identification.pattern_search import (
 )
 
 STEPS = 50
+LINES = 14
+WORK = 8_000_000
+MOST_POINTS = 9000
 COARSE = 0.05
 APART = 0.03
 FINEST = 0.004
@@ -38,40 +48,63 @@ FIRST_PARENTS = 20
 RIVALS = 2
 PARENTS = 6
 SWEEPS = 5
+ROUNDS = 3
+CROSS = 500
 REJECTED = 4.0
+LEAST_GAIN = 0.5
 
 
-def search_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
-    """Return the best model over the whole triangle of one valve; never worse than ``model``."""
-    best = model
+def first_grid(limit: float, samples: int) -> FloatArray:
+    """Return the grid of the first scan; short records allow more points."""
+    grids = [coarse_grid(limit), even_grid(limit, STEPS)]
+    spare = min(WORK // samples, MOST_POINTS) - len(grids[0]) - len(grids[1])
+    steps = int(spare / (1.5 * LINES))
+    if steps > STEPS:
+        grids.append(line_grid(limit, LINES, steps))
+    return np.vstack(grids)
+
+
+def first_search(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+    """Return the best model over the whole triangle of one valve; never worse than ``model``.
+
+    The scans see the other valves and the noise as ``model`` has them.
+    """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    grid = coarse_grid(limit)
-    fine = np.vstack([grid, even_grid(limit, STEPS)])
+    fine = first_grid(limit, data.y.shape[1])
     one_step = scan_valve(data, model, orders, valve, fine, start, Criterion.ONE_STEP)
     others = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-    scans = [one_step, *scan_criteria(data, model, orders, valve, grid, start, others)]
+    scans = [one_step]
+    scans += scan_criteria(data, model, orders, valve, coarse_grid(limit), start, others)
     rivals = []
     for criterion, scan in zip((Criterion.ONE_STEP, *others), scans, strict=True):
         parents = scan.grid[scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)]
-        rivals.append(descend(data, model, orders, valve, parents, criterion, data.delay, False))
+        rivals.append(descend(data, model, orders, valve, parents, criterion, data.delays, False))
+    best = model
     for rival in sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]:
         if rival.friction[valve, 0] > 0.0:
             closer = comb(data, rival, orders, valve)
             best = min(best, closer, key=lambda candidate: candidate.loss)
-    if best.friction[valve, 0] == 0.0:
-        return best
-    best, _ = refine(data, best, orders, valve, REJECTED)
+    return best
+
+
+def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+    """Improve one valve's friction under the model's own noise until nothing changes."""
+    if model.friction[valve, 0] == 0.0:
+        return model
+    limit = float(data.limit[valve])
+    best, _ = refine(data, model, orders, valve, REJECTED)
     for _ in range(SWEEPS):
-        before = best.loss
+        before, friction = best.loss, best.friction[valve]
+        grid = np.vstack([coarse_grid(limit), cross_grid(friction, limit, CROSS)])
         scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
-        chosen = grid[scan.best(PARENTS - 2, data.min_moves, COARSE * limit)]
-        parents = np.vstack([best.friction[valve], chosen])
-        delay = nearby_delays(data, best, valve)
-        best = descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, delay)
+        chosen = grid[scan.best(PARENTS - 2, data.min_moves, APART * limit)]
+        parents = np.vstack([friction, chosen])
+        ranges = nearby_delays(data, best, valve)
+        best = descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
         best = comb(data, best, orders, valve)
-        best, _ = refine(data, best, orders, valve, REJECTED)
-        if best.loss > before - 1.0:
+        if best.loss > before - LEAST_GAIN:
             break
+        best, _ = refine(data, best, orders, valve, REJECTED)
     return best
 
 
@@ -82,14 +115,14 @@ def descend(
     valve: int,
     parents: FloatArray,
     criterion: Criterion,
-    delay: tuple[int, int],
+    ranges: DelayRanges,
     warm: bool = True,
 ) -> Model:
     """Scan finer and finer round several parents (f_S, f_D); return the better model.
 
     Args:
         parents: shape (G, 2).
-        delay: range of delays scanned.
+        ranges: delays scanned, per output.
         warm: start the exact fit from that of ``model``.
     """
     limit, start = float(data.limit[valve]), float(model.start[valve])
@@ -97,13 +130,13 @@ def descend(
         return model
     patterns = None
     if data.law is HeStiction:
-        patterns = PatternSearch(data, model, orders, valve, delay, criterion=criterion)
+        patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
         parents, _ = best_in_cells(patterns, parents, start)
     step = APART * limit
     while step > FINEST * limit:
         step /= 3.0
         grid = finer_grid(parents, step, limit)
-        scan = scan_valve(data, model, orders, valve, grid, start, criterion, delay)
+        scan = scan_valve(data, model, orders, valve, grid, start, criterion, ranges)
         chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
         if not chosen:
             return model
@@ -123,11 +156,11 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     its neighbours much worse than a wrong pattern further off.
     """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    delay, step = nearby_delays(data, model, valve), COMB * limit
+    ranges, step = nearby_delays(data, model, valve), COMB * limit
     grid, half, best = model.friction[valve][None, :], 15, model
     for _ in range(2):
         grid = finer_grid(grid, step, limit, half)
-        scan = scan_valve(data, model, orders, valve, grid, start, delay=delay)
+        scan = scan_valve(data, model, orders, valve, grid, start, ranges=ranges)
         chosen = scan.best(PARENTS, data.min_moves, 2.0 * step)
         grid, half, step = grid[chosen], 3, step / 3.0
     for index in chosen[:2]:
@@ -137,17 +170,20 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     return best
 
 
-def search(data: Data, model: Model, orders: Orders, sweeps: int = 3) -> Model:
+def search(data: Data, model: Model, orders: Orders) -> Model:
     """Coordinate search over all valves: the best improvement first, until nothing changes."""
-    rivals = [search_valve(data, model, orders, valve) for valve in range(len(data.u))]
-    model = min(rivals, key=lambda candidate: candidate.loss)
+    left = list(range(len(data.u)))
+    while left:
+        rivals = {valve: first_search(data, model, orders, valve) for valve in left}
+        valve = min(left, key=lambda j: rivals[j].loss)
+        model = improve_valve(data, rivals[valve], orders, valve)
+        left.remove(valve)
     if len(data.u) == 1:
         return model
-    for _ in range(sweeps):
+    for _ in range(ROUNDS):
         before = model.loss
-        order = np.argsort([rival.loss for rival in rivals])[::-1]
-        for valve in order:
-            model = search_valve(data, model, orders, int(valve))
-        if model.loss > before - 2.0:
+        for valve in range(len(data.u)):
+            model = improve_valve(data, model, orders, valve)
+        if model.loss > before - LEAST_GAIN:
             break
     return model
