@@ -10,7 +10,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction_parameters import FrictionPair
 
-
 SWARM = 5
 FEW = 20
 

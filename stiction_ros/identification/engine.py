@@ -11,7 +11,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.friction_grid import find_law
-from stiction_ros.identification.intervals import FrictionIntervals, friction_intervals
+from stiction_ros.identification.intervals import friction_intervals
 from stiction_ros.identification.models import (
     Data,
     Model,
@@ -19,7 +19,6 @@ from stiction_ros.identification.models import (
     linear_model,
     refit,
     settle_delays,
-    stem_of,
 )
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders, OutputFit
@@ -145,9 +144,7 @@ def linear_rivals(
     data: Data, model: Model, linear: Model, orders: Orders, valve: int
 ) -> list[Model]:
     """Return models without friction in ``valve``, of three orders, with their own delays."""
-    friction, start, stems = model.friction.copy(), model.start.copy(), model.stems.copy()
-    friction[valve], start[valve], stems[valve] = 0.0, 0.0, data.u[valve]
-    freed = dataclasses.replace(model, friction=friction, start=start, stems=stems)
+    freed = without_friction(data, model, orders, valve)
     rivals = []
     for extra in range(3):
         raised = dataclasses.replace(
@@ -170,44 +167,47 @@ def estimate_valves(
     options: IdentificationOptions,
 ) -> tuple[tuple[ValveEstimate, ...], Model]:
     """Return the estimates and the final model, frictions in the middle of their intervals."""
-    friction, stems = model.friction.copy(), model.stems.copy()
     found = []
     for j in range(len(data.u)):
         intervals = friction_intervals(data, model, orders, j, options.confidence)
+        model = intervals.model
         span = float(np.ptp(data.u[j]))
         figures = evidence(data, model, rivals[j], j, span)
         doubted = figures["delta_bic"] <= options.bic_margin
         static = (0.0, intervals.static[1]) if doubted else intervals.static
         dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
         verdict = judge(figures, static, span, options)
-        friction[j] = intervals.static_estimate, intervals.dynamic_estimate
+        estimate = (intervals.static_estimate, intervals.dynamic_estimate)
         if doubted and (figures["delta_bic"] < 0.0 or verdict is VerdictKind.HEALTHY):
-            friction[j] = 0.0
-        friction[j, 0] = max(friction[j])
-        stems[j] = stem_of(data, j, friction[j], float(model.start[j]))
+            estimate = (0.0, 0.0)
+            model = without_friction(data, model, orders, j)
         figures["deadband_loss"] = intervals.deadband_loss
-        found.append((intervals, static, dynamic, verdict, figures))
-    final = refit(data, dataclasses.replace(model, friction=friction, stems=stems), orders)
-    valves = tuple(
-        _valve(record, data, final, j, *entry, options.law) for j, entry in enumerate(found)
+        found.append((estimate, static, dynamic, verdict, figures))
+    valves = tuple(_valve(record, model, j, *entry, options.law) for j, entry in enumerate(found))
+    return valves, model
+
+
+def without_friction(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+    """Return the model, fitted again, with a valve that follows OP."""
+    friction, start, stems = model.friction.copy(), model.start.copy(), model.stems.copy()
+    friction[valve], start[valve], stems[valve] = 0.0, 0.0, data.u[valve]
+    return refit(
+        data, dataclasses.replace(model, friction=friction, start=start, stems=stems), orders
     )
-    return valves, final
 
 
 def _valve(
     record: Record,
-    data: Data,
     model: Model,
     j: int,
-    intervals: FrictionIntervals,
+    estimate: tuple[float, float],
     static: tuple[float, float],
     dynamic: tuple[float, float],
     verdict: VerdictKind,
     figures: dict[str, float],
     law: str,
 ) -> ValveEstimate:
-    f_s, f_d = (float(value) for value in model.friction[j])
-    start = float(record.op[0, j] + model.start[j])
+    f_s, f_d = estimate
     return ValveEstimate(
         name=record.valves[j],
         verdict=verdict,
@@ -216,8 +216,8 @@ def _valve(
         static_interval=(min(static[0], f_s), max(static[1], f_s)),
         dynamic_friction=f_d,
         dynamic_interval=(min(dynamic[0], f_d), max(dynamic[1], f_d)),
-        jump=0.0 if intervals.deadband_loss < 4.0 else f_s - f_d,
-        stem_start=start,
+        jump=0.0 if figures["deadband_loss"] < 4.0 else f_s - f_d,
+        stem_start=float(record.op[0, j] + model.start[j]),
         moves=int(np.count_nonzero(np.diff(model.stems[j]))),
         evidence=figures,
     )

@@ -23,6 +23,9 @@ from stiction_ros.identification.pattern_search import (
 )
 from stiction_ros.identification.patterns import resting_cells
 
+# f_S, f_D and one more for the choice among very many patterns.
+FREEDOM = 3
+
 Interval = tuple[float, float]
 
 
@@ -35,12 +38,13 @@ class FrictionIntervals:
         dynamic: f_D, %.
         static_estimate: middle of ``static`` if itself not rejected, otherwise the middle of
             the best pattern, %.
-        dynamic_estimate: f_D of the best fit at ``static_estimate``, %.
+        dynamic_estimate: f_D of the best fit, %.
         zero_loss: how much worse f_S = 0 is, in units of −2 log likelihood.
         deadband_loss: how much worse the best f_D = f_S is, same units.
         patterns: number of switching patterns enumerated round the best one; 0 when the
             law has none or the valve does not slip.
         closed: whether that enumeration reached rejected patterns on every side.
+        model: the model with the best pattern.
     """
 
     static: Interval
@@ -51,6 +55,7 @@ class FrictionIntervals:
     deadband_loss: float
     patterns: int
     closed: bool
+    model: Model
 
 
 def friction_intervals(
@@ -58,7 +63,7 @@ def friction_intervals(
 ) -> FrictionIntervals:
     """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
-    threshold = float(chi2.ppf(confidence, 2))
+    threshold = float(chi2.ppf(confidence, FREEDOM))
     near: PatternMap | None = None
     if data.law is HeStiction:
         model, near = refine(data, model, orders, valve, threshold, wander=0)
@@ -87,6 +92,7 @@ def friction_intervals(
         deadband_loss=_deadband_loss(scan) - floor,
         patterns=0 if near is None else len(near.scan.loss),
         closed=near is not None and near.closed,
+        model=model,
     )
 
 
@@ -167,16 +173,14 @@ def _hull(intervals: list[Interval]) -> Interval:
 def _estimate(
     scan: PatternScan, accepted: NDArray[np.intp], static: Interval, limit: float
 ) -> tuple[float, float]:
-    """Return (f_S, f_D): the middle of the interval where a pattern there is accepted."""
+    """Return f_S in the middle of its interval where a pattern there is accepted, and f_D."""
     middle = 0.5 * (static[0] + static[1])
-    best = int(scan.loss.argmin())
-    f_s, f_d = scan.middle(best, limit)
-    order = accepted[np.argsort(scan.loss[accepted], kind="stable")]
-    for index in order:
+    f_s, f_d = scan.middle(int(scan.loss.argmin()), limit)
+    for index in accepted:
         level = float(scan.level[index])
         low, high = scan.static_range(int(index), (level, level))
         if low <= middle <= high:
-            return middle, level
+            return max(middle, f_d), f_d
     return f_s, f_d
 
 

@@ -256,7 +256,8 @@ def ar_fit(w: FloatArray, order: int) -> FloatArray:
 def _normal_equations(problem: _Problem, point: _Point) -> tuple[FloatArray, FloatArray]:
     """Return Gram matrix and gradient over (a, d) with the linear part projected out.
 
-    Kaufman's form of the derivative of the variable projection.
+    Kaufman's form of the derivative of the variable projection. As with the linear columns,
+    the lags of A are replaced by differences; :func:`_descend` turns its steps back.
     """
     orders, p = problem.orders, problem.orders.noise
     count = point.count
@@ -276,6 +277,7 @@ def _normal_equations(problem: _Problem, point: _Point) -> tuple[FloatArray, Flo
     for i in range(1, p + 1):
         jacobian[orders.output + i - 1, :count] = w[p - i : p - i + count]
         jacobian[orders.output + i - 1, count:] = 0.0
+    jacobian[: orders.output] = _difference_table(orders.output) @ jacobian[: orders.output]
     cross = solve_triangular(point.root, point.rows @ jacobian.T, lower=True, check_finite=False)
     return jacobian @ jacobian.T - cross.T @ cross, jacobian @ point.residual
 
@@ -286,7 +288,8 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: 
     Ends when an iteration lowers the criterion by less than ``least_gain``.
     """
     na = problem.orders.output
-    damping = 1e-3
+    table = _difference_table(na)
+    damping = 1e-4
     innovations = point.innovations
     weight = FREE_RUN_WEIGHT * float(innovations @ innovations) / problem.energy
     point = problem.evaluate(point.a, point.noise, weight)
@@ -301,7 +304,7 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: 
             system = gram + damping * np.eye(len(gram))
             step = -np.linalg.solve(system, gradient) / scale
             a = point.a.copy()
-            a[1:] += step[:na]
+            a[1:] += table.T @ step[:na]
             noise = point.noise.copy()
             noise[1:] += step[na:]
             if np.abs(np.roots(a)).max(initial=0.0) < MAX_RADIUS:
@@ -314,7 +317,7 @@ def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: 
             return point
         gain = 1.0 - candidate.energy / point.energy
         point, damping = candidate, max(damping / 10.0, 1e-9)
-        if gain * point.count < least_gain:
+        if gain * point.count < least_gain and damping < 1e-5:
             break
     return point
 

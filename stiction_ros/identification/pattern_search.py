@@ -235,7 +235,7 @@ class PatternSearch:
         jl, jh, sl, sh = rectangles.T
         fits = (jh - jl > smallest) & (sh - sl > smallest) & (sh > jl)
         fits &= jl + sl < 2.0 * self.limit
-        return rectangles[fits]
+        return np.asarray(rectangles[fits])
 
 
 def points_of(friction: FloatArray) -> FloatArray:
@@ -286,7 +286,7 @@ class PatternMap:
 
 def neighbourhood(
     search: PatternSearch, begin: Beginning, friction: FloatArray, threshold: float, most: int
-) -> PatternMap | None:
+) -> PatternMap:
     """Enumerate round (f_S, f_D), outwards until all patterns at the edge are rejected.
 
     Args:
@@ -367,12 +367,13 @@ def refine(
             return model, None
         search = PatternSearch(data, model, orders, valve, ranges, begin)
         reachable = neighbourhood(search, begin, model.friction[valve], threshold, MOST_CELLS)
-        loss = np.where(reachable.scan.moves >= data.min_moves, reachable.scan.loss, np.inf)
+        found = reachable.scan
+        loss = np.where(found.moves >= data.min_moves, found.loss, np.inf)
         best = int(loss.argmin())
         if not np.isfinite(loss[best]):
             break
-        friction, start = plain.realised(reachable.scan, best, begin)
-        rival = with_valve(data, model, orders, valve, friction, start, reachable.scan.delays[best])
+        friction, start = plain.realised(found, best, begin)
+        rival = with_valve(data, model, orders, valve, friction, start, found.delays[best])
         if rival.loss > model.loss - LEAST_GAIN:
             break
         model = rival

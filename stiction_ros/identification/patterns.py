@@ -20,7 +20,6 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 
-
 SWARM = 2
 FEW = 40
 

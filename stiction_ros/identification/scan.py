@@ -120,7 +120,7 @@ class OutputScan:
         vector = right[lag].transpose(2, 0, 1)
         solution = np.linalg.solve(matrix, vector[..., None])[..., 0]
         explained = np.einsum("gti,gti->gt", vector, solution).reshape(size, delays)
-        return np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy)
+        return np.asarray(np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy))
 
     def _products(self, x: FloatArray, s: FloatArray) -> FloatArray:
         """Return sums of x[k − l] s[k − m] over the window, shape (L, L, G), |l − m| < n_b."""
