@@ -134,6 +134,10 @@ class _Problem:
         self.groups = [(j, delay + 1, orders.input) for j, delay in enumerate(delays)]
         self.groups += [(-2, 0, 1), (-1, 0, orders.output)]
         self.size = sum(count for _, _, count in self.groups)
+        # Samples, from `begin` on, at which Σw² is priced: all before the first innovation, as
+        # nothing else holds the initial state there, then every THIN-th.
+        self.priced = np.r_[: orders.noise, orders.noise : len(y) - self.begin : THIN]
+        self.prices = np.sqrt(np.where(self.priced < orders.noise, 1.0, float(THIN)))
 
     def rows(self, x: FloatArray, begin: int) -> FloatArray:
         """Return differences of the lagged signals from sample ``begin`` on; (q, N - begin)."""
@@ -161,23 +165,22 @@ class _Problem:
         """Return the variable-projection solution at (A, D).
 
         Args:
-            weight: price of Σw², on every ``THIN``-th sample; 0 for innovations only.
+            weight: price of Σw²; 0 for innovations only.
         """
         first, begin = self.orders.first, self.begin
-        factor = float(np.sqrt(THIN * weight))
+        prices = np.sqrt(weight) * self.prices
         plain = self.rows(lfilter([1.0], a, self.signals, axis=1), begin)
         rows = self.rows(lfilter(noise, a, self.signals, axis=1), first)
         target = lfilter(noise, [1.0], self.y[begin:])[first - begin :]
         count = len(target)
         if weight > 0.0:
-            thinned = slice(first - begin, None, THIN)
-            rows = np.hstack([rows, factor * plain[:, thinned]])
-            target = np.concatenate([target, factor * self.y[first::THIN]])
+            rows = np.hstack([rows, prices * plain[:, self.priced]])
+            target = np.concatenate([target, prices * self.y[begin + self.priced]])
         theta, root, keep = _least_squares(rows, target)
         if not keep.all():
             rows = rows[keep]
         residual = target - theta[keep] @ rows
-        return _Point(a, noise, theta, rows, root, theta @ plain, residual, count, factor)
+        return _Point(a, noise, theta, rows, root, theta @ plain, residual, count, weight)
 
 
 def _least_squares(
@@ -228,7 +231,7 @@ class _Point:
     free_run: FloatArray
     residual: FloatArray
     count: int
-    factor: float
+    weight: float
 
     @property
     def innovations(self) -> FloatArray:
@@ -268,11 +271,11 @@ def _normal_equations(problem: _Problem, point: _Point) -> tuple[FloatArray, Flo
     for i in range(1, orders.output + 1):
         begin = orders.output + p - i
         jacobian[i - 1, :count] = slope[begin : begin + count]
-    if point.factor > 0.0:
+    if point.weight > 0.0:
         plain = np.concatenate([lead, lfilter([1.0], point.a, point.free_run)])
+        prices = np.sqrt(point.weight) * problem.prices
         for i in range(1, orders.output + 1):
-            begin = orders.output + p - i
-            jacobian[i - 1, count:] = point.factor * plain[begin : begin + count : THIN]
+            jacobian[i - 1, count:] = prices * plain[orders.output - i + problem.priced]
     w = problem.y[problem.begin :] - point.free_run
     for i in range(1, p + 1):
         jacobian[orders.output + i - 1, :count] = w[p - i : p - i + count]
@@ -375,7 +378,7 @@ def _loss(problem: _Problem, point: _Point) -> float:
     """Return n log(Σε²/n) + n κ Σw²/Σy²."""
     innovations = point.innovations
     energy = max(float(innovations @ innovations), 1e-300)
-    w = problem.y[problem.orders.first :] - point.free_run[problem.orders.noise :]
+    w = problem.y[problem.begin :] - point.free_run
     penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
     return point.count * (float(np.log(energy / point.count)) + penalty)
 

@@ -109,7 +109,7 @@ class PatternSearch:
         self.u = data.u[valve]
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.ranges = ranges
+        self.ranges, self.begin = ranges, begin
         self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
 
     def evaluate(self, cells: Cells) -> PatternScan:

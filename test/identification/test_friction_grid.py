@@ -1,51 +1,48 @@
-"""Grids stay inside the triangle; switching bounds keep the pattern."""
+"""Grids stay inside the triangle."""
 
 import numpy as np
-from hypothesis import given, settings
+import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 
+from stiction_ros.effects import FloatArray
 from stiction_ros.identification.friction_grid import (
-    around,
     coarse_grid,
-    find_law,
-    simulate,
-    switching_bounds,
+    cross_grid,
+    even_grid,
+    finer_grid,
+    line_grid,
 )
+
+
+def inside(grid: FloatArray, limit: float) -> bool:
+    static, dynamic = grid.T
+    return bool(
+        (dynamic <= static + 1e-9).all()
+        and (dynamic >= -1e-9).all()
+        and (static <= limit * (1.0 + 1e-9)).all()
+    )
 
 
 @given(limit=st.floats(0.1, 200.0))
-def test_coarse_grid_fills_the_triangle(limit: float) -> None:
-    grid = coarse_grid(limit)
-    assert (grid[:, 1] <= grid[:, 0] + 1e-9).all()
-    assert grid[:, 0].min() > 0.0
-    assert np.isclose(grid[:, 0].max(), limit)
+def test_grids_of_the_whole_triangle_stay_in_it(limit: float) -> None:
+    assert coarse_grid(limit)[:, 0].min() > 0.0
+    assert np.isclose(coarse_grid(limit)[:, 0].max(), limit)
+    for grid in (coarse_grid(limit), even_grid(limit, 20), line_grid(limit, 5, 40)):
+        assert len(grid) > 100
+        assert inside(grid, limit)
 
 
-@given(static=st.floats(0.0, 10.0), dynamic=st.floats(0.0, 10.0), step=st.floats(0.01, 3.0))
-def test_local_grid_stays_in_the_triangle(static: float, dynamic: float, step: float) -> None:
-    grid = around(np.array([[static, min(static, dynamic)]]), step, 10.0)
-    assert (grid[:, 1] <= grid[:, 0]).all()
-    assert (grid[:, 0] <= 10.0).all()
-    assert (grid >= 0.0).all()
+@given(static=st.floats(0.0, 10.0), share=st.floats(0.0, 1.0), step=st.floats(0.01, 3.0))
+def test_grids_round_a_point_stay_in_the_triangle(static: float, share: float, step: float) -> None:
+    point = np.array([static, share * static])
+    assert inside(finer_grid(point[None, :], step, 10.0), 10.0)
+    assert inside(cross_grid(point, 10.0, 50), 10.0)
 
 
-@settings(max_examples=50, deadline=None)
-@given(
-    seed=st.integers(0, 10_000),
-    static=st.floats(0.2, 5.0),
-    share=st.floats(0.0, 1.0),
-    place=st.floats(0.001, 0.999),
-)
-def test_friction_between_the_bounds_moves_the_stem_alike(
-    seed: int, static: float, share: float, place: float
-) -> None:
-    u = np.random.default_rng(seed).standard_normal(200).cumsum()
-    law = find_law("he")
-    grid = np.array([[static, share * static]])
-    start = u[:1]
-    stems = simulate(law, grid, u, start)
-    stayed, slipped = switching_bounds(stems, u, start, grid[:, 0])
-    assert stayed[0] <= static <= slipped[0]
-    top = min(float(slipped[0]), static + 1.0)
-    other = np.array([[float(stayed[0]) + place * (top - float(stayed[0])), grid[0, 1]]])
-    assert (simulate(law, other, u, start) == stems).all()
+def test_finer_grid_is_even_in_jump_and_reverse() -> None:
+    grid = finer_grid(np.array([[5.0, 2.0]]), 0.1, 20.0, half=1)
+    jump, reverse = grid[:, 0] - grid[:, 1], grid[:, 0] + grid[:, 1]
+    assert sorted({round(value, 6) for value in jump}) == pytest.approx([2.9, 3.0, 3.1])
+    assert sorted({round(value, 6) for value in reverse}) == pytest.approx([6.9, 7.0, 7.1])
+    assert len(grid) == 9

@@ -1,0 +1,90 @@
+"""Enumeration is complete, and its best cell is the best of any point nearby."""
+
+import numpy as np
+import pytest
+import simulated_loops as loops
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiction_ros.identification import IdentificationOptions, engine
+from stiction_ros.identification.models import Data, Model, linear_model, with_valve
+from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_search import (
+    PatternSearch,
+    nearby_delays,
+    points_of,
+    refine,
+)
+from stiction_ros.identification.patterns import beginning_of, cells_at
+
+
+@pytest.fixture(scope="module")
+def near_truth() -> tuple[Data, Model, Orders]:
+    """Return Example 1 with a friction a little beside the truth."""
+    record = loops.example1(1, "equation")
+    data = engine.prepare(record, IdentificationOptions(3, 3))
+    orders = engine.window(IdentificationOptions(3, 3), 3, 3)
+    linear = linear_model(data, orders)
+    friction = np.array([5.02, 1.97])
+    return data, with_valve(data, linear, orders, 0, friction, 0.0, np.array([5])), orders
+
+
+def search_of(near_truth: tuple[Data, Model, Orders]) -> PatternSearch:
+    data, model, orders = near_truth
+    level = PatternSearch(data, model, orders, 0, ((5, 5),)).best_level(model.friction[0])
+    begin = beginning_of(data.u[0], level, float(model.friction[0, 0]))
+    return PatternSearch(data, model, orders, 0, ((5, 5),), begin)
+
+
+def test_enumerated_cells_fill_the_rectangle(near_truth: tuple[Data, Model, Orders]) -> None:
+    search = search_of(near_truth)
+    assert search.begin is not None
+    rectangle = np.array([2.95, 3.05, 6.95, 7.05])
+    found = search.enumerate(search.begin, rectangle, 5000)
+    assert found is not None
+    jl, jh, sl, sh = np.clip(found.bounds, rectangle[[0, 0, 2, 2]], rectangle[[1, 1, 3, 3]]).T
+    corners = np.unique(np.round(np.column_stack([jl, jh, sl, sh]), 12), axis=0)
+    area = ((corners[:, 1] - corners[:, 0]) * (corners[:, 3] - corners[:, 2])).sum()
+    assert area == pytest.approx(0.01, rel=1e-6)
+    assert search.enumerate(search.begin, rectangle, 2) is None
+
+
+@settings(max_examples=30, deadline=None)
+@given(jump=st.floats(2.951, 3.049), reverse=st.floats(6.951, 7.049))
+def test_no_point_of_the_rectangle_beats_its_cells(
+    near_truth: tuple[Data, Model, Orders], jump: float, reverse: float
+) -> None:
+    search = search_of(near_truth)
+    assert search.begin is not None
+    found = search.enumerate(search.begin, np.array([2.95, 3.05, 6.95, 7.05]), 5000)
+    assert found is not None
+    cells = cells_at(search.u, search.begin, np.array([[jump, reverse]]))
+    f_d = 0.5 * (reverse - jump)
+    stem = cells.bases - f_d * cells.signs
+    scan = search.scans[0]
+    point = scan.count * float(np.log(scan.energy(stem).min() / scan.count))
+    assert found.loss.min() <= point + 1e-6
+
+
+def test_refinement_ends_at_the_truth(near_truth: tuple[Data, Model, Orders]) -> None:
+    data, model, orders = near_truth
+    better, reachable = refine(data, model, orders, 0, 8.0)
+    assert better.loss < model.loss - 5.0
+    assert better.friction[0] == pytest.approx([5.0, 2.0], abs=0.03)
+    assert reachable is not None
+    assert reachable.closed
+    truth = points_of(np.array([[5.0, 2.0]]))[0]
+    assert (reachable.rectangle[[0, 2]] <= truth).all()
+    assert (reachable.rectangle[[1, 3]] >= truth).all()
+
+
+def test_valve_without_friction_is_left_alone(near_truth: tuple[Data, Model, Orders]) -> None:
+    data, _, orders = near_truth
+    linear = linear_model(data, orders)
+    assert refine(data, linear, orders, 0, 8.0) == (linear, None)
+
+
+def test_nearby_delays_stay_in_the_range(near_truth: tuple[Data, Model, Orders]) -> None:
+    data, model, _ = near_truth
+    assert nearby_delays(data, model, 0) == ((4, 6),)
+    assert nearby_delays(data, model, 0, 20) == ((0, 10),)
