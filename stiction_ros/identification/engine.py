@@ -145,17 +145,15 @@ def linear_rivals(
 ) -> list[Model]:
     """Return models without friction in ``valve``, of three orders, with their own delays."""
     freed = without_friction(data, model, orders, valve)
-    rivals = []
+    rivals = [freed]
     for extra in range(3):
         raised = dataclasses.replace(
             orders, output=orders.output + extra, input=orders.input + extra
         )
-        for delays in {freed.delays, linear.delays}:
-            own = dataclasses.replace(freed, delays=delays)
-            rivals.append(refit(data, own, raised, warm=False))
-    best = min(range(len(rivals)), key=lambda index: rivals[index].bic)
-    raised = rivals[best].fits[0].orders
-    return [*rivals, improve_delays(data, rivals[best], raised)]
+        own = dataclasses.replace(freed, delays=linear.delays)
+        rivals.append(refit(data, own, raised, warm=False))
+    best = min(rivals, key=lambda rival: rival.bic)
+    return [*rivals, improve_delays(data, best, best.fits[0].orders)]
 
 
 def estimate_valves(

@@ -17,14 +17,15 @@ from stiction_ros.identification.pattern_search import (
     PatternMap,
     PatternScan,
     PatternSearch,
+    best_in_cells,
     nearby_delays,
     points_of,
     refine,
 )
-from stiction_ros.identification.patterns import resting_cells
 
 # f_S, f_D and one more for the choice among very many patterns.
 FREEDOM = 3
+FAR = 40
 
 Interval = tuple[float, float]
 
@@ -97,13 +98,13 @@ def friction_intervals(
 
 
 def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
-    """Return the patterns of coarse grids over the whole triangle, with best f_D each."""
-    limit = float(data.limit[valve])
-    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve, 0))
-    grid = np.vstack([coarse_grid(limit), _deadbands(limit)])
-    level = float(data.u[valve, 0] + model.start[valve])
-    cells = resting_cells(search.u, np.full(len(grid), level), points_of(grid))
-    return search.evaluate(cells)
+    """Return the patterns of deadbands and of the best points of a coarse grid."""
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    ranges = nearby_delays(data, model, valve, 0)
+    coarse = scan_valve(data, model, orders, valve, coarse_grid(limit), start, ranges=ranges)
+    chosen = coarse.grid[np.argsort(coarse.loss, kind="stable")[:FAR]]
+    search = PatternSearch(data, model, orders, valve, ranges)
+    return best_in_cells(search, np.vstack([chosen, _deadbands(limit)]), start)[1]
 
 
 def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
@@ -127,7 +128,7 @@ def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> Patter
 
 
 def _deadbands(limit: float) -> FloatArray:
-    values = limit * (np.arange(1, 81) / 80.0) ** 2
+    values = limit * (np.arange(1, 41) / 40.0) ** 2
     return np.column_stack([values, values])
 
 

@@ -252,7 +252,7 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
         zero = np.zeros((m, 2))
         delays = tuple((data.delay[0],) * m for _ in range(p))
         base = Model(zero, np.zeros(m), data.u.copy(), delays, ())
-    model = refit(data, base, orders, warm=False)
+    model = refit(data, _one_step_delays(data, base, orders), orders, warm=False)
     for _ in range(3):
         before = model.loss
         model = improve_delays(data, model, orders)
@@ -261,12 +261,28 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
     return model
 
 
+def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
+    """Return the model with each channel's delay at the least one-step SE, one after another."""
+    low, high = data.delay
+    if low == high:
+        return model
+    delays = [list(row) for row in model.delays]
+    one = np.ones(1)
+    for i, y in enumerate(data.y):
+        for j in range(len(data.u)):
+            others = [k for k in range(len(data.u)) if k != j]
+            lags = tuple(delays[i][k] for k in others)
+            scan = OutputScan(y, model.stems[others], lags, orders, data.delay, one, one)
+            delays[i][j] = low + int(scan.energy(model.stems[j : j + 1])[0].argmin())
+    return dataclasses.replace(model, delays=tuple(map(tuple, delays)))
+
+
 def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
     """Scan all delays of every channel with friction fixed; keep what the exact fit favours."""
     if data.delay[0] == data.delay[1]:
         return model
     for valve in range(len(data.u)):
-        for criterion in (Criterion.ONE_STEP, Criterion.INNOVATIONS):
+        for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
             friction = model.friction[valve][None, :]
             scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
             now = [row[valve] for row in model.delays]

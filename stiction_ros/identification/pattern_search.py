@@ -38,8 +38,8 @@ GROWTHS = 14
 MARGIN = 6.0
 ZOOMS = 16
 ROUNDS = 4
-MOST_LEVELS = 60
-LEAST_GAIN = 0.02
+MOST_LEVELS = 30
+LEAST_GAIN = 0.3
 
 
 @dataclasses.dataclass(frozen=True)

@@ -49,8 +49,8 @@ RIVALS = 2
 PARENTS = 6
 SWEEPS = 5
 ROUNDS = 3
-CROSS = 500
-REJECTED = 4.0
+CROSS = 300
+REJECTED = 1.0
 LEAST_GAIN = 0.5
 
 
@@ -77,7 +77,8 @@ def first_search(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     scans += scan_criteria(data, model, orders, valve, coarse_grid(limit), start, others)
     rivals = []
     for criterion, scan in zip((Criterion.ONE_STEP, *others), scans, strict=True):
-        parents = scan.grid[scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)]
+        count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
+        parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
         rivals.append(descend(data, model, orders, valve, parents, criterion, data.delays, False))
     best = model
     for rival in sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]:
@@ -101,9 +102,9 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
         parents = np.vstack([friction, chosen])
         ranges = nearby_delays(data, best, valve)
         best = descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
-        best = comb(data, best, orders, valve)
         if best.loss > before - LEAST_GAIN:
             break
+        best = comb(data, best, orders, valve)
         best, _ = refine(data, best, orders, valve, REJECTED)
     return best
 
