@@ -144,6 +144,8 @@ def linear_rivals(
     data: Data, model: Model, linear: Model, orders: Orders, valve: int
 ) -> list[Model]:
     """Return models without friction in ``valve``, of three orders, with their own delays."""
+    if model.friction[valve, 0] == 0.0:
+        return [model]
     freed = without_friction(data, model, orders, valve)
     rivals = [freed]
     for extra in range(3):

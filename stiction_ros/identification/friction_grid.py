@@ -60,18 +60,17 @@ def line_grid(limit: float, lines: int, steps: int) -> FloatArray:
     return _rows(jump, reverse, limit)
 
 
-def cross_grid(friction: FloatArray, limit: float, steps: int) -> FloatArray:
-    """Return the lines of the same S and of the same J as (f_S, f_D), limit / steps apart."""
-    jump, reverse = friction[0] - friction[1], friction[0] + friction[1]
+def cross_grid(jumps: FloatArray, reverses: FloatArray, limit: float, steps: int) -> FloatArray:
+    """Return lines of the given J, along S, and of the given S, along J, limit / steps apart."""
     fine = (np.arange(2 * steps) + 0.5) * (limit / steps)
-    jumps = np.concatenate([fine, np.full(len(fine), jump)])
-    reverses = np.concatenate([np.full(len(fine), reverse), fine])
-    return _rows(jumps, reverses, limit)
+    jump = np.concatenate([np.repeat(jumps, len(fine)), np.tile(fine, len(reverses))])
+    reverse = np.concatenate([np.tile(fine, len(jumps)), np.repeat(reverses, len(fine))])
+    return _rows(jump, reverse, limit)
 
 
 def _rows(jump: FloatArray, reverse: FloatArray, limit: float) -> FloatArray:
     """Return rows (f_S, f_D) of the points (J, S) inside the triangle."""
-    inside = (reverse >= jump) & (jump + reverse <= 2.0 * limit)
+    inside = (jump >= 0.0) & (reverse >= jump) & (jump + reverse <= 2.0 * limit)
     return 0.5 * np.column_stack([reverse + jump, reverse - jump])[inside]
 
 

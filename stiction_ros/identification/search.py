@@ -8,6 +8,9 @@ of its neighbourhood (:mod:`.pattern_search`).
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
+
 import numpy as np
 
 from stiction_ros.effects import HeStiction
@@ -24,6 +27,7 @@ from stiction_ros.identification.models import (
     Data,
     DelayRanges,
     Model,
+    ValveScan,
     scan_criteria,
     scan_valve,
     with_valve,
@@ -33,6 +37,7 @@ from stiction_ros.identification.pattern_search import (
     PatternSearch,
     best_in_cells,
     nearby_delays,
+    points_of,
     refine,
 )
 
@@ -49,7 +54,7 @@ RIVALS = 2
 PARENTS = 6
 SWEEPS = 5
 ROUNDS = 3
-CROSS = 300
+CROSS = 200
 REJECTED = 1.0
 LEAST_GAIN = 0.5
 
@@ -64,19 +69,44 @@ def first_grid(limit: float, samples: int) -> FloatArray:
     return np.vstack(grids)
 
 
-def first_search(data: Data, model: Model, orders: Orders, valve: int) -> Model:
-    """Return the best model over the whole triangle of one valve; never worse than ``model``.
+@dataclasses.dataclass(frozen=True)
+class FirstScan:
+    """The whole triangle of one valve under three criteria.
 
-    The scans see the other valves and the noise as ``model`` has them.
+    Attributes:
+        model: the model whose other valves and noise the scans saw.
+        valve: index.
+        scans: by criterion.
     """
+
+    model: Model
+    valve: int
+    scans: Mapping[Criterion, ValveScan]
+
+    @property
+    def gain(self) -> float:
+        """By how much the best friction beats none, in the criterion where it does most."""
+        return max(float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values())
+
+
+def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstScan:
+    """Scan the whole triangle of one valve, its first row without friction."""
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    fine = first_grid(limit, data.y.shape[1])
+    fine = np.vstack([np.zeros((1, 2)), first_grid(limit, data.y.shape[1])])
+    coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
     one_step = scan_valve(data, model, orders, valve, fine, start, Criterion.ONE_STEP)
     others = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-    scans = [one_step]
-    scans += scan_criteria(data, model, orders, valve, coarse_grid(limit), start, others)
+    scans = scan_criteria(data, model, orders, valve, coarse, start, others)
+    return FirstScan(
+        model, valve, {Criterion.ONE_STEP: one_step, **dict(zip(others, scans, strict=True))}
+    )
+
+
+def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
+    """Return the best model over the whole triangle of one valve, never worse than before."""
+    model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
     rivals = []
-    for criterion, scan in zip((Criterion.ONE_STEP, *others), scans, strict=True):
+    for criterion, scan in first.scans.items():
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
         parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
         rivals.append(descend(data, model, orders, valve, parents, criterion, data.delays, False))
@@ -96,7 +126,9 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
     best, _ = refine(data, model, orders, valve, REJECTED)
     for _ in range(SWEEPS):
         before, friction = best.loss, best.friction[valve]
-        grid = np.vstack([coarse_grid(limit), cross_grid(friction, limit, CROSS)])
+        jumps, reverses = neighbouring_lines(data, best, orders, valve)
+        cross = cross_grid(jumps, reverses, limit, CROSS)
+        grid = np.vstack([coarse_grid(limit), cross])
         scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
         chosen = grid[scan.best(PARENTS - 2, data.min_moves, APART * limit)]
         parents = np.vstack([friction, chosen])
@@ -107,6 +139,27 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
         best = comb(data, best, orders, valve)
         best, _ = refine(data, best, orders, valve, REJECTED)
     return best
+
+
+def neighbouring_lines(
+    data: Data, model: Model, orders: Orders, valve: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return J and S of the model and, where the law has cells, just beyond its cell."""
+    friction = model.friction[valve]
+    (jump, reverse), limit = points_of(friction[None, :])[0], float(data.limit[valve])
+    if data.law is not HeStiction:
+        return np.array([jump]), np.array([reverse])
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    _, cells = best_in_cells(search, friction[None, :], float(model.start[valve]))
+    jl, jh, sl, sh = np.clip(cells.bounds[0], 0.0, 2.0 * limit)
+    beyond = [
+        np.clip(0.3 * (high - low), 1e-4 * limit, 3e-3 * limit)
+        for low, high in ((jl, jh), (sl, sh))
+    ]
+    return (
+        np.array([jl - beyond[0], jump, jh + beyond[0]]),
+        np.array([sl - beyond[1], reverse, sh + beyond[1]]),
+    )
 
 
 def descend(
@@ -172,19 +225,21 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
 
 
 def search(data: Data, model: Model, orders: Orders) -> Model:
-    """Coordinate search over all valves: the best improvement first, until nothing changes."""
+    """Coordinate search over all valves: the most promising first, until nothing changes."""
     left = list(range(len(data.u)))
     while left:
-        rivals = {valve: first_search(data, model, orders, valve) for valve in left}
-        valve = min(left, key=lambda j: rivals[j].loss)
-        model = improve_valve(data, rivals[valve], orders, valve)
-        left.remove(valve)
-    if len(data.u) == 1:
+        scans = [first_scan(data, model, orders, valve) for valve in left]
+        first = max(scans, key=lambda scan: scan.gain)
+        model = first_search(data, orders, first)
+        model = improve_valve(data, model, orders, first.valve)
+        left.remove(first.valve)
+    sticky = np.flatnonzero(model.friction[:, 0])
+    if len(sticky) < 2:
         return model
     for _ in range(ROUNDS):
         before = model.loss
-        for valve in range(len(data.u)):
-            model = improve_valve(data, model, orders, valve)
+        for valve in sticky:
+            model = improve_valve(data, model, orders, int(valve))
         if model.loss > before - LEAST_GAIN:
             break
     return model

@@ -37,7 +37,7 @@ def test_grids_of_the_whole_triangle_stay_in_it(limit: float) -> None:
 def test_grids_round_a_point_stay_in_the_triangle(static: float, share: float, step: float) -> None:
     point = np.array([static, share * static])
     assert inside(finer_grid(point[None, :], step, 10.0), 10.0)
-    assert inside(cross_grid(point, 10.0, 50), 10.0)
+    assert inside(cross_grid(point, point + 1.0, 10.0, 50), 10.0)
 
 
 def test_finer_grid_is_even_in_jump_and_reverse() -> None:
