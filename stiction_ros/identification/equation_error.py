@@ -87,6 +87,14 @@ class ArxFit:
         """Modulus of the largest root of A(q); the model is stable below 1."""
         return largest_root(self.a)
 
+    def judged(self, y: FloatArray, stems: FloatArray, orders: ArxOrders) -> ArxFit:
+        """Return the same model with SE and residuals over output y, (N,), and stems, (m, N)."""
+        theta = np.concatenate([self.a, self.b.ravel()])
+        predicted = regressors(y, stems, self.delays, orders) @ theta + self.constant
+        residuals = y[orders.first :] - predicted
+        error = float(residuals @ residuals)
+        return dataclasses.replace(self, squared_error=error, residuals=residuals)
+
     def free_run(self, y: FloatArray, stems: FloatArray, first: int) -> FloatArray:
         """Return the free run from sample ``first`` on, started from the measured past.
 
