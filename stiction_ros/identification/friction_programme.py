@@ -22,16 +22,16 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.equation_error import Delays, largest_root
+from stiction_ros.identification.equation_error import Delays, fit_arx, largest_root
 from stiction_ros.identification.programme_data import Frame, ProgrammeData
 from stiction_ros.identification.programme_terms import Terms
 
 FEASIBILITY = 1e-6
 MAX_ITERATIONS = 60
+RESTART_ITERATIONS = 15
 IPOPT = {
     "print_level": 0,
     "sb": "yes",
-    "max_iter": MAX_ITERATIONS,
     "tol": 1e-5,
     "acceptable_tol": 1e-3,
     "acceptable_iter": 4,
@@ -83,8 +83,10 @@ class FrictionProgramme:
     """Problem (12) for given delays; one solver serves every start and every τ."""
 
     def __init__(self, data: ProgrammeData, delays: Delays) -> None:
-        self.data, self.frame = data, Frame.of(data, delays)
-        self._solver = self._build()
+        self.data, self.delays, self.frame = data, delays, Frame.of(data, delays)
+        self._stems = self._build_stems()
+        self._problem, self._derivatives = self._build()
+        self._solvers: dict[int, Any] = {}
 
     def start(self, friction: FloatArray) -> FloatArray:
         """Return unknowns with these frictions, shape (m, 2), %, and the ARX start (15)."""
@@ -92,16 +94,42 @@ class FrictionProgramme:
         x[: 2 * self.frame.valves] = (friction / self.data.op_span[:, None]).ravel()
         return x
 
+    def fitted(self, friction: FloatArray, smoothing: FloatArray) -> tuple[FloatArray, float]:
+        """Return unknowns with the least-squares coefficients of these frictions, and (12a).
+
+        Args:
+            friction: rows (f_S, f_D), shape (m, 2), %.
+            smoothing: τ of every valve, shape (m,), 1/%.
+        """
+        span, data = self.data.op_span, self.data
+        stems = np.array(self._stems(friction / span[:, None], smoothing * span))
+        x, total = self.start(friction), 0.0
+        for i, (y, row) in enumerate(zip(data.pv, self.delays, strict=True)):
+            fit = fit_arx(y, stems, row, data.orders)
+            theta = np.concatenate([fit.a, fit.b.ravel(), [fit.constant]])
+            place = 2 * self.frame.valves + i * self.frame.width
+            part = np.linalg.solve(self.frame.basis[i], theta - self.frame.theta[i])
+            x[place : place + self.frame.width] = part
+            total += fit.squared_error
+        return x, total / self.frame.outputs
+
     def solve(
-        self, x: FloatArray, smoothing: FloatArray, reach: FloatArray | None = None
+        self,
+        x: FloatArray,
+        smoothing: FloatArray,
+        reach: FloatArray | None = None,
+        iterations: int = MAX_ITERATIONS,
     ) -> Solution:
-        """Run IPOPT once.
+        """Run IPOPT once, then solve the coefficients with the frictions held.
+
+        The last is linear least squares; it completes what an iteration limit cut short.
 
         Args:
             x: start.
             smoothing: τ of every valve, shape (m,), 1/%.
             reach: how far f_S and f_D of each valve may go from the start, shape (m,), %;
                 None for the whole triangle.
+            iterations: limit of IPOPT.
         """
         count = 2 * self.frame.valves
         low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)
@@ -110,30 +138,60 @@ class FrictionProgramme:
             scaled = np.repeat(reach / self.data.op_span, 2)
             low[:count] = np.maximum(low[:count], x[:count] - scaled)
             high[:count] = np.minimum(high[:count], x[:count] + scaled)
-        answer = self._solver(
+        solver = self._solver(iterations)
+        answer = solver(
             x0=x, p=smoothing * self.data.op_span, lbx=low, ubx=high, lbg=0.0, ubg=np.inf
         )
-        stats = self._solver.stats()
+        stats = solver.stats()
         end = np.array(answer["x"]).ravel()
         slack = np.array(answer["g"]).ravel()
         friction = end[:count].reshape(-1, 2) * self.data.op_span[:, None]
+        objective = float(answer["f"]) * self.frame.start_error
+        if np.isfinite(end).all():
+            polished, least = self.fitted(friction, smoothing)
+            if not least >= objective:
+                end, objective = polished, least
         finite = bool(np.isfinite(end).all() and np.isfinite(slack).all())
         return Solution(
             x=end,
             friction=friction,
-            objective=float(answer["f"]) * self.frame.start_error,
+            objective=objective,
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
             feasible=finite and bool(slack.min(initial=0.0) >= -FEASIBILITY),
             stable=finite and max(largest_root(fit.a) for fit in self.frame.models(end)) < 1.0,
         )
 
-    def _build(self) -> Any:
+    def _build_stems(self) -> Any:
+        friction, smoothing = (
+            ca.MX.sym("f", self.frame.valves, 2),
+            ca.MX.sym("tau", self.frame.valves),
+        )
+        rows = [
+            self.data.stems.expression(0, u, ca.vertcat(friction[j, :].T, smoothing[j]))[0]
+            for j, u in enumerate(self.data.op)
+        ]
+        return ca.Function("stems", [friction, smoothing], [ca.vertcat(*rows)])
+
+    def _solver(self, iterations: int) -> Any:
+        if iterations not in self._solvers:
+            options = self._derivatives | {
+                "print_time": False,
+                "no_nlp_grad": True,
+                "calc_f": False,
+                "calc_g": False,
+                "calc_lam_p": False,
+                "ipopt": IPOPT | {"max_iter": iterations},
+            }
+            self._solvers[iterations] = ca.nlpsol("friction", "ipopt", self._problem, options)
+        return self._solvers[iterations]
+
+    def _build(self) -> tuple[dict[str, Any], dict[str, Any]]:
         x, smoothing = ca.MX.sym("x", self.frame.size), ca.MX.sym("tau", self.frame.valves)
         weight, price = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 2 * self.frame.valves)
         terms = [Terms(self.frame, x, smoothing, order) for order in range(3)]
         value, limits = terms[0].objective(), terms[0].constraints()
-        functions = {
+        functions: dict[str, Any] = {
             "grad_f": ca.Function(
                 "grad_f",
                 [x, smoothing],
@@ -156,13 +214,4 @@ class FrictionProgramme:
                 ["triu_hess_gamma_x_x"],
             ),
         }
-        options: dict[str, Any] = functions | {
-            "print_time": False,
-            "no_nlp_grad": True,
-            "calc_f": False,
-            "calc_g": False,
-            "calc_lam_p": False,
-            "ipopt": IPOPT,
-        }
-        problem = {"x": x, "p": smoothing, "f": value, "g": limits}
-        return ca.nlpsol("friction", "ipopt", problem, options)
+        return {"x": x, "p": smoothing, "f": value, "g": limits}, functions

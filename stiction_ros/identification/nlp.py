@@ -26,7 +26,11 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
 from stiction_ros.identification.apparent_stiction import apparent_stiction
 from stiction_ros.identification.equation_error import Delays, evaluate
-from stiction_ros.identification.friction_programme import FrictionProgramme, Solution
+from stiction_ros.identification.friction_programme import (
+    RESTART_ITERATIONS,
+    FrictionProgramme,
+    Solution,
+)
 from stiction_ros.identification.one_step_result import (
     Answer,
     check_record,
@@ -44,6 +48,7 @@ from stiction_ros.records.record import Record
 MAX_CHOICES = 500
 SMOOTHING = 1e4
 ROUGH = (2.8, 4.0)  # τ S_0 of the strongly smoothed stages
+ENDS = 2
 LEVELS = 4
 MAX_ROUNDS = 30
 COMPASS = np.array([[1, 1], [-1, -1], [1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]])
@@ -121,7 +126,7 @@ class _Search:
         if not ends:
             self.progress(1.0)
             return None
-        chosen = self._distinct([min(ends, key=_objective), *roughs])
+        chosen = [*self._distinct(sorted(ends, key=_objective))[:ENDS], *roughs]
         refined = []
         for k, candidate in enumerate(chosen):
             refined.append(self._refine(candidate, self.reach))
@@ -192,7 +197,7 @@ class _Search:
                 and bool(
                     (
                         np.abs(other.solution.friction - candidate.solution.friction).max(axis=1)
-                        < 0.2 * self.reach
+                        < self.reach
                     ).all()
                 )
                 for other in kept
@@ -204,11 +209,12 @@ class _Search:
     def _refine(self, candidate: _Candidate, reach: FloatArray) -> _Candidate:
         """Restart round the candidate as long as that helps, then with half the step."""
         programme = FrictionProgramme(self.data, candidate.delays)
-        best = self._restart(programme, candidate.solution, candidate.solution.x, reach)
+        best = self._restart(programme, candidate.solution.friction, reach)
         level = 0
         for _ in range(MAX_ROUNDS):
             polled = [
-                self._restart(programme, best, x, reach / 2.0) for x in self._around(best.x, reach)
+                self._restart(programme, friction, reach / 2.0)
+                for friction in self._around(best.friction, reach)
             ]
             better = [end for end in polled if end.accepted and not _beats(best, end)]
             if better:
@@ -220,22 +226,23 @@ class _Search:
         return _Candidate(candidate.delays, best)
 
     def _restart(
-        self, programme: FrictionProgramme, origin: Solution, x: FloatArray, reach: FloatArray
+        self, programme: FrictionProgramme, friction: FloatArray, reach: FloatArray
     ) -> Solution:
-        solution = programme.solve(x, self.final, reach)
-        start = Start(StartKind.RESTART, origin.friction)
-        self._note(start, programme.frame.delays, [solution])
+        x = programme.fitted(friction, self.final)[0]
+        solution = programme.solve(x, self.final, reach, RESTART_ITERATIONS)
+        start = Start(StartKind.RESTART, friction)
+        self._note(start, programme.delays, [solution])
         return solution
 
-    def _around(self, x: FloatArray, reach: FloatArray) -> list[FloatArray]:
-        """Return unknowns with one valve's friction moved by ``reach``, within the triangle."""
+    def _around(self, friction: FloatArray, reach: FloatArray) -> list[FloatArray]:
+        """Return frictions with one valve's moved by ``reach``, within the triangle."""
         points = []
-        for j, step in enumerate(reach / self.data.op_span):
+        for j, step in enumerate(reach):
             for direction in COMPASS:
-                moved = x.copy()
-                static, dynamic = moved[2 * j : 2 * j + 2] + step * direction
-                if 0.0 <= dynamic <= static <= self.limits[j] / self.data.op_span[j]:
-                    moved[2 * j : 2 * j + 2] = static, dynamic
+                static, dynamic = friction[j] + step * direction
+                if 0.0 <= dynamic <= static <= self.limits[j]:
+                    moved = friction.copy()
+                    moved[j] = static, dynamic
                     points.append(moved)
         return points
 
@@ -246,34 +253,30 @@ class _Search:
                 continue
             programme = FrictionProgramme(self.data, delays)
             start = Start(StartKind.DELAY, best.solution.friction)
-            solution = programme.solve(
-                programme.start(start.friction), self.final, self.reach / 4.0
-            )
+            x = programme.fitted(start.friction, self.final)[0]
+            solution = programme.solve(x, self.final, self.reach / 4.0)
             self._note(start, delays, [solution])
             if solution.accepted and not _beats(best.solution, solution):
                 best = _Candidate(delays, solution)
         return best
 
     def answer(self, best: _Candidate | None) -> tuple[Answer, float]:
-        """Return the answer and its objective; coefficients solved with frictions held."""
+        """Return the answer and its objective, (12a)."""
         if best is None:
             delays, friction = self.choices[0], np.zeros((len(self.limits), 2))
             found = evaluate(self.record, friction, delays, self.orders)
             reason = "no start ended feasible with a stable process"
             answer = Answer(FitStatus.NO_MODEL, reason, friction, found.fits, found.stems)
             return answer, found.squared_error
-        programme = FrictionProgramme(self.data, best.delays)
-        held = programme.solve(best.solution.x, self.final, np.zeros(len(self.limits)))
-        end = held if held.accepted and not _beats(best.solution, held) else best.solution
-        stems = smoothed_stems(self.record.op, end.friction, self.final)
+        models = FrictionProgramme(self.data, best.delays).frame.models(best.solution.x)
+        friction = best.solution.friction
+        stems = smoothed_stems(self.record.op, friction, self.final)
         fits = tuple(
-            fit.judged(y, stems, self.orders)
-            for fit, y in zip(programme.frame.models(end.x), self.record.pv.T, strict=True)
+            model.judged(y, stems, self.orders)
+            for model, y in zip(models, self.record.pv.T, strict=True)
         )
-        status = FitStatus.OK if end.solved else FitStatus.NOT_CONVERGED
-        reason = "" if end.solved else f"IPOPT ended with {end.status}"
         objective = float(np.mean([fit.squared_error for fit in fits]))
-        return Answer(status, reason, end.friction, fits, stems), objective
+        return Answer(FitStatus.OK, "", friction, fits, stems), objective
 
 
 def final_smoothing(limits: FloatArray) -> FloatArray:
