@@ -1,14 +1,17 @@
 """The paper's method: the nonlinear programme (12) from M starts, for every choice of delays.
 
 1. Every start is solved for every choice of delays. A start on the border is far from the
-   answer and climbs three values of τ, each from the last one's end: two of strong smoothing,
+   answer and climbs four values of τ, each from the last one's end: three of strong smoothing,
    where the criterion has one broad valley, then τ = 10⁴, where the smoothed law is He's. A
    start on the line of the apparent stiction is near and begins at τ = 10⁴.
 2. At τ = 10⁴ the criterion is piecewise constant in f_S, so IPOPT improves f_D and the process
    but leaves f_S nearly where it was. The best ends, the best of the smoothed stages among
-   them, are therefore restarted around themselves, in steps from 0.5 % downwards.
-3. All choices of delays are solved from there, and the best objective wins. The coefficients
-   are solved a last time with frictions held.
+   them, are therefore restarted around themselves, in steps from 0.5 % downwards. Twice the
+   best neighbour at a wide step (2 % and 1 %), or with one valve released, is treated likewise.
+3. All choices of delays are solved from there, and the best objective wins.
+
+After every run of IPOPT the coefficients are solved once more with the frictions held, which
+is linear least squares.
 
 Values of τ between the two kinds are not used: under slow OP a moderately smoothed stem creeps
 instead of jumping, and the criterion has spurious minima.
@@ -47,9 +50,10 @@ from stiction_ros.records.record import Record
 
 MAX_CHOICES = 500
 SMOOTHING = 1e4
-ROUGH = (2.8, 4.0)  # τ S_0 of the strongly smoothed stages
+ROUGH = (2.8, 4.0, 8.0)  # τ S_0 of the strongly smoothed stages
 ENDS = 2
 LEVELS = 4
+HOPS = (4.0, 2.0)  # in units of the reach
 MAX_ROUNDS = 30
 COMPASS = np.array([[1, 1], [-1, -1], [1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]])
 Progress = Callable[[float], None]
@@ -130,8 +134,11 @@ class _Search:
         refined = []
         for k, candidate in enumerate(chosen):
             refined.append(self._refine(candidate, self.reach))
-            self.progress(0.6 + 0.3 * (k + 1) / len(chosen))
+            self.progress(0.6 + 0.25 * (k + 1) / len(chosen))
         best = min([*ends, *(end for end in refined if end.solution.accepted)], key=_objective)
+        for hop in HOPS:
+            best = self._hop(best, hop * self.reach)
+        self.progress(0.95)
         for _ in range(2):
             other = self._other_delays(best)
             if other.delays == best.delays:
@@ -210,7 +217,7 @@ class _Search:
         """Restart round the candidate as long as that helps, then with half the step."""
         programme = FrictionProgramme(self.data, candidate.delays)
         best = self._restart(programme, candidate.solution.friction, reach)
-        level = 0
+        finest = self.reach * 0.5**LEVELS
         for _ in range(MAX_ROUNDS):
             polled = [
                 self._restart(programme, friction, reach / 2.0)
@@ -220,10 +227,30 @@ class _Search:
             if better:
                 best = min(better, key=lambda end: end.objective)
                 continue
-            level, reach = level + 1, reach / 2.0
-            if level == LEVELS:
+            reach = reach / 2.0
+            if (reach <= finest).all():
                 break
         return _Candidate(candidate.delays, best)
+
+    def _hop(self, best: _Candidate, step: FloatArray) -> _Candidate:
+        """Try the best neighbour at a wide step, or with one valve released, itself refined."""
+        programme = FrictionProgramme(self.data, best.delays)
+        friction = best.solution.friction
+        released = [
+            np.where(np.arange(len(friction))[:, None] == j, 0.0, friction)
+            for j in range(len(friction))
+            if friction[j].max() > step[j]
+        ]
+        polled = [
+            self._restart(programme, point, self.reach)
+            for point in [*self._around(friction, step), *released]
+        ]
+        accepted = [end for end in polled if end.accepted]
+        if not accepted:
+            return best
+        nearest = min(accepted, key=lambda end: end.objective)
+        other = self._refine(_Candidate(best.delays, nearest), self.reach)
+        return best if _beats(best.solution, other.solution) else other
 
     def _restart(
         self, programme: FrictionProgramme, friction: FloatArray, reach: FloatArray
