@@ -6,8 +6,8 @@
    start on the line of the apparent stiction is near and begins at τ = 10⁴.
 2. At τ = 10⁴ the criterion is piecewise constant in f_S, so IPOPT improves f_D and the process
    but leaves f_S nearly where it was. The best ends, the best of the smoothed stages among
-   them, are therefore restarted around themselves, in steps from 0.5 % downwards. Twice the
-   best neighbour at a wide step (2 % and 1 %), or with one valve released, is treated likewise.
+   them, are therefore restarted around themselves, in steps from 0.5 % downwards. Then the
+   best neighbours at wide steps (4, 2 and 1 %), or with one valve released, are treated likewise.
 3. All choices of delays are solved from there, and the best objective wins.
 
 After every run of IPOPT the coefficients are solved once more with the frictions held, which
@@ -53,7 +53,8 @@ SMOOTHING = 1e4
 ROUGH = (2.8, 4.0, 8.0)  # τ S_0 of the strongly smoothed stages
 ENDS = 2
 LEVELS = 4
-HOPS = (4.0, 2.0)  # in units of the reach
+HOPS = (8.0, 4.0, 2.0)  # in units of the reach
+HOP_ENDS = 2
 MAX_ROUNDS = 30
 COMPASS = np.array([[1, 1], [-1, -1], [1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]])
 Progress = Callable[[float], None]
@@ -219,10 +220,7 @@ class _Search:
         best = self._restart(programme, candidate.solution.friction, reach)
         finest = self.reach * 0.5**LEVELS
         for _ in range(MAX_ROUNDS):
-            polled = [
-                self._restart(programme, friction, reach / 2.0)
-                for friction in self._around(best.friction, reach)
-            ]
+            polled = self._poll(programme, self._around(best.friction, reach), reach / 2.0)
             better = [end for end in polled if end.accepted and not _beats(best, end)]
             if better:
                 best = min(better, key=lambda end: end.objective)
@@ -233,7 +231,7 @@ class _Search:
         return _Candidate(candidate.delays, best)
 
     def _hop(self, best: _Candidate, step: FloatArray) -> _Candidate:
-        """Try the best neighbour at a wide step, or with one valve released, itself refined."""
+        """Refine the best neighbours at a wide step, those with one valve released included."""
         programme = FrictionProgramme(self.data, best.delays)
         friction = best.solution.friction
         released = [
@@ -241,16 +239,21 @@ class _Search:
             for j in range(len(friction))
             if friction[j].max() > step[j]
         ]
-        polled = [
-            self._restart(programme, point, self.reach)
-            for point in [*self._around(friction, step), *released]
-        ]
-        accepted = [end for end in polled if end.accepted]
-        if not accepted:
-            return best
-        nearest = min(accepted, key=lambda end: end.objective)
-        other = self._refine(_Candidate(best.delays, nearest), self.reach)
-        return best if _beats(best.solution, other.solution) else other
+        polled = self._poll(programme, [*self._around(friction, step), *released], self.reach)
+        ends = [_Candidate(best.delays, end) for end in polled if end.accepted]
+        for other in self._distinct(sorted(ends, key=_objective))[:HOP_ENDS]:
+            refined = self._refine(other, self.reach)
+            if not _beats(best.solution, refined.solution):
+                best = refined
+        return best
+
+    def _poll(
+        self, programme: FrictionProgramme, points: Sequence[FloatArray], reach: FloatArray
+    ) -> list[Solution]:
+        """Solve from the more promising half of ``points``, judged by their own (12a)."""
+        errors = [programme.fitted(point, self.final)[1] for point in points]
+        order = np.argsort(errors, kind="stable")[: (len(points) + 1) // 2]
+        return [self._restart(programme, points[index], reach) for index in order]
 
     def _restart(
         self, programme: FrictionProgramme, friction: FloatArray, reach: FloatArray
