@@ -136,9 +136,10 @@ class ApparentStiction:
 def apparent_stiction(record: Record) -> tuple[ApparentStiction, ...]:
     """Return the apparent stiction of every valve of a record.
 
-    PV(OP) over a whole record with set-point moves is no ellipse. So the whole record and
-    ``WINDOWS`` equal parts of it are tried with every output, and the ellipse of least misfit
-    is taken; parts in which OP spans less than half of the middle part are left out.
+    A set-point move draws a wide path that is not the cycle. So ``WINDOWS`` equal parts of the
+    record are tried with every output, those in which OP spans between half of and the whole
+    of what it spans in the middle part, and the ellipse of least misfit is taken. Where there
+    is none the whole record is tried.
     """
     return tuple(_of_valve(record, j) for j in range(len(record.valves)))
 
@@ -148,16 +149,15 @@ def _of_valve(record: Record, valve: int) -> ApparentStiction:
     edges = np.linspace(0, count, WINDOWS + 1).astype(int).tolist()
     windows = list(itertools.pairwise(edges))
     spans = [float(np.ptp(u[a:b])) if b > a else 0.0 for a, b in windows]
-    smallest = 0.5 * float(np.median(spans))
-    windows = [w for w, span in zip(windows, spans, strict=True) if span >= smallest]
-    tried = [
-        ApparentStiction(
-            record.valves[valve],
-            output,
-            (a, b),
-            fit_ellipse(u[a:b], record.pv[a:b, i]),
-        )
-        for a, b in [*windows, (0, count)]
-        for i, output in enumerate(record.outputs)
-    ]
+    middle = float(np.median(spans))
+    quiet = [w for w, span in zip(windows, spans, strict=True) if 0.5 * middle <= span <= middle]
+    tried = [_pair(record, valve, i, rows) for rows in quiet for i in range(len(record.outputs))]
+    if not any(found.ellipse.found for found in tried):
+        tried = [_pair(record, valve, i, (0, count)) for i in range(len(record.outputs))]
     return min(tried, key=lambda found: (not found.ellipse.found, found.ellipse.misfit))
+
+
+def _pair(record: Record, valve: int, output: int, rows: tuple[int, int]) -> ApparentStiction:
+    part = slice(*rows)
+    ellipse = fit_ellipse(record.op[part, valve], record.pv[part, output])
+    return ApparentStiction(record.valves[valve], record.outputs[output], rows, ellipse)
