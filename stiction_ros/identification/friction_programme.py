@@ -8,9 +8,9 @@ r"""The paper's nonlinear programme (12) for one choice of delays.
 with the stem of the smoothed law (12b) and the ARX prediction (12c). Single shooting: the
 unknowns are 2m frictions and, per output, n_a + m n_b coefficients and a constant.
 
-All data are scaled: OP by its span, PV by its standard deviation, the objective by its value
-at the ARX start (15)-(16), and the coefficients by the triangular factor of the regressors at
-that start, so that the Hessian in them begins as the identity. The Hessian is exact.
+OP is scaled by its span, the objective by its value at the ARX start (15)-(16), and the
+coefficients by the triangular factor of the regressors at that start, so that the Hessian in
+them begins near a multiple of the identity. The Hessian is exact.
 """
 
 from __future__ import annotations

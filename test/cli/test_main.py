@@ -64,7 +64,7 @@ def test_identify_by_the_paper_s_methods(
     found = json.loads(capsys.readouterr().out)
     assert found["model"]["method"] == method[0]
     assert found["model"]["search"]["squared_error"] > 0.0
-    assert found["valves"][0]["f_s"] == pytest.approx(4.0, abs=0.2)
+    assert found["valves"][0]["f_s"] == pytest.approx(4.0, abs=0.5)
 
 
 @pytest.mark.parametrize("option", [["--starts", "3"], ["--method", "nlp", "--grid-step", "1"]])

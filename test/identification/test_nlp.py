@@ -7,7 +7,6 @@ import simulated_loops as loops
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.identification import (
     FitStatus,
@@ -24,40 +23,32 @@ from stiction_ros.identification.programme_terms import ALPHA, Terms
 from stiction_ros.identification.starts import StartKind, border, draw_starts, stiction_line
 from stiction_ros.records.record import Record
 
-
-def excited(samples: int = 400) -> Record:
-    """A first-order process behind a valve with f_S = 4, f_D = 1 under a slow sine of OP."""
-    time = np.arange(samples)
-    op = 50.0 + 8.0 * np.sin(time / 17.0) + 4.0 * np.sin(time / 41.0)
-    stem = HeStiction(4.0, 1.0).simulate(op, float(op[0]))
-    pv = np.zeros(samples)
-    noise = 0.02 * np.random.default_rng(3).standard_normal(samples)
-    for k in range(2, samples):
-        pv[k] = 0.8 * pv[k - 1] + 0.2 * (stem[k - 2] - 50.0) + noise[k]
-    return Record("excited", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
+OPTIONS = IdentificationOptions(method="nlp", output_order=3, input_order=3, delay=(5, 5), starts=2)
 
 
-OPTIONS = IdentificationOptions(method="nlp", output_order=1, input_order=1, delay=(1, 1), starts=2)
+def short() -> Record:
+    """Example 1 for 450 samples: f_S = 5, f_D = 2, delay 5."""
+    return loops.example1(0, "equation", samples=450)
 
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    return identify(excited(), OPTIONS)
+    return identify(short(), OPTIONS)
 
 
 def test_it_finds_the_friction(found: Identification) -> None:
     valve = found.valves[0]
     assert found.status is FitStatus.OK
-    assert valve.static_friction == pytest.approx(4.0, abs=0.15)
-    assert valve.dynamic_friction == pytest.approx(1.0, abs=0.1)
-    assert found.outputs[0].a == pytest.approx((-0.8,), abs=0.02)
-    assert found.outputs[0].fit_free_run > 95.0
+    assert valve.static_friction == pytest.approx(5.0, abs=0.15)
+    assert valve.dynamic_friction == pytest.approx(2.0, abs=0.15)
+    assert found.outputs[0].a == pytest.approx(loops.A, abs=0.1)
+    assert found.outputs[0].fit_free_run > 80.0
 
 
 def test_it_claims_no_evidence(found: Identification) -> None:
     valve = found.valves[0]
     assert valve.verdict is VerdictKind.UNDECIDED
-    assert valve.static_interval == (0.0, pytest.approx(np.ptp(excited().op)))
+    assert valve.static_interval == (0.0, pytest.approx(np.ptp(short().op)))
     assert any("no interval and no verdict" in note for note in found.notes)
 
 
@@ -66,12 +57,12 @@ def test_squared_error_is_that_of_he_s_law(found: Identification) -> None:
     assert log is not None
     friction = np.array([[valve.static_friction, valve.dynamic_friction]])
     orders = ArxOrders(log.output_order, log.input_order, log.first)
-    assert log.squared_error == squared_error(excited(), friction, ((1,),), orders)
+    assert log.squared_error == squared_error(short(), friction, ((5,),), orders)
     assert log.objective == pytest.approx(log.squared_error, rel=0.05)
 
 
 def test_every_accepted_end_keeps_the_constraints(found: Identification) -> None:
-    record = excited()
+    record = short()
     assert found.search is not None
     ends = [start for start in found.search.starts if start.accepted]
     assert {start.kind for start in ends} >= {"border", "restart"}
@@ -90,7 +81,7 @@ def test_the_best_accepted_end_wins(found: Identification) -> None:
 
 
 def test_the_same_record_gives_the_same_result(found: Identification) -> None:
-    again = identify(excited(), OPTIONS)
+    again = identify(short(), OPTIONS)
     assert (again.valves, again.outputs, again.search) == (
         found.valves,
         found.outputs,
