@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.search_log import SearchLog
 
 
 class VerdictKind(enum.StrEnum):
@@ -127,6 +128,7 @@ class Identification:
         valves, outputs: estimates in the order of the record.
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
+        search: what the search tried and its squared error; None where a method keeps none.
     """
 
     status: FitStatus
@@ -139,20 +141,24 @@ class Identification:
     outputs: tuple[OutputModel, ...]
     stem: FloatArray
     notes: tuple[str, ...] = ()
+    search: SearchLog | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
+        model: dict[str, Any] = {
+            "kind": "arx",
+            "status": self.status.value,
+            "reason": self.reason,
+            "method": self.method,
+            "notes": list(self.notes),
+        }
+        if self.search is not None:
+            model["search"] = self.search.to_json()
         return {
             "samples": self.samples,
             "sample_time": self.sample_time,
             "seconds": self.seconds,
-            "model": {
-                "kind": "arx",
-                "status": self.status.value,
-                "reason": self.reason,
-                "method": self.method,
-                "notes": list(self.notes),
-            },
+            "model": model,
             "valves": [valve.to_json() for valve in self.valves],
             "outputs": [output.to_json() for output in self.outputs],
         }
