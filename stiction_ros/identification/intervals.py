@@ -46,6 +46,7 @@ class FrictionIntervals:
             law has none or the valve does not slip.
         closed: whether that enumeration reached rejected patterns on every side.
         model: the model with the best pattern.
+        profile: rows (f_S, least loss above the best) over all patterns tried, %.
     """
 
     static: Interval
@@ -57,6 +58,7 @@ class FrictionIntervals:
     patterns: int
     closed: bool
     model: Model
+    profile: tuple[tuple[float, float], ...]
 
 
 def friction_intervals(
@@ -94,6 +96,7 @@ def friction_intervals(
         patterns=0 if near is None else len(near.scan.loss),
         closed=near is not None and near.closed,
         model=model,
+        profile=_profile(scan, floor, limit),
     )
 
 
@@ -164,11 +167,27 @@ def _accepted_ranges(
     """Return the f_S and the f_D of one pattern whose loss stays below ``highest``."""
     dynamic = scan.accepted_dynamic(index, highest - float(scan.loss[index]))
     low, high = scan.static_range(index, dynamic)
-    return (min(low, limit), min(high, limit)), dynamic
+    return (float(min(low, limit)), float(min(high, limit))), dynamic
 
 
 def _hull(intervals: list[Interval]) -> Interval:
     return min(low for low, _ in intervals), max(high for _, high in intervals)
+
+
+def _profile(scan: PatternScan, floor: float, limit: float) -> tuple[tuple[float, float], ...]:
+    """Return the lower envelope of the loss over f_S, finest where it is lowest."""
+    static = np.array([scan.middle(index, limit)[0] for index in range(len(scan.loss))])
+    best = static[int(scan.loss.argmin())]
+    step = limit * np.array([0.0, *np.geomspace(1e-4, 1.0, 25)])
+    edges = np.unique(np.concatenate([best - step, best + step]))
+    bins = np.searchsorted(edges, static)
+    rows = []
+    for number in np.unique(bins):
+        inside = np.flatnonzero((bins == number) & np.isfinite(scan.loss))
+        if len(inside):
+            lowest = inside[int(scan.loss[inside].argmin())]
+            rows.append((float(static[lowest]), float(scan.loss[lowest] - floor)))
+    return tuple(rows)
 
 
 def _estimate(
@@ -181,8 +200,8 @@ def _estimate(
         level = float(scan.level[index])
         low, high = scan.static_range(int(index), (level, level))
         if low <= middle <= high:
-            return max(middle, f_d), f_d
-    return f_s, f_d
+            return float(max(middle, f_d)), f_d
+    return float(f_s), f_d
 
 
 def _deadband_loss(scan: PatternScan) -> float:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from stiction_ros.errors import InputError
 from stiction_ros.identification import engine, grid_search, nlp
+from stiction_ros.identification.input_checks import swapped_columns
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import Identification
 from stiction_ros.records.record import Record
@@ -38,7 +40,14 @@ def identify(
 
     Raises:
         InputError: a record that no model can be fitted to, or an option that the method
-            does not have.
+            does not have, or OP and PV that are clearly swapped.
     """
     options = options or IdentificationOptions()
+    evidence = swapped_columns(record) if options.check_columns else None
+    if evidence is not None:
+        raise InputError(
+            f"OP and PV look swapped: {evidence.reason}",
+            where=record.name,
+            fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
+        )
     return METHODS[options.method](record, options, progress)

@@ -33,6 +33,9 @@ class IdentificationOptions:
         grid_step: step of f_S and of f_D, % (method ``grid``).
         grid_law: stem of the grid, ``he_smoothed`` as published or ``he``.
 
+        one_step_best: also find the friction and delays of least one-step SE (exact, He's law).
+        check_columns: refuse a record in which OP and PV are clearly swapped.
+
     Raises:
         InputError: a value out of range.
     """
@@ -52,6 +55,8 @@ class IdentificationOptions:
     starts: int = 7
     grid_step: float = 0.5
     grid_law: str = "he_smoothed"
+    one_step_best: bool = True
+    check_columns: bool = True
 
     def __post_init__(self) -> None:
         for key, known in (("method", METHOD_NAMES), ("grid_law", GRID_LAWS)):

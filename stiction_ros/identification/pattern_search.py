@@ -109,7 +109,7 @@ class PatternSearch:
         self.u = data.u[valve]
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.ranges, self.begin = ranges, begin
+        self.ranges, self.begin, self.criterion = ranges, begin, criterion
         self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
 
     def evaluate(self, cells: Cells) -> PatternScan:
@@ -203,7 +203,7 @@ class PatternSearch:
         for scan, energy, delay in zip(self.scans, energies, self.ranges, strict=True):
             values = energy(levels)
             delays.append(values.argmin(axis=2) + delay[0])
-            loss += scan.count * np.log(values.min(axis=2) / scan.count)
+            loss += self.criterion.loss(values.min(axis=2), scan.count)
         return loss, np.stack(delays, axis=2)
 
     def enumerate(self, begin: Beginning, rectangle: FloatArray, most: int) -> PatternScan | None:

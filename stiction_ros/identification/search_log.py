@@ -58,7 +58,9 @@ class SearchLog:
         output_order, input_order, first: n_a, n_b and ε of both.
         points: grid points or starts that were worked through.
         delays_tried: number of choices of delays.
-        starts: every start of the nonlinear programme, in order; empty for the grid.
+        starts: every start of the nonlinear programme, in order; empty for the others.
+        friction, delays: what ``squared_error`` belongs to where that is not the answer of the
+            method: (f_S, f_D) per valve, %, and the t_d of each valve per output.
     """
 
     squared_error: float
@@ -69,6 +71,8 @@ class SearchLog:
     points: int
     delays_tried: int
     starts: tuple[SolvedStart, ...] = ()
+    friction: tuple[tuple[float, float], ...] = ()
+    delays: Delays = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values."""
