@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.intervals import friction_intervals
+from stiction_ros.identification.long_records import carried_over, liveliest_part
 from stiction_ros.identification.models import (
     Data,
     Model,
@@ -60,9 +61,15 @@ def identify(
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    orders, linear, outcome, table = choose(data, options)
+    part = liveliest_part(data)
+    orders, linear, outcome, table = choose(part, options)
+    model = outcome.model
+    report(0.4)
+    if part is not data:
+        linear = linear_model(data, orders)
+        model = carried_over(data, linear, model, orders)
     report(0.5)
-    model, delays = settle_delays(data, outcome.model, orders)
+    model, delays = settle_delays(data, model, orders)
     rivals = [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))]
     report(0.7)
     valves, model = estimate_valves(record, data, model, orders, rivals, options)

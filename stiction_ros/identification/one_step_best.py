@@ -24,6 +24,8 @@ from stiction_ros.identification.friction_grid import finer_grid
 from stiction_ros.identification.models import Criterion, Data, Model, scan_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
+    CELL_SAMPLES,
+    SAMPLES,
     PatternScan,
     PatternSearch,
     neighbourhood,
@@ -33,7 +35,7 @@ from stiction_ros.identification.search import zoom
 from stiction_ros.identification.search_log import SearchLog
 from stiction_ros.records.record import Record
 
-COMB, HALF = 0.0016, 14
+COMB, HALF, SHORT = 0.0016, 14, 5
 BEST = 5
 POLISHED = 3
 MOST_CELLS = 1500
@@ -102,17 +104,19 @@ class _Search:
         """Return the best point over one valve's friction and delays, the others fixed."""
         limit = float(self.data.limit[valve])
         u = self.data.u[valve]
+        step = COMB * limit * min(1.0, SAMPLES / len(u))
+        half = HALF if len(u) <= SAMPLES else SHORT
         stems = simulate_stems(self.record.op, best.friction)
         stems = stems - self.record.op.mean(axis=0)[:, None]
         model = Model(best.friction, np.zeros(len(stems)), stems, best.delays, ())
         rows = best.friction[valve][None, :]
         criterion, ranges = Criterion.SQUARED_ERROR, self.data.delays
         if best.friction[valve, 0] > 0.0:
-            grid = finer_grid(rows, COMB * limit, limit, HALF)
+            grid = finer_grid(rows, step, limit, half)
             scan = scan_valve(self.data, model, self.orders, valve, grid, 0.0, criterion, ranges)
             self.points += len(grid)
-            rows = np.vstack([rows, grid[scan.best(BEST, 0, 2.0 * COMB * limit)]])
-            rows = finer_grid(rows, COMB / 3.0 * limit, limit, 2)
+            rows = np.vstack([rows, grid[scan.best(BEST, 0, 2.0 * step)]])
+            rows = finer_grid(rows, step / 3.0, limit, 2)
         else:
             rows, _ = zoom(self.data, model, self.orders, valve, _small(limit), criterion, ranges)
         free = best.friction.copy()
@@ -122,7 +126,7 @@ class _Search:
             return best
         scan = scan_valve(self.data, model, self.orders, valve, rows, 0.0, criterion, ranges)
         self.points += len(rows)
-        for index in scan.best(2, 0, 2.0 * COMB * limit):
+        for index in scan.best(2, 0, 2.0 * step):
             friction = scan.grid[index]
             for begin in _beginnings(u, friction, 0.003 * limit):
                 best = self._in_cells(best, model, valve, friction, begin)
@@ -133,6 +137,7 @@ class _Search:
     ) -> _Point:
         """Return the best point of the switching patterns round ``friction``."""
         u = self.data.u[valve]
+        most = min(MOST_CELLS, int(0.5 * CELL_SAMPLES / len(u)))
         if begin.first == len(u):
             return best
         search = PatternSearch(
@@ -143,7 +148,7 @@ class _Search:
             self.data.delays,
             criterion=Criterion.SQUARED_ERROR,
         )
-        scan = neighbourhood(search, begin, friction, 0.0, MOST_CELLS).scan
+        scan = neighbourhood(search, begin, friction, 0.0, most).scan
         self.points += len(scan.loss)
         error = np.abs(u[: begin.first + 1] - u[0])
         band = (float(error[:-1].max(initial=0.0)), float(error[-1]))

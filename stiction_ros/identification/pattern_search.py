@@ -34,6 +34,9 @@ from stiction_ros.identification.scan import PatternEnergy
 
 BLOCK = 1_500_000
 MOST_CELLS = 3000
+CELL_SAMPLES = 3e7
+SAMPLES = 6000  # up to which neighbourhoods are of full size
+REJECTED = 1.0
 GROWTHS = 14
 MARGIN = 6.0
 ZOOMS = 16
@@ -295,7 +298,7 @@ def neighbourhood(
     """
     centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
     scan = search.evaluate(cells_at(search.u, begin, centre[None, :]))
-    reach = 0.002 * search.limit
+    reach = 0.002 * search.limit * min(1.0, SAMPLES / len(search.u))
     rectangle = np.array(
         [centre[0] - reach, centre[0] + reach, centre[1] - reach, centre[1] + reach]
     )
@@ -328,7 +331,7 @@ def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: fl
         & (accepted[:, 3] > sl)
     )
     accepted = accepted[meets]
-    wide, high = max(0.3 * (jh - jl), 1e-4 * limit), max(0.3 * (sh - sl), 1e-4 * limit)
+    wide, high = max(0.3 * (jh - jl), 1e-6 * limit), max(0.3 * (sh - sl), 1e-6 * limit)
     out = rectangle.copy()
     if len(accepted):
         lowest, highest = accepted.min(axis=0), accepted.max(axis=0)
@@ -366,7 +369,8 @@ def refine(
         if begin.first == len(plain.u):
             return model, None
         search = PatternSearch(data, model, orders, valve, ranges, begin)
-        reachable = neighbourhood(search, begin, model.friction[valve], threshold, MOST_CELLS)
+        most = min(MOST_CELLS, int(CELL_SAMPLES / len(plain.u)))
+        reachable = neighbourhood(search, begin, model.friction[valve], threshold, most)
         found = reachable.scan
         loss = np.where(found.moves >= data.min_moves, found.loss, np.inf)
         best = int(loss.argmin())

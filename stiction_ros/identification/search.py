@@ -34,6 +34,8 @@ from stiction_ros.identification.models import (
 )
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
+    REJECTED,
+    SAMPLES,
     PatternSearch,
     best_in_cells,
     nearby_delays,
@@ -55,7 +57,6 @@ PARENTS = 6
 SWEEPS = 5
 ROUNDS = 3
 CROSS = 200
-REJECTED = 1.0
 LEAST_GAIN = 0.5
 ALIKE = 0.9
 EQUAL = 10.0
@@ -235,7 +236,8 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     its neighbours much worse than a wrong pattern further off.
     """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    ranges, step = nearby_delays(data, model, valve), COMB * limit
+    ranges = nearby_delays(data, model, valve)
+    step = COMB * limit * min(1.0, SAMPLES / data.u.shape[1])
     grid, half, best = model.friction[valve][None, :], 15, model
     for _ in range(2):
         grid = finer_grid(grid, step, limit, half)
