@@ -38,6 +38,7 @@ from stiction_ros.records.record import Record
 COMB, HALF, SHORT = 0.0016, 14, 5
 BEST = 5
 POLISHED = 3
+NEAR = 1e-4  # relative error of the search's SE, by its ridge
 MOST_CELLS = 1500
 SWEEPS = 2
 
@@ -93,12 +94,16 @@ class _Search:
         flat = np.zeros((len(data.u), 2))
         level = self.point(flat, tuple((data.delay[0],) * len(data.u) for _ in y)).error
         # In these units SE is near the number of samples, as −2 log likelihood would be.
-        scale = np.sqrt(max(level, 1e-300) * len(y) / (len(y[0]) * len(y)))
-        self.data = dataclasses.replace(data, y=y / scale)
+        self.unit = float(np.sqrt(max(level, 1e-300) / len(y[0])))
+        self.data = dataclasses.replace(data, y=y / self.unit)
 
     def point(self, friction: FloatArray, delays: Delays) -> _Point:
         """Return SE at given frictions and delays."""
         return _Point(friction, delays, squared_error(self.record, friction, delays, self.arx))
+
+    def _scaled(self, loss: float) -> float:
+        """Return (12a) in the record's units from SE in those of the search."""
+        return loss * self.unit**2 / len(self.data.y)
 
     def improved(self, best: _Point, valve: int) -> _Point:
         """Return the best point over one valve's friction and delays, the others fixed."""
@@ -126,34 +131,34 @@ class _Search:
             return best
         scan = scan_valve(self.data, model, self.orders, valve, rows, 0.0, criterion, ranges)
         self.points += len(rows)
+        search = PatternSearch(self.data, model, self.orders, valve, ranges, criterion=criterion)
         for index in scan.best(2, 0, 2.0 * step):
             friction = scan.grid[index]
             for begin in _beginnings(u, friction, 0.003 * limit):
-                best = self._in_cells(best, model, valve, friction, begin)
+                best = self._in_cells(best, search, valve, friction, begin)
         return best
 
     def _in_cells(
-        self, best: _Point, model: Model, valve: int, friction: FloatArray, begin: Beginning
+        self,
+        best: _Point,
+        search: PatternSearch,
+        valve: int,
+        friction: FloatArray,
+        begin: Beginning,
     ) -> _Point:
         """Return the best point of the switching patterns round ``friction``."""
-        u = self.data.u[valve]
-        most = min(MOST_CELLS, int(0.5 * CELL_SAMPLES / len(u)))
+        u = search.u
         if begin.first == len(u):
             return best
-        search = PatternSearch(
-            self.data,
-            model,
-            self.orders,
-            valve,
-            self.data.delays,
-            criterion=Criterion.SQUARED_ERROR,
-        )
+        most = min(MOST_CELLS, int(0.5 * CELL_SAMPLES / len(u)))
         scan = neighbourhood(search, begin, friction, 0.0, most).scan
         self.points += len(scan.loss)
         error = np.abs(u[: begin.first + 1] - u[0])
         band = (float(error[:-1].max(initial=0.0)), float(error[-1]))
         polished = 0
         for index in np.argsort(scan.loss, kind="stable"):
+            if self._scaled(float(scan.loss[index])) > best.error * (1.0 + NEAR):
+                break
             delays = tuple(
                 tuple(int(scan.delays[index, i]) if j == valve else d for j, d in enumerate(row))
                 for i, row in enumerate(best.delays)
