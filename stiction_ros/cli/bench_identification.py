@@ -52,6 +52,7 @@ class Plan:
         duels: examples on which the methods meet.
         lengths: samples N of growing records, increasing.
         valves: numbers m of valves of growing loops, the first 1.
+        loop_samples: N of the growing loops.
         delay: range of delays tried in Example 1 and in its long records; None leaves the
             example's own.
         longest: records above this are left out, samples.
@@ -65,6 +66,7 @@ class Plan:
     duels: tuple[Duel, ...]
     lengths: tuple[int, ...]
     valves: tuple[int, ...] = (1, 2, 3)
+    loop_samples: int = 1500
     delay: tuple[int, int] | None = None
     longest: int = 100_000
     repeat: int = 3
@@ -222,7 +224,7 @@ def grow_valves(plan: Plan, begin: Callable[[str], Progress]) -> list[Row]:
     """Return the rows of loops of more and more valves, with as many outputs."""
     rows: list[Row] = []
     for count in plan.valves:
-        example = coupled_loop(plan.seed, count)
+        example = coupled_loop(plan.seed, count, plan.loop_samples)
         exact = timed(example, example.options, plan.repeat, begin(f"m = {count}: exact"))
         base = rows[0].subject_ms if rows else exact.median
         true = ", ".join(

@@ -22,17 +22,18 @@ from stiction_ros.examples import Example, example1
 
 TINY = Plan(
     duels=(Duel(lambda seed: short_example1(seed), "Example 1", 1, 4.0, 0.5),),
-    lengths=(500, 1000, 2000),
+    lengths=(400, 800, 2000),
     valves=(1, 2),
-    delay=(5, 6),
-    longest=1000,
-    repeat=2,
+    loop_samples=300,
+    delay=(5, 5),
+    longest=800,
+    repeat=1,
 )
 KEYS = {"case", "subject", "baseline", "subject_ms", "baseline_ms", "p99_ms", "ratio", "note"}
 
 
 def short_example1(seed: int) -> Example:
-    return example1(seed, samples=800)
+    return example1(seed, samples=300)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +60,7 @@ def test_the_document_is_the_contract_s(document: dict[str, Any]) -> None:
 
 def test_every_comparison_has_its_row(document: dict[str, Any]) -> None:
     cases = [row["case"].split(",")[0] for row in document["rows"]]
-    wanted = ["Example 1", "Example 1", "N = 500", "N = 1000", "m = 1", "m = 2"]
+    wanted = ["Example 1", "Example 1", "N = 400", "N = 800", "m = 1", "m = 2"]
     assert cases == wanted
 
 
@@ -126,7 +127,7 @@ def test_the_other_benchmark_refuses_these_options(capsys: pytest.CaptureFixture
 
 def test_the_bar_runs_from_start_to_end() -> None:
     shares: list[float] = []
-    plan = Plan(duels=(), lengths=(500,), valves=(1,), delay=(5, 5), longest=500, repeat=1)
+    plan = Plan(duels=(), lengths=(300,), valves=(), delay=(5, 5), longest=300, repeat=2)
     identification(plan, lambda share, text: shares.append(share))
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
