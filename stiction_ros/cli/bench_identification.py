@@ -206,6 +206,7 @@ def extrapolated(time: float, coarse: int, fine: int) -> float:
 def grow_samples(plan: Plan, lengths: Sequence[int], begin: Callable[[str], Progress]) -> list[Row]:
     """Return the rows of longer and longer heads of one record of Example 1's loop."""
     example = _narrowed(example1(plan.seed, samples=lengths[-1]), plan.delay)
+    low, high = example.options.delay
     rows: list[Row] = []
     for count in lengths:
         part = dataclasses.replace(example, record=example.record.part(0, count))
@@ -215,8 +216,9 @@ def grow_samples(plan: Plan, lengths: Sequence[int], begin: Callable[[str], Prog
         left = [n for n in plan.lengths if n > count]
         if count == lengths[-1] and left:
             note += f"; N = {', '.join(map(str, left))} left out"
-        names = (EXACT, f"time at N = {lengths[0]}, in proportion to N")
-        rows.append(row(f"N = {count}", names, exact.times, [base * count / lengths[0]], note))
+        names = (EXACT, f"N = {lengths[0]}, scaled")
+        case = f"N = {count}, delay {low} to {high}"
+        rows.append(row(case, names, exact.times, [base * count / lengths[0]], note))
     return rows
 
 
@@ -231,10 +233,10 @@ def grow_valves(plan: Plan, begin: Callable[[str], Progress]) -> list[Row]:
             "{} {:g}/{:g}".format(tag, *example.friction(tag)) for tag in example.record.valves
         )
         note = (
-            f"{count} outputs, {count**2} channels, N = {len(example.record)}; "
+            f"p = {count}, N = {len(example.record)}, delays sought: {count**2}; "
             f"{exact.median / 1e3:.3g} s ({exact.runs}); {_friction(exact.found)} (true {true})"
         )
-        names = (EXACT, "time at m = 1, times m")
+        names = (EXACT, "m = 1, scaled")
         rows.append(row(f"m = {count}", names, exact.times, [base * count], note))
     return rows
 
