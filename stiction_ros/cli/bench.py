@@ -4,42 +4,21 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
+import os
 import platform
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import bench_graph, bench_identification
+from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
-from stiction_ros.cli.node_processes import NodeProcesses, require_ros, ros_environment
 from stiction_ros.cli.progress import Bar, bar
-from stiction_ros.cli.scenarios import find, node_parameters
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag_messages import read_raw
 
-ECHOES = 2000
-SAMPLES = 1500
-
-
-@dataclasses.dataclass(frozen=True)
-class Row:
-    """One comparison; times are medians in ms, ``ratio`` = baseline / subject."""
-
-    case: str
-    subject: str
-    baseline: str
-    subject_ms: float
-    baseline_ms: float
-    p99_ms: float
-    ratio: float
-    note: str
+COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
 
 def add(commands: Any) -> None:
@@ -53,6 +32,23 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "name", nargs="?", default="graph", choices=tuple(BENCHMARKS), help="default: graph"
     )
+    group = parser.add_argument_group("identification")
+    group.add_argument(
+        "--repeat",
+        type=int,
+        metavar="N",
+        help="runs of the exact search; nlp and grid run once (3)",
+    )
+    group.add_argument("--seed", type=int, metavar="N", help="of the simulated records (7)")
+    group.add_argument(
+        "--longest", type=int, metavar="N", help="longest record of growing N (100000)"
+    )
+    group.add_argument(
+        "--quick",
+        action="store_true",
+        default=None,
+        help="fewer delays, one start, coarser grids, records up to 10000 samples",
+    )
     parser.add_argument("--json", metavar="F", help="write the rows as JSON; - for stdout")
     parser.set_defaults(run=run)
 
@@ -60,112 +56,74 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     with bar(f"bench {options.name}") as show:
-        rows = BENCHMARKS[options.name](show)
-    document = {
-        "name": options.name,
-        "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
-        "rows": [dataclasses.asdict(row) for row in rows],
-    }
+        rows = BENCHMARKS[options.name](options, show)
     if options.json is not None:
+        document = {
+            "name": options.name,
+            "machine": machine(),
+            "rows": [dataclasses.asdict(row) for row in rows],
+        }
         write_json(options.json, document)
     if options.json != "-":
-        table = Table()
-        for name in ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject"):
-            table.add_column(name)
-        for row in rows:
-            table.add_row(
-                row.case,
-                row.subject,
-                f"{row.subject_ms:.3f}",
-                f"{row.p99_ms:.3f}",
-                row.baseline,
-                f"{row.baseline_ms:.3f}",
-                f"{row.ratio:.3f}",
-            )
-        Console().print(table)
-        for row in rows:
-            Console().print(f"{row.case}: {row.note}")
+        _print(rows)
     return 0
 
 
-def graph(show: Bar) -> list[Row]:
-    """One lockstep sample with recording, against a bare echo of the same message.
-
-    The echo is measured before and after; its median is over both.
-    """
-    require_ros()
-    rows = []
-    for name in ("siso", "tank"):
-        first = _echo(name)
-        cycle = _lockstep(name, {"mode": "unaware"}, show)
-        second = _echo(name)
-        echo = np.concatenate([first, second])
-        fitted = _lockstep(name, {}, show)
-        note = f"{np.median(cycle) / np.median(echo):.2f} echoes per sample"
-        rows.append(_row(f"{name}, fits off", cycle, echo, note))
-        share = f"{fitted.mean():.2f} ms per sample on average, waits for fits included"
-        note = f"{np.median(fitted) / np.median(echo):.2f} echoes per sample; {share}"
-        rows.append(_row(f"{name}, fits on", fitted, echo, note))
-    return rows
-
-
-def _row(case: str, subject: Any, baseline: Any, note: str) -> Row:
-    middle, base = float(np.median(subject)), float(np.median(baseline))
-    return Row(
-        case,
-        "lockstep sample, recorded",
-        "echo between two processes",
-        middle,
-        base,
-        float(np.percentile(subject, 99)),
-        base / middle,
-        note,
+def machine() -> str:
+    """Return where the figures come from, in one line."""
+    threads = os.environ.get("OMP_NUM_THREADS", "all")
+    return (
+        f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, "
+        f"Python {platform.python_version()}, OMP_NUM_THREADS={threads}"
     )
 
 
-def _lockstep(name: str, controller: Mapping[str, Any], show: Bar) -> Any:
-    """Return ms per sample of a recorded lockstep run."""
-    with tempfile.TemporaryDirectory() as folder:
-        directory = Path(folder)
-        nodes = node_parameters(find(name), directory)
-        nodes["controller"].update(controller)
-        if controller:
-            nodes.pop("estimator")
-            nodes["plant"]["samples"] = SAMPLES
-            for node in nodes.values():
-                node["wait_for"] = [w for w in node.get("wait_for", []) if w != "estimator"]
-        processes = NodeProcesses(nodes, directory)
-        try:
-            processes.start()
-            processes.wait(show)
-        finally:
-            processes.stop()
-        processes.check()
-        bag = directory / "bag"
-        sent = [m.publish_time for m in read_raw(bag) if m.topic.name == "/pv"]
-    return np.diff(np.array(sent[len(sent) // 20 :])) / 1e6
+def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
+    for key in ("repeat", "seed", "longest", "quick"):
+        if getattr(options, key) is not None:
+            raise InputError(
+                "benchmark graph has no such option",
+                where=f"--{key}",
+                fix="leave it out, or measure identification",
+            )
+    return bench_graph.graph(show)
 
 
-def _echo(name: str) -> Any:
-    """Return round-trip times, ms, of the scenario's pv message between two processes."""
-    names = {"siso": "PV1", "tank": "C,T"}[name]
-    environment = ros_environment()
-    base = [sys.executable, "-P", "-m", "stiction_ros.nodes.echo"]
-    mirror = subprocess.Popen([*base, "mirror"], env=environment)
-    try:
-        done = subprocess.run(
-            [*base, "time", names, str(ECHOES)],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=120,
+def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
+    plan = bench_identification.QUICK if options.quick else bench_identification.FULL
+    chosen = {
+        key: value
+        for key in ("repeat", "seed", "longest")
+        if (value := getattr(options, key)) is not None
+    }
+    return bench_identification.identification(dataclasses.replace(plan, **chosen), show)
+
+
+def _print(rows: Sequence[Row]) -> None:
+    table = Table()
+    for name in COLUMNS:
+        table.add_column(name)
+    for row in rows:
+        table.add_row(
+            row.case,
+            row.subject,
+            _number(row.subject_ms),
+            _number(row.p99_ms),
+            row.baseline,
+            _number(row.baseline_ms),
+            _number(row.ratio),
         )
-    finally:
-        mirror.terminate()
-        mirror.wait()
-    if done.returncode != 0:
-        raise InputError(f"the echo failed: {done.stderr.strip()[-300:]}", where="bench graph")
-    return np.array(json.loads(done.stdout))
+    console = Console()
+    console.print(table)
+    for row in rows:
+        console.print(f"{row.case}, {row.subject} against {row.baseline}: {row.note}")
 
 
-BENCHMARKS: dict[str, Callable[[Bar], list[Row]]] = {"graph": graph}
+def _number(value: float) -> str:
+    return f"{value:.3f}" if value < 100.0 else f"{value:.0f}"
+
+
+BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
+    "graph": _graph,
+    "identification": _identification,
+}

@@ -1,8 +1,9 @@
-"""Loops whose truth is known: the paper's two examples and loops without friction."""
+"""Loops whose truth is known: the paper's two, a coupled one, and loops without friction."""
 
 from __future__ import annotations
 
 from stiction_ros.examples.comparison import Comparison, compare
+from stiction_ros.examples.coupled import coupled_loop
 from stiction_ros.examples.example import Example
 from stiction_ros.examples.healthy import FAMILIES, healthy_loop
 from stiction_ros.examples.paper import NOISES, PLANTS, example1, example2
@@ -16,6 +17,7 @@ __all__ = [
     "Example",
     "Finding",
     "compare",
+    "coupled_loop",
     "example1",
     "example2",
     "healthy_loop",

@@ -16,8 +16,8 @@ class Example:
     """A simulated record, the loop behind it, and how it is to be identified.
 
     Attributes:
-        name: ``example1``, ``example2`` or ``healthy``.
-        variant: where the noise enters, which plant, or which family.
+        name: ``example1``, ``example2``, ``coupled`` or ``healthy``.
+        variant: where the noise enters, which plant, how many valves, or which family.
         seed: of the noise, and of the whole loop in a family.
         record: OP, PV, SP and the true stem positions.
         truth: the simulated loop; all its frictions follow He's law.

@@ -19,7 +19,7 @@ EXAMPLE1_SAMPLES = 2500
 EXAMPLE2_SAMPLES = 620
 
 
-def example1(seed: int, noise: str = "measurement") -> Example:
+def example1(seed: int, noise: str = "measurement", samples: int = EXAMPLE1_SAMPLES) -> Example:
     """Return Example 1: process (18), He's valve with f_S = 5 and f_D = 2, 2500 samples of 1 s.
 
     The stiction-unaware MPC (19) controls; the set-point moves every 250 s, as the cycle
@@ -28,6 +28,7 @@ def example1(seed: int, noise: str = "measurement") -> Example:
     Args:
         seed: of the white noise, σ = 0.01.
         noise: ``measurement`` adds it to PV as in (2), ``equation`` is v of (9).
+        samples: N; a longer record repeats the set-points every 2500 s.
 
     Raises:
         InputError: unknown ``noise``.
@@ -38,8 +39,9 @@ def example1(seed: int, noise: str = "measurement") -> Example:
     document["process"]["outputs"][0]["noise"]["enters"] = noise
     plant = LoopModel.from_mapping(document)
     schedule = SetPoints.load(find_config("example1.set_points.yaml"), plant.outputs)
+    schedule = dataclasses.replace(schedule, repeat=EXAMPLE1_SAMPLES * plant.sample_time)
     scenario = dataclasses.replace(scenario, plant=plant, set_points=schedule)
-    record = _record(scenario, seed, EXAMPLE1_SAMPLES)
+    record = _record(scenario, seed, samples)
     options = IdentificationOptions(output_order=3, input_order=3, delay=(0, 10))
     return Example("example1", noise, seed, record, plant, options)
 

@@ -34,6 +34,14 @@ def test_example1_has_the_printed_length_and_orders(first: Example) -> None:
     assert first.delay("PV1", "V1") == 5
 
 
+def test_a_longer_example1_goes_on_with_the_same_set_points(first: Example) -> None:
+    longer = example1(3, first.variant, samples=2600).record
+    assert first.record.sp is not None
+    assert longer.sp is not None
+    assert np.array_equal(longer.pv[:2500], first.record.pv)
+    assert np.array_equal(longer.sp[2500:], first.record.sp[:100])
+
+
 def test_example1_is_the_same_for_the_same_seed(first: Example) -> None:
     again, other = (example1(seed, first.variant) for seed in (3, 4))
     assert np.array_equal(again.record.pv, first.record.pv)

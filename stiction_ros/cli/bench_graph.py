@@ -1,0 +1,90 @@
+"""``stiction bench graph``: a lockstep sample of the nodes against a bare echo."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.cli.bench_row import Row, row
+from stiction_ros.cli.node_processes import NodeProcesses, require_ros, ros_environment
+from stiction_ros.cli.progress import Bar
+from stiction_ros.cli.scenarios import find, node_parameters
+from stiction_ros.errors import InputError
+from stiction_ros.records.bag_messages import read_raw
+
+ECHOES = 2000
+SAMPLES = 1500
+NAMES = ("lockstep sample, recorded", "echo between two processes")
+
+
+def graph(show: Bar) -> list[Row]:
+    """One lockstep sample with recording, against a bare echo of the same message.
+
+    The echo is measured before and after; its median is over both.
+    """
+    require_ros()
+    rows = []
+    for name in ("siso", "tank"):
+        first = _echo(name)
+        cycle = _lockstep(name, {"mode": "unaware"}, show)
+        second = _echo(name)
+        echo = np.concatenate([first, second])
+        fitted = _lockstep(name, {}, show)
+        note = f"{np.median(cycle) / np.median(echo):.2f} echoes per sample"
+        rows.append(row(f"{name}, fits off", NAMES, cycle, echo, note))
+        share = f"{fitted.mean():.2f} ms per sample on average, waits for fits included"
+        note = f"{np.median(fitted) / np.median(echo):.2f} echoes per sample; {share}"
+        rows.append(row(f"{name}, fits on", NAMES, fitted, echo, note))
+    return rows
+
+
+def _lockstep(name: str, controller: Mapping[str, Any], show: Bar) -> Any:
+    """Return ms per sample of a recorded lockstep run."""
+    with tempfile.TemporaryDirectory() as folder:
+        directory = Path(folder)
+        nodes = node_parameters(find(name), directory)
+        nodes["controller"].update(controller)
+        if controller:
+            nodes.pop("estimator")
+            nodes["plant"]["samples"] = SAMPLES
+            for node in nodes.values():
+                node["wait_for"] = [w for w in node.get("wait_for", []) if w != "estimator"]
+        processes = NodeProcesses(nodes, directory)
+        try:
+            processes.start()
+            processes.wait(show)
+        finally:
+            processes.stop()
+        processes.check()
+        bag = directory / "bag"
+        sent = [m.publish_time for m in read_raw(bag) if m.topic.name == "/pv"]
+    return np.diff(np.array(sent[len(sent) // 20 :])) / 1e6
+
+
+def _echo(name: str) -> Any:
+    """Return round-trip times, ms, of the scenario's pv message between two processes."""
+    names = {"siso": "PV1", "tank": "C,T"}[name]
+    environment = ros_environment()
+    base = [sys.executable, "-P", "-m", "stiction_ros.nodes.echo"]
+    mirror = subprocess.Popen([*base, "mirror"], env=environment)
+    try:
+        done = subprocess.run(
+            [*base, "time", names, str(ECHOES)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+    finally:
+        mirror.terminate()
+        mirror.wait()
+    if done.returncode != 0:
+        raise InputError(f"the echo failed: {done.stderr.strip()[-300:]}", where="bench graph")
+    return np.array(json.loads(done.stdout))
