@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
@@ -22,6 +21,7 @@ from stiction_ros.identification.pattern_search import (
     points_of,
     refine,
 )
+from stiction_ros.identification.patterns import has_cells
 
 # f_S, f_D and one more for the choice among very many patterns.
 FREEDOM = 3
@@ -66,7 +66,7 @@ def friction_intervals(
     limit = float(data.limit[valve])
     threshold = float(chi2.ppf(confidence, FREEDOM))
     near: PatternMap | None = None
-    if data.law is HeStiction:
+    if has_cells(data.law):
         model, near = refine(data, model, orders, valve, threshold, wander=0)
         scan = _far_patterns(data, model, orders, valve)
         if near is not None:

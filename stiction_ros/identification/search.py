@@ -13,7 +13,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import (
     coarse_grid,
@@ -40,6 +39,7 @@ from stiction_ros.identification.pattern_search import (
     points_of,
     refine,
 )
+from stiction_ros.identification.patterns import has_cells
 
 STEPS = 50
 LINES = 14
@@ -147,7 +147,7 @@ def neighbouring_lines(
     """Return J and S of the model and, where the law has cells, just beyond its cell."""
     friction = model.friction[valve]
     (jump, reverse), limit = points_of(friction[None, :])[0], float(data.limit[valve])
-    if data.law is not HeStiction:
+    if not has_cells(data.law):
         return np.array([jump]), np.array([reverse])
     search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
     _, cells = best_in_cells(search, friction[None, :], float(model.start[valve]))
@@ -183,7 +183,7 @@ def descend(
     if not len(parents):
         return model
     patterns = None
-    if data.law is HeStiction:
+    if has_cells(data.law):
         patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
         parents, _ = best_in_cells(patterns, parents, start)
     step = APART * limit
