@@ -126,7 +126,7 @@ class PatternSearch:
     def _evaluate(self, cells: Cells) -> PatternScan:
         dynamic = cells.dynamic
         dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
-        level, curvature, loss, delays = self._minimised(cells.bases, cells.signs, dynamic)
+        level, curvature, loss, delays = self.minimised(cells.bases, cells.signs, dynamic)
         moves = (np.diff(cells.bases, axis=1) != 0.0).sum(axis=1).astype(float)
         return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
 
@@ -139,7 +139,7 @@ class PatternSearch:
         cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)
         before = cells.signs == 0.0
         bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
-        level, _, loss, _ = self._minimised(bases, -before.astype(float), ranges)
+        level, _, loss, _ = self.minimised(bases, -before.astype(float), ranges)
         best = int(loss.argmin())
         inside = 1e-9 * (ranges[best, 1] - ranges[best, 0])
         return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
@@ -159,7 +159,7 @@ class PatternSearch:
         before = cells.signs == 0.0
         bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
         around = begin.level + 0.1 * self.limit * np.array([[-1.0, 1.0]])
-        level = float(self._minimised(bases, -before.astype(float), around)[0][0])
+        level = float(self.minimised(bases, -before.astype(float), around)[0][0])
         least, most = first_slip_range(self.u, level, begin, self.law)
         if max(low, least) < min(high, most):
             static = 0.5 * (max(low, least) + min(high, most))
@@ -168,7 +168,7 @@ class PatternSearch:
             level = self.best_level(np.array([static, f_d]))
         return np.array([static, f_d]), level - float(self.u[0])
 
-    def _minimised(
+    def minimised(
         self, bases: FloatArray, signs: FloatArray, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Minimise over the level x in base − x · sign, per pattern inside its range.
