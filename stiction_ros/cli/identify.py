@@ -14,7 +14,8 @@ from rich.table import Table
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
-from stiction_ros.identification import Identification, IdentificationOptions, identify
+from stiction_ros.identification import METHODS, Identification, IdentificationOptions, identify
+from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.csv_file import CsvColumns
 from stiction_ros.records.open_record import open_record
 
@@ -34,9 +35,20 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
     )
-    parser.add_argument("--law", default="he", help="friction law (default: he)")
     parser.add_argument(
-        "--method", default="exact", choices=("exact",), help="search (default: exact)"
+        "--law",
+        default="he",
+        metavar="LAW",
+        help=f"friction law of method exact: {' | '.join(LAWS)} (default: he)",
+    )
+    parser.add_argument(
+        "--method", default="exact", choices=tuple(METHODS), help="search (default: exact)"
+    )
+    parser.add_argument(
+        "--starts", type=int, metavar="M", help="first guesses of method nlp (default: 7)"
+    )
+    parser.add_argument(
+        "--grid-step", type=float, metavar="S", help="step of method grid in %% (default: 0.5)"
     )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument("--out", metavar="DIR", help="write report.html and figures there")
@@ -82,7 +94,12 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     record = open_record(options.record, columns(options))
     settings = IdentificationOptions(
-        output_order=options.na, input_order=options.nb, delay=options.delay, law=options.law
+        method=options.method,
+        output_order=options.na,
+        input_order=options.nb,
+        delay=options.delay,
+        law=options.law,
+        **method_options(options),
     )
     with bar("identifying") as show:
         found = identify(record, settings, progress=show)
@@ -102,6 +119,26 @@ def run(options: argparse.Namespace) -> int:
         page = report_record(record, found, directory)
         print(f"report: {page}", file=sys.stderr)
     return 0
+
+
+def method_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of one method alone, refused with any other method."""
+    chosen: dict[str, Any] = {}
+    for key, option, method in (
+        ("starts", "--starts", "nlp"),
+        ("grid_step", "--grid-step", "grid"),
+    ):
+        value = getattr(options, key)
+        if value is None:
+            continue
+        if options.method != method:
+            raise InputError(
+                f"method {options.method} has no such option",
+                where=option,
+                fix=f"add --method {method}",
+            )
+        chosen[key] = value
+    return chosen
 
 
 def _print(document: Mapping[str, Any], found: Identification) -> None:

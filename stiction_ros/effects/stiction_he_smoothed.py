@@ -39,9 +39,26 @@ class SmoothedHeStiction(HeStiction):
         return self._next(memory, value, casadi.tanh)
 
     def _next(self, stem: Any, value: Any, tanh: Any) -> Any:
-        error = value - stem
-        above = tanh(self.smoothing * (error + self.static_friction))
-        below = tanh(self.smoothing * (-error + self.static_friction))
-        stays = 0.5 * above + 0.5 * below
-        direction = -0.5 * above + 0.5 * below
-        return stays * stem + (1.0 - stays) * value + direction * self.dynamic_friction
+        frictions = self.static_friction, self.dynamic_friction
+        return smoothed_step(stem, value, frictions, self.smoothing, tanh)
+
+
+def smoothed_step(
+    stem: Any, value: Any, frictions: tuple[Any, Any], smoothing: Any, tanh: Any
+) -> Any:
+    """Return the next stem position by (5) and (6).
+
+    Args:
+        stem: χ_{k−1}, %.
+        value: OP u_k, %.
+        frictions: f_S and f_D, %.
+        smoothing: τ, 1/%.
+        tanh: of numbers or of CasADi expressions, as the other arguments are.
+    """
+    static, dynamic = frictions
+    error = value - stem
+    above = tanh(smoothing * (error + static))
+    below = tanh(smoothing * (-error + static))
+    stays = 0.5 * above + 0.5 * below
+    direction = -0.5 * above + 0.5 * below
+    return stays * stem + (1.0 - stays) * value + direction * dynamic

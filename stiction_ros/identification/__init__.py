@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stiction_ros.identification.engine import identify
+from stiction_ros.identification.methods import METHODS, identify
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import (
     FitStatus,
@@ -13,6 +13,7 @@ from stiction_ros.identification.results import (
 )
 
 __all__ = [
+    "METHODS",
     "FitStatus",
     "Identification",
     "IdentificationOptions",

@@ -52,6 +52,7 @@ DECADES = 1.5
 APART, LONG = 0.3, 0.15
 BROKEN = 1.6
 ALL_DELAYS = 2.0
+NEARBY, NEARBY_DECADES = 3000, 6.0
 
 
 @dataclasses.dataclass
@@ -118,7 +119,9 @@ def _grown(data: Data, model: Model, orders: Orders, valve: int, first: int) -> 
             swarm.scan = _judged(window, best, orders, valve, swarm.rows, ranges)
         for _ in range(ROUNDS):
             best = _fitted(window, best, orders, valve, swarm)
-            rows = np.vstack([swarm.rows, _children(swarm, limit, generator)])
+            off = _offsets(len(swarm.rows) * CHILDREN, swarm.width, generator)
+            rows = np.repeat(swarm.rows, CHILDREN, axis=0) + limit * off
+            rows = np.vstack([swarm.rows, _in_triangle(rows, limit)])
             scan = _judged(window, best, orders, valve, rows, ranges)
             swarm = _thinned(rows, scan, kept, swarm.width, limit)
             swarm.width *= SHRINK
@@ -192,15 +195,29 @@ def _judged(
     return scan_valve(window, best, orders, valve, rows[:, :2], rows[:, 2], ranges=ranges)
 
 
-def _children(swarm: Swarm, limit: float, generator: np.random.Generator) -> FloatArray:
-    """Return rows at random off the swarm, on scales that differ by row and direction."""
-    count = len(swarm.rows) * CHILDREN
-    scale = 10.0 ** generator.uniform(-DECADES, 0.0, (3, count))
+def swarm_round(model: Model, valve: int, limit: float) -> FloatArray:
+    """Return rows (f_S, f_D, start) at random round the model's, on six decades of scale, %."""
+    generator = np.random.default_rng(SEED)
+    centre = np.append(model.friction[valve], model.start[valve])
+    rows = centre + limit * _offsets(NEARBY, WIDTH, generator, NEARBY_DECADES)
+    return _in_triangle(rows, limit)
+
+
+def _offsets(
+    count: int, width: float, generator: np.random.Generator, decades: float = DECADES
+) -> FloatArray:
+    """Return random moves of (f_S, f_D, start), shape (count, 3), as shares of the limit.
+
+    Their scales differ by row and by direction.
+    """
+    scale = 10.0 ** generator.uniform(-decades, 0.0, (3, count))
     used = generator.random((3, count)) < 0.7
-    off = generator.standard_normal((3, count)) * scale * used * limit
-    total, dynamic, difference = off * np.array([[swarm.width], [swarm.width], [WIDE]])
-    moves = np.column_stack([0.5 * (total + difference), dynamic, 0.5 * (total - difference)])
-    rows = np.repeat(swarm.rows, CHILDREN, axis=0) + moves
+    off = generator.standard_normal((3, count)) * scale * used
+    total, dynamic, difference = off * np.array([[width], [width], [WIDE]])
+    return np.column_stack([0.5 * (total + difference), dynamic, 0.5 * (total - difference)])
+
+
+def _in_triangle(rows: FloatArray, limit: float) -> FloatArray:
     static = np.clip(rows[:, 0], 1e-9 * limit, limit)
     return np.column_stack(
         [static, np.clip(rows[:, 1], 0.0, static), np.clip(rows[:, 2], -static, static)]

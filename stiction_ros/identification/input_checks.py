@@ -83,6 +83,8 @@ def swapped_columns(record: Record) -> Evidence | None:
     Args:
         record: m valves, p outputs; the set-point sign needs m = p, in the same order.
     """
+    if any(not np.ptp(part) > 0.0 for part in (*record.op.T, *record.pv.T) if len(part)):
+        return None
     by_set_point = _set_point_ratio(record)
     by_controller = _controller_ratio(record)
     if by_set_point is not None and by_set_point >= 1.0 / CLOSER:

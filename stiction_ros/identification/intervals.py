@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
+from stiction_ros.identification.growing_search import swarm_round
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
@@ -19,9 +20,9 @@ from stiction_ros.identification.pattern_search import (
     best_in_cells,
     nearby_delays,
     points_of,
-    refine,
 )
 from stiction_ros.identification.patterns import has_cells
+from stiction_ros.identification.polygon_search import PolygonMap, refine_near
 
 # f_S, f_D and one more for the choice among very many patterns.
 FREEDOM = 3
@@ -46,6 +47,7 @@ class FrictionIntervals:
             law has none or the valve does not slip.
         closed: whether that enumeration reached rejected patterns on every side.
         model: the model with the best pattern.
+        profile: rows (f_S, least loss above the best) over all patterns tried, %.
     """
 
     static: Interval
@@ -57,6 +59,7 @@ class FrictionIntervals:
     patterns: int
     closed: bool
     model: Model
+    profile: tuple[tuple[float, float], ...]
 
 
 def friction_intervals(
@@ -65,14 +68,14 @@ def friction_intervals(
     """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
     threshold = float(chi2.ppf(confidence, FREEDOM))
-    near: PatternMap | None = None
+    near: PatternMap | PolygonMap | None
+    model, near = refine_near(data, model, orders, valve, threshold, wander=0)
     if has_cells(data.law):
-        model, near = refine(data, model, orders, valve, threshold, wander=0)
         scan = _far_patterns(data, model, orders, valve)
-        if near is not None:
-            scan = PatternScan.joined([scan, near.scan])
     else:
         scan = _grid_points(data, model, orders, valve)
+    if near is not None:
+        scan = PatternScan.joined([scan, near.scan])
     start = float(model.start[valve])
     ranges = nearby_delays(data, model, valve, 0)
     zero = scan_valve(data, model, orders, valve, np.zeros((1, 2)), start, ranges=ranges)
@@ -91,9 +94,10 @@ def friction_intervals(
         dynamic_estimate=estimate[1],
         zero_loss=float(scan.loss[0]) - floor,
         deadband_loss=_deadband_loss(scan) - floor,
-        patterns=0 if near is None else len(near.scan.loss),
+        patterns=0 if near is None else near.patterns,
         closed=near is not None and near.closed,
         model=model,
+        profile=_profile(scan, floor, limit),
     )
 
 
@@ -108,23 +112,18 @@ def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Patte
 
 
 def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
-    """Return grids over the triangle, finer and finer towards the model; points, not cells."""
+    """Return grids over the triangle and a swarm round the model; points, not cells."""
     limit = float(data.limit[valve])
     grids, step = [coarse_grid(limit), _deadbands(limit)], limit / 30.0
     for _ in range(8):
         grids.append(finer_grid(model.friction[valve][None, :], step, limit))
         step /= 3.0
-    return point_patterns(
-        scan_valve(
-            data,
-            model,
-            orders,
-            valve,
-            np.vstack(grids),
-            float(model.start[valve]),
-            ranges=nearby_delays(data, model, valve, 0),
-        )
-    )
+    grid = np.vstack(grids)
+    rows = np.column_stack([grid, np.full(len(grid), model.start[valve])])
+    rows = np.vstack([rows, swarm_round(model, valve, limit)])
+    ranges = nearby_delays(data, model, valve, 0)
+    scan = scan_valve(data, model, orders, valve, rows[:, :2], rows[:, 2], ranges=ranges)
+    return point_patterns(scan)
 
 
 def _deadbands(limit: float) -> FloatArray:
@@ -164,11 +163,27 @@ def _accepted_ranges(
     """Return the f_S and the f_D of one pattern whose loss stays below ``highest``."""
     dynamic = scan.accepted_dynamic(index, highest - float(scan.loss[index]))
     low, high = scan.static_range(index, dynamic)
-    return (min(low, limit), min(high, limit)), dynamic
+    return (float(min(low, limit)), float(min(high, limit))), dynamic
 
 
 def _hull(intervals: list[Interval]) -> Interval:
     return min(low for low, _ in intervals), max(high for _, high in intervals)
+
+
+def _profile(scan: PatternScan, floor: float, limit: float) -> tuple[tuple[float, float], ...]:
+    """Return the lower envelope of the loss over f_S, finest where it is lowest."""
+    static = np.array([scan.middle(index, limit)[0] for index in range(len(scan.loss))])
+    best = static[int(scan.loss.argmin())]
+    step = limit * np.array([0.0, *np.geomspace(1e-4, 1.0, 25)])
+    edges = np.unique(np.concatenate([best - step, best + step]))
+    bins = np.searchsorted(edges, static)
+    rows = []
+    for number in np.unique(bins):
+        inside = np.flatnonzero((bins == number) & np.isfinite(scan.loss))
+        if len(inside):
+            lowest = inside[int(scan.loss[inside].argmin())]
+            rows.append((float(static[lowest]), float(scan.loss[lowest] - floor)))
+    return tuple(rows)
 
 
 def _estimate(
@@ -181,8 +196,8 @@ def _estimate(
         level = float(scan.level[index])
         low, high = scan.static_range(int(index), (level, level))
         if low <= middle <= high:
-            return max(middle, f_d), f_d
-    return f_s, f_d
+            return float(max(middle, f_d)), f_d
+    return float(f_s), f_d
 
 
 def _deadband_loss(scan: PatternScan) -> float:

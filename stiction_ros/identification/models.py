@@ -20,17 +20,33 @@ from stiction_ros.identification.scan import OutputScan
 
 BLOCK = 4_000_000
 DELAY_MARGIN = 10.8
+EQUAL = 3.84
 
 
 DelayRanges = tuple[tuple[int, int], ...]
 
 
 class Criterion(enum.Enum):
-    """Prefilter of a scan: which error of the current model counts."""
+    """Prefilter of a scan, which error of the current model counts, and how outputs add up.
+
+    The first three add up n log(SE / n), ``SQUARED_ERROR`` the plain SE of one step, (12a).
+    """
 
     ONE_STEP = enum.auto()
     FREE_RUN = enum.auto()
     INNOVATIONS = enum.auto()
+    SQUARED_ERROR = enum.auto()
+
+    @property
+    def filtered(self) -> bool:
+        """Whether the data are filtered by the model's 1/A."""
+        return self in (Criterion.FREE_RUN, Criterion.INNOVATIONS)
+
+    def loss(self, energy: FloatArray, count: int) -> FloatArray:
+        """Return what one output adds to the loss, from its SE over ``count`` samples."""
+        if self is Criterion.SQUARED_ERROR:
+            return energy
+        return np.asarray(count * np.log(energy / count))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,11 +160,11 @@ def output_scans(
             tuple(delays[j] for j in others),
             orders,
             delay,
-            fit.noise if criterion is Criterion.INNOVATIONS else one,
-            fit.a if criterion is not Criterion.ONE_STEP else one,
+            model.fits[i].noise if criterion is Criterion.INNOVATIONS else one,
+            model.fits[i].a if criterion.filtered else one,
             free,
         )
-        for y, fit, delays, delay in zip(data.y, model.fits, model.delays, ranges, strict=True)
+        for i, (y, delays, delay) in enumerate(zip(data.y, model.delays, ranges, strict=True))
     ]
 
 
@@ -199,7 +215,7 @@ def scan_criteria(
             for i, scan in enumerate(outputs):
                 energy = scan.energy(stems)
                 best[c, rows, i] = energy.argmin(axis=1) + ranges[i][0]
-                loss[c, rows] += scan.count * np.log(energy.min(axis=1) / scan.count)
+                loss[c, rows] += criteria[c].loss(energy.min(axis=1), scan.count)
     return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(criteria))]
 
 
@@ -302,23 +318,32 @@ def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
     return model
 
 
-def settle_delays(data: Data, model: Model, orders: Orders) -> Model:
+def settle_delays(
+    data: Data, model: Model, orders: Orders
+) -> tuple[Model, list[list[tuple[int, ...]]]]:
     """Choose each channel's delay by the exact fit: the longest that is not rejected.
 
     A leading coefficient that the record cannot tell from zero counts as delay: a shorter
     delay must lower −2 log likelihood by more than ``DELAY_MARGIN``, the 99.9 % point of its
     gain by one coefficient that is zero.
+
+    Returns:
+        The model, and per output and valve all delays within ``EQUAL`` of the best.
     """
+    equal: list[list[tuple[int, ...]]] = []
     for i in range(len(data.y)):
+        equal.append([])
         for j in range(len(data.u)):
             rivals = _neighbours(data, model, orders, i, j)
             best = min(rivals.values(), key=lambda fit: fit.loss)
             near = [d for d, fit in rivals.items() if fit.loss <= best.loss + DELAY_MARGIN]
+            alike = [d for d, fit in rivals.items() if fit.loss <= best.loss + EQUAL]
+            equal[i].append(tuple(sorted(alike)))
             chosen = rivals[max(near)]
             delays, fits = list(model.delays), list(model.fits)
             delays[i], fits[i] = chosen.delays, chosen
             model = dataclasses.replace(model, delays=tuple(delays), fits=tuple(fits))
-    return model
+    return model, equal
 
 
 def _neighbours(data: Data, model: Model, orders: Orders, i: int, j: int) -> dict[int, OutputFit]:
@@ -336,18 +361,3 @@ def _neighbours(data: Data, model: Model, orders: Orders, i: int, j: int) -> dic
                 break
             best, delay = min(best, fit.loss), delay + shift
     return rivals
-
-
-def alternative_delays(
-    data: Data, model: Model, orders: Orders, margin: float
-) -> list[list[tuple[int, ...]]]:
-    """Return, per output and valve, all delays whose loss is within ``margin`` of the best."""
-    found = []
-    for i in range(len(data.y)):
-        row = []
-        for j in range(len(data.u)):
-            rivals = _neighbours(data, model, orders, i, j)
-            best = min(fit.loss for fit in rivals.values())
-            row.append(tuple(sorted(d for d, f in rivals.items() if f.loss <= best + margin)))
-        found.append(row)
-    return found

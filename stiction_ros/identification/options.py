@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from stiction_ros.errors import InputError
+
+METHOD_NAMES = ("exact", "nlp", "grid")
+GRID_LAWS = ("he_smoothed", "he")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -12,7 +16,9 @@ class IdentificationOptions:
     """Options of :func:`stiction_ros.identification.identify`.
 
     Attributes:
-        output_order: n_a; None lets BIC choose among 1, 2 and 3 under the noise model.
+        method: ``exact``, or one of the paper's: ``nlp``, ``grid``; see :mod:`.methods`.
+        output_order: n_a; None lets BIC choose among 1, 2 and 3 under the noise model (method
+            ``exact``; the others take 3).
         input_order: n_b; None means equal to n_a.
         delay: inclusive range of t_d, samples, for every channel.
         law: friction law.
@@ -23,11 +29,18 @@ class IdentificationOptions:
         min_moves: fewest stem moves from which anything may be concluded.
         negligible_friction: f_S up to this is healthy, %.
         negligible_share: f_S up to this share of the OP span is healthy.
+        starts: M, first guesses of the nonlinear programme (method ``nlp``).
+        grid_step: step of f_S and of f_D, % (method ``grid``).
+        grid_law: stem of the grid, ``he_smoothed`` as published or ``he``.
+
+        one_step_best: also find the friction and delays of least one-step SE (exact, He's law).
+        check_columns: refuse a record in which OP and PV are clearly swapped.
 
     Raises:
         InputError: a value out of range.
     """
 
+    method: str = "exact"
     output_order: int | None = None
     input_order: int | None = None
     delay: tuple[int, int] = (0, 10)
@@ -39,8 +52,24 @@ class IdentificationOptions:
     min_moves: int = 6
     negligible_friction: float = 0.3
     negligible_share: float = 0.03
+    starts: int = 7
+    grid_step: float = 0.5
+    grid_law: str = "he_smoothed"
+    one_step_best: bool = True
+    check_columns: bool = True
 
     def __post_init__(self) -> None:
+        for key, known in (("method", METHOD_NAMES), ("grid_law", GRID_LAWS)):
+            if getattr(self, key) not in known:
+                raise InputError(
+                    f"unknown value {getattr(self, key)!r}",
+                    where=key,
+                    fix=f"use {' | '.join(known)}",
+                )
+        if not 1 <= self.starts <= 1000:
+            raise InputError(f"{self.starts} lies outside 1 to 1000", where="starts")
+        if not (math.isfinite(self.grid_step) and self.grid_step > 0.0):
+            raise InputError(f"{self.grid_step} is not positive", where="grid_step")
         low, high = self.delay
         if not 0 <= low <= high:
             raise InputError(

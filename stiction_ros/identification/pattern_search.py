@@ -36,6 +36,9 @@ from stiction_ros.identification.scan import PatternEnergy
 
 BLOCK = 1_500_000
 MOST_CELLS = 3000
+CELL_SAMPLES = 3e7
+SAMPLES = 6000  # up to which neighbourhoods are of full size
+REJECTED = 1.0
 GROWTHS = 14
 MARGIN = 6.0
 ZOOMS = 16
@@ -111,7 +114,7 @@ class PatternSearch:
         self.u, self.law = data.u[valve], data.law
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.ranges, self.begin = ranges, begin
+        self.ranges, self.begin, self.criterion = ranges, begin, criterion
         self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
 
     def evaluate(self, cells: Cells) -> PatternScan:
@@ -206,7 +209,7 @@ class PatternSearch:
         for scan, energy, delay in zip(self.scans, energies, self.ranges, strict=True):
             values = energy(levels)
             delays.append(values.argmin(axis=2) + delay[0])
-            loss += scan.count * np.log(values.min(axis=2) / scan.count)
+            loss += self.criterion.loss(values.min(axis=2), scan.count)
         return loss, np.stack(delays, axis=2)
 
     def enumerate(self, begin: Beginning, rectangle: FloatArray, most: int) -> PatternScan | None:
@@ -286,6 +289,11 @@ class PatternMap:
     rectangle: FloatArray
     closed: bool
 
+    @property
+    def patterns(self) -> int:
+        """Number of cells."""
+        return len(self.scan.loss)
+
 
 def neighbourhood(
     search: PatternSearch, begin: Beginning, friction: FloatArray, threshold: float, most: int
@@ -298,7 +306,7 @@ def neighbourhood(
     """
     centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
     scan = search.evaluate(cells_at(search.u, begin, centre[None, :], search.law))
-    reach = 0.002 * search.limit
+    reach = 0.002 * search.limit * min(1.0, SAMPLES / len(search.u))
     rectangle = np.array(
         [centre[0] - reach, centre[0] + reach, centre[1] - reach, centre[1] + reach]
     )
@@ -331,7 +339,7 @@ def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: fl
         & (accepted[:, 3] > sl)
     )
     accepted = accepted[meets]
-    wide, high = max(0.3 * (jh - jl), 1e-4 * limit), max(0.3 * (sh - sl), 1e-4 * limit)
+    wide, high = max(0.3 * (jh - jl), 1e-6 * limit), max(0.3 * (sh - sl), 1e-6 * limit)
     out = rectangle.copy()
     if len(accepted):
         lowest, highest = accepted.min(axis=0), accepted.max(axis=0)
@@ -371,7 +379,8 @@ def refine(
         if begin.first == len(plain.u):
             return model, None
         search = PatternSearch(data, model, orders, valve, ranges, begin)
-        reachable = neighbourhood(search, begin, model.friction[valve], threshold, MOST_CELLS)
+        most = min(MOST_CELLS, int(CELL_SAMPLES / len(plain.u)))
+        reachable = neighbourhood(search, begin, model.friction[valve], threshold, most)
         found = reachable.scan
         loss = np.where(found.moves >= data.min_moves, found.loss, np.inf)
         best = int(loss.argmin())

@@ -17,7 +17,14 @@ from stiction_ros.effects import SemiPhysicalStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.models import Data, Model, with_valve
 from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.pattern_search import PatternScan, PatternSearch, nearby_delays
+from stiction_ros.identification.pattern_search import (
+    PatternMap,
+    PatternScan,
+    PatternSearch,
+    nearby_delays,
+    refine,
+)
+from stiction_ros.identification.patterns import has_cells
 from stiction_ros.identification.polygon_patterns import (
     PolygonCell,
     cell_of,
@@ -105,6 +112,20 @@ def polygon_neighbourhood(
         len(judged.cells),
         closed,
     )
+
+
+def refine_near(
+    data: Data, model: Model, orders: Orders, valve: int, threshold: float, wander: int = 1
+) -> tuple[Model, PatternMap | PolygonMap | None]:
+    """Return the model with the best pattern of its neighbourhood, whatever the law's cells.
+
+    Args:
+        threshold: excess of the loss over the best from which a pattern is rejected.
+        wander: how many samples delays may change in one round; polygons keep them.
+    """
+    if has_cells(data.law):
+        return refine(data, model, orders, valve, threshold, wander)
+    return refine_polygons(data, model, orders, valve, threshold)
 
 
 def refine_polygons(

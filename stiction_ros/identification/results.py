@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.search_log import SearchLog
 
 
 class VerdictKind(enum.StrEnum):
@@ -43,6 +44,8 @@ class ValveEstimate:
         stem_start: stem position before the first sample, %.
         moves: number of samples at which the estimated stem moved.
         evidence: named figures behind the verdict, see :mod:`.verdict`.
+        profile: rows (f_S, least −2 log likelihood above the best) over the patterns that were
+            tried, f_S in %.
     """
 
     name: str
@@ -56,6 +59,7 @@ class ValveEstimate:
     stem_start: float
     moves: int
     evidence: Mapping[str, float]
+    profile: tuple[tuple[float, float], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
@@ -115,6 +119,22 @@ class OutputModel:
 
 
 @dataclasses.dataclass(frozen=True)
+class OrderRow:
+    """One choice of orders, friction as the search found it.
+
+    Attributes:
+        output_order, input_order: n_a and n_b.
+        aic, bic: information criteria of the linear parts under the noise model; only
+            differences count.
+    """
+
+    output_order: int
+    input_order: int
+    aic: float
+    bic: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Identification:
     """Everything one record says about its valves.
 
@@ -127,6 +147,9 @@ class Identification:
         valves, outputs: estimates in the order of the record.
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
+        search: what the search tried and its squared error; None where a method keeps none.
+            The default search puts the friction and delays of least one-step SE here.
+        orders: all orders that were compared.
     """
 
     status: FitStatus
@@ -139,20 +162,30 @@ class Identification:
     outputs: tuple[OutputModel, ...]
     stem: FloatArray
     notes: tuple[str, ...] = ()
+    search: SearchLog | None = None
+    orders: tuple[OrderRow, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
+        model: dict[str, Any] = {
+            "kind": "arx",
+            "status": self.status.value,
+            "reason": self.reason,
+            "method": self.method,
+            "notes": list(self.notes),
+        }
+        if self.search is not None:
+            model["search"] = self.search.to_json()
+        if self.orders:
+            model["orders"] = [dataclasses.asdict(row) for row in self.orders]
+        profiles = {v.name: [list(row) for row in v.profile] for v in self.valves if v.profile}
+        if profiles:
+            model["profiles"] = profiles
         return {
             "samples": self.samples,
             "sample_time": self.sample_time,
             "seconds": self.seconds,
-            "model": {
-                "kind": "arx",
-                "status": self.status.value,
-                "reason": self.reason,
-                "method": self.method,
-                "notes": list(self.notes),
-            },
+            "model": model,
             "valves": [valve.to_json() for valve in self.valves],
             "outputs": [output.to_json() for output in self.outputs],
         }

@@ -21,6 +21,7 @@ from stiction_ros.identification.friction_grid import (
     finer_grid,
     line_grid,
 )
+from stiction_ros.identification.growing_search import growing_search
 from stiction_ros.identification.models import (
     Criterion,
     Data,
@@ -33,13 +34,15 @@ from stiction_ros.identification.models import (
 )
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
+    REJECTED,
+    SAMPLES,
     PatternSearch,
     best_in_cells,
     nearby_delays,
     points_of,
-    refine,
 )
 from stiction_ros.identification.patterns import has_cells
+from stiction_ros.identification.polygon_search import refine_near
 
 STEPS = 50
 LINES = 14
@@ -55,8 +58,9 @@ PARENTS = 6
 SWEEPS = 5
 ROUNDS = 3
 CROSS = 200
-REJECTED = 1.0
 LEAST_GAIN = 0.5
+ALIKE = 0.9
+EQUAL = 10.0
 
 
 def first_grid(limit: float, samples: int) -> FloatArray:
@@ -105,6 +109,10 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
 def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
     """Return the best model over the whole triangle of one valve, never worse than before."""
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
+    if not has_cells(data.law):
+        grown = growing_search(data, model, orders, valve)
+        if grown is not None and grown.loss < model.loss:
+            return grown
     rivals = []
     for criterion, scan in first.scans.items():
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
@@ -123,7 +131,7 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
     if model.friction[valve, 0] == 0.0:
         return model
     limit = float(data.limit[valve])
-    best, _ = refine(data, model, orders, valve, REJECTED)
+    best, _ = refine_near(data, model, orders, valve, REJECTED)
     for _ in range(SWEEPS):
         before, friction = best.loss, best.friction[valve]
         jumps, reverses = neighbouring_lines(data, best, orders, valve)
@@ -137,7 +145,7 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
         if best.loss > before - LEAST_GAIN:
             break
         best = comb(data, best, orders, valve)
-        best, _ = refine(data, best, orders, valve, REJECTED)
+        best, _ = refine_near(data, best, orders, valve, REJECTED)
     return best
 
 
@@ -179,9 +187,33 @@ def descend(
         ranges: delays scanned, per output.
         warm: start the exact fit from that of ``model``.
     """
-    limit, start = float(data.limit[valve]), float(model.start[valve])
-    if not len(parents):
+    rows, delays = zoom(data, model, orders, valve, parents, criterion, ranges)
+    if not len(rows):
         return model
+    start = float(model.start[valve])
+    rival = with_valve(data, model, orders, valve, rows[0], start, delays[0], warm=warm)
+    return min(model, rival, key=lambda candidate: candidate.loss)
+
+
+def zoom(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    parents: FloatArray,
+    criterion: Criterion,
+    ranges: DelayRanges,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the best rows (f_S, f_D) of ever finer grids round the parents, and delays.
+
+    Returns:
+        Rows, best first, shape (G, 2), G = 0 when the valve moves too seldom in all of them,
+        and delays per output, shape (G, p).
+    """
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    nothing = np.empty((0, 2)), np.empty((0, len(data.y)), dtype=int)
+    if not len(parents):
+        return nothing
     patterns = None
     if has_cells(data.law):
         patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
@@ -193,14 +225,13 @@ def descend(
         scan = scan_valve(data, model, orders, valve, grid, start, criterion, ranges)
         chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
         if not chosen:
-            return model
+            return nothing
         parents, delays = grid[chosen], scan.delays[chosen]
         if patterns is not None:
             parents, cells = best_in_cells(patterns, parents, start)
             order = np.argsort(cells.loss, kind="stable")
             parents, delays = parents[order], cells.delays[order]
-    rival = with_valve(data, model, orders, valve, parents[0], start, delays[0], warm=warm)
-    return min(model, rival, key=lambda candidate: candidate.loss)
+    return parents, delays
 
 
 def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
@@ -210,7 +241,8 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     its neighbours much worse than a wrong pattern further off.
     """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    ranges, step = nearby_delays(data, model, valve), COMB * limit
+    ranges = nearby_delays(data, model, valve)
+    step = COMB * limit * min(1.0, SAMPLES / data.u.shape[1])
     grid, half, best = model.friction[valve][None, :], 15, model
     for _ in range(2):
         grid = finer_grid(grid, step, limit, half)
@@ -224,22 +256,38 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     return best
 
 
-def search(data: Data, model: Model, orders: Orders) -> Model:
+@dataclasses.dataclass(frozen=True)
+class SearchOutcome:
+    """Where a search ended.
+
+    Attributes:
+        model: the best model.
+        rivals: pairs (valve with friction, valve whose friction explains the record as well).
+    """
+
+    model: Model
+    rivals: tuple[tuple[int, int], ...] = ()
+
+
+def search(data: Data, model: Model, orders: Orders) -> SearchOutcome:
     """Coordinate search over all valves: the most promising first, until nothing changes."""
-    left = list(range(len(data.u)))
+    left, rivals = list(range(len(data.u))), []
     while left:
         scans = [first_scan(data, model, orders, valve) for valve in left]
         first = max(scans, key=lambda scan: scan.gain)
-        model = first_search(data, orders, first)
-        model = improve_valve(data, model, orders, first.valve)
+        model = improve_valve(data, first_search(data, orders, first), orders, first.valve)
         left.remove(first.valve)
+        for scan in scans:
+            if scan is not first and scan.gain > ALIKE * first.gain > EQUAL:
+                other = improve_valve(data, first_search(data, orders, scan), orders, scan.valve)
+                if other.loss < model.loss + EQUAL:
+                    rivals.append((first.valve, scan.valve))
     sticky = np.flatnonzero(model.friction[:, 0])
-    if len(sticky) < 2:
-        return model
-    for _ in range(ROUNDS):
-        before = model.loss
-        for valve in sticky:
-            model = improve_valve(data, model, orders, int(valve))
-        if model.loss > before - LEAST_GAIN:
-            break
-    return model
+    if len(sticky) > 1:
+        for _ in range(ROUNDS):
+            before = model.loss
+            for valve in sticky:
+                model = improve_valve(data, model, orders, int(valve))
+            if model.loss > before - LEAST_GAIN:
+                break
+    return SearchOutcome(model, tuple(rivals))

@@ -38,6 +38,8 @@ class EstimatorSettings(FitSchedule, TrustRule):
             output_order=self.output_order or None,
             input_order=self.input_order or None,
             delay=(self.delay_low, self.delay_high),
+            one_step_best=False,
+            check_columns=False,
         )
 
 

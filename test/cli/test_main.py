@@ -57,6 +57,26 @@ def test_identify_prints_the_contract_as_json(
     assert wanted <= output.keys()
 
 
+@pytest.mark.parametrize("method", [["nlp", "--starts", "1"], ["grid", "--grid-step", "1"]])
+def test_identify_by_the_paper_s_methods(
+    method: list[str], record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    orders = ["--na", "1", "--nb", "1", "--delay", "0"]
+    assert main(["identify", str(record), *orders, "--json", "-", "--method", *method]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["model"]["method"] == method[0]
+    assert found["model"]["search"]["squared_error"] > 0.0
+    assert found["valves"][0]["f_s"] == pytest.approx(4.0, abs=0.5)
+
+
+@pytest.mark.parametrize("option", [["--starts", "3"], ["--method", "nlp", "--grid-step", "1"]])
+def test_options_of_another_method_are_refused(
+    option: list[str], record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(record), *option]) == 2
+    assert "has no such option" in capsys.readouterr().err
+
+
 def test_report_writes_one_page(record: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert main(["report", str(record), "--out", str(page)]) == 0

@@ -128,3 +128,48 @@ def test_unknown_law_is_refused() -> None:
 def test_options_are_checked(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
         IdentificationOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_orders_that_were_compared_are_listed() -> None:
+    found = identify(loops.example1(0, samples=900))
+    assert [row.output_order for row in found.orders] == [1, 2, 3]
+    assert found.to_json()["model"]["orders"][0].keys() == {
+        *("output_order", "input_order", "aic", "bic"),
+    }
+    best = min(found.orders, key=lambda row: row.bic)
+    assert len(found.outputs[0].a) == best.output_order
+
+
+def test_profile_is_lowest_at_the_estimate() -> None:
+    valve = identify(loops.example1(0), THIRD_ORDER).valves[0]
+    excess = dict(valve.profile)
+    lowest = min(excess, key=lambda f_s: excess[f_s])
+    assert excess[lowest] == pytest.approx(0.0, abs=1e-9)
+    low, high = valve.static_interval
+    assert low <= lowest <= high
+    assert all(value > 7.8 for f_s, value in excess.items() if not low <= f_s <= high)
+
+
+def test_delays_that_cannot_be_told_apart_are_named() -> None:
+    notes = identify(loops.example1(1, samples=1200), THIRD_ORDER).notes
+    assert any("delays 4, 5 of V1 to PV1" in note for note in notes)
+
+
+def test_friction_that_could_sit_in_either_of_two_valves_is_named() -> None:
+    record = loops.example1(0, samples=900)
+    twins = Record("twins", 1.0, ("V1", "V2"), ("PV1",), np.repeat(record.op, 2, axis=1), record.pv)
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(twins.op.shape)
+    twins = dataclasses.replace(twins, op=twins.op + noise)
+    options = dataclasses.replace(THIRD_ORDER, delay=(5, 5), one_step_best=False)
+    notes = identify(twins, options).notes
+    assert any("friction in V" in note and "as well as in V" in note for note in notes)
+
+
+@pytest.mark.parametrize("with_set_point", [True, False])
+def test_swapped_columns_are_refused(with_set_point: bool) -> None:
+    record = loops.example1(0, samples=900)
+    wrong = dataclasses.replace(
+        record, op=record.pv, pv=record.op, sp=record.sp if with_set_point else None
+    )
+    with pytest.raises(InputError, match="look swapped"):
+        identify(wrong)

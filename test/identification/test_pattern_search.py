@@ -6,7 +6,7 @@ import simulated_loops as loops
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.identification import IdentificationOptions, engine
+from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.models import Data, Model, linear_model, with_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
@@ -16,14 +16,15 @@ from stiction_ros.identification.pattern_search import (
     refine,
 )
 from stiction_ros.identification.patterns import beginning_of, cells_at
+from stiction_ros.identification.preparation import prepare, window
 
 
 @pytest.fixture(scope="module")
 def near_truth() -> tuple[Data, Model, Orders]:
     """Return Example 1 with a friction a little beside the truth."""
     record = loops.example1(1, "equation")
-    data = engine.prepare(record, IdentificationOptions(3, 3))
-    orders = engine.window(IdentificationOptions(3, 3), 3, 3)
+    data = prepare(record, IdentificationOptions(output_order=3, input_order=3))
+    orders = window(IdentificationOptions(output_order=3, input_order=3), 3, 3)
     linear = linear_model(data, orders)
     friction = np.array([5.02, 1.97])
     return data, with_valve(data, linear, orders, 0, friction, 0.0, np.array([5])), orders

@@ -1,0 +1,53 @@
+"""Identification by any method.
+
+- ``exact``: the default search, :mod:`.engine`.
+- ``nlp``: the paper's nonlinear programme (12), :mod:`.nlp`.
+- ``grid``: the grid search that the paper compares with, :mod:`.grid_search`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification import engine, grid_search, nlp
+from stiction_ros.identification.input_checks import swapped_columns
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.results import Identification
+from stiction_ros.records.record import Record
+
+Progress = Callable[[float], None]
+Method = Callable[[Record, IdentificationOptions | None, Progress | None], Identification]
+
+METHODS: Mapping[str, Method] = {
+    "exact": engine.identify,
+    "nlp": nlp.identify,
+    "grid": grid_search.identify,
+}
+
+
+def identify(
+    record: Record,
+    options: IdentificationOptions | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Identify friction and linear dynamics of every valve and output of a record.
+
+    Args:
+        record: what was measured.
+        options: ``options.method`` names the search; None for the defaults.
+        progress: called with the share done, 0 to 1.
+
+    Raises:
+        InputError: a record that no model can be fitted to, or an option that the method
+            does not have, or OP and PV that are clearly swapped.
+    """
+    options = options or IdentificationOptions()
+    evidence = swapped_columns(record) if options.check_columns else None
+    if evidence is not None:
+        raise InputError(
+            f"OP and PV look swapped: {evidence.reason}",
+            where=record.name,
+            fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
+        )
+    return METHODS[options.method](record, options, progress)

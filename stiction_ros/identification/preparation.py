@@ -1,0 +1,73 @@
+"""From a record to centred, scaled data and the orders that are tried."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification.friction_grid import find_law
+from stiction_ros.identification.models import Data
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.output_error import Orders
+from stiction_ros.records.record import Record
+
+MIN_SAMPLES = 60
+DEFAULT_ORDERS = (1, 2, 3)
+
+
+def prepare(record: Record, options: IdentificationOptions) -> Data:
+    """Return the centred, scaled data; raise :class:`InputError` when they are unusable."""
+    for key, values, tags in (
+        ("op", record.op, record.valves),
+        ("pv", record.pv, record.outputs),
+    ):
+        for column, tag in enumerate(tags):
+            part = values[:, column]
+            if len(part) and np.ptp(part) <= 1e-9 * max(1.0, float(np.abs(part).max())):
+                raise InputError(
+                    f"{key} of {tag} is constant",
+                    where=record.name,
+                    fix="choose a window in which the loop moves",
+                )
+    if not record.valves or not record.outputs:
+        raise InputError("needs at least one valve and one output", where=record.name)
+    orders = window(
+        options, max(tried_orders(options)), input_order_for(options, max(tried_orders(options)))
+    )
+    free = 2 * orders.output + len(record.valves) * orders.input + orders.noise + 3
+    needed = orders.first + max(MIN_SAMPLES, 5 * free)
+    if len(record) < needed:
+        raise InputError(
+            f"{len(record)} samples are too few, {needed} are needed",
+            where=record.name,
+            fix="take a longer record, lower orders or a narrower delay range",
+        )
+    u, y = record.op.T, record.pv.T
+    span = np.ptp(u, axis=1)
+    limit = span if options.friction_limit is None else np.minimum(span, options.friction_limit)
+    return Data(
+        y=(y - y.mean(axis=1, keepdims=True)) / y.std(axis=1, keepdims=True),
+        u=u - u.mean(axis=1, keepdims=True),
+        law=find_law(options.law),
+        limit=limit,
+        delay=options.delay,
+        min_moves=options.min_moves,
+    )
+
+
+def tried_orders(options: IdentificationOptions) -> tuple[int, ...]:
+    """Return the n_a that are tried."""
+    return DEFAULT_ORDERS if options.output_order is None else (options.output_order,)
+
+
+def input_order_for(options: IdentificationOptions, output_order: int) -> int:
+    """Return the n_b that goes with an n_a."""
+    return output_order if options.input_order is None else options.input_order
+
+
+def window(options: IdentificationOptions, output_order: int, input_order: int) -> Orders:
+    """Return orders with the one window that suits all rivals of this identification."""
+    largest = max(tried_orders(options)) + 2
+    largest_input = input_order_for(options, max(tried_orders(options))) + 2
+    first = options.delay[1] + 2 * largest_input + largest + options.noise_order + 1
+    return Orders(output_order, input_order, options.noise_order, first)

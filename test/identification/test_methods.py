@@ -1,0 +1,67 @@
+"""One function for all methods, and options that belong to one of them."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import simulated_loops as loops
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification import METHODS, IdentificationOptions, engine, identify
+from stiction_ros.identification.options import METHOD_NAMES
+
+SMALL = IdentificationOptions(
+    output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0
+)
+
+
+def test_the_table_and_the_options_name_the_same_methods() -> None:
+    assert tuple(METHODS) == METHOD_NAMES
+
+
+@pytest.mark.parametrize("method", METHOD_NAMES)
+def test_each_method_signs_its_result(method: str) -> None:
+    record = loops.example1(0, samples=300)
+    found = identify(record, dataclasses.replace(SMALL, method=method))
+    assert found.method == method
+    document = found.to_json()
+    assert document["model"]["method"] == method
+    assert ("search" in document["model"]) is (found.search is not None)
+    assert json.loads(json.dumps(document, allow_nan=False))["valves"][0]["name"] == "V1"
+
+
+def test_the_default_is_the_exact_search() -> None:
+    record = loops.example1(0, samples=400)
+    options = dataclasses.replace(SMALL, delay=(4, 5))
+    assert identify(record, options).valves == engine.identify(record, options).valves
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"method": "guess"},
+        {"grid_law": "kano"},
+        {"starts": 0},
+        {"grid_step": 0.0},
+        {"grid_step": float("nan")},
+    ],
+)
+def test_options_of_methods_are_checked(wrong: dict[str, object]) -> None:
+    with pytest.raises(InputError):
+        IdentificationOptions(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("method", ["nlp", "grid"])
+@pytest.mark.parametrize("case", ["constant op", "constant pv", "short", "law"])
+def test_unusable_records_are_refused(method: str, case: str) -> None:
+    record = loops.example1(0, samples=300)
+    options = dataclasses.replace(SMALL, method=method)
+    if case.startswith("constant"):
+        record = dataclasses.replace(record, **{case[-2:]: np.full((300, 1), 5.0)})
+    if case == "short":
+        record = record.part(0, 30)
+    if case == "law":
+        options = dataclasses.replace(options, law="kano")
+    with pytest.raises(InputError):
+        identify(record, options)
