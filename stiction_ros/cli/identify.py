@@ -15,6 +15,7 @@ from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
 from stiction_ros.identification import METHODS, Identification, IdentificationOptions, identify
+from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.csv_file import CsvColumns
 from stiction_ros.records.open_record import open_record
 
@@ -34,7 +35,12 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
     )
-    parser.add_argument("--law", default="he", help="friction law (default: he)")
+    parser.add_argument(
+        "--law",
+        default="he",
+        metavar="LAW",
+        help=f"friction law of method exact: {' | '.join(LAWS)} (default: he)",
+    )
     parser.add_argument(
         "--method", default="exact", choices=tuple(METHODS), help="search (default: exact)"
     )

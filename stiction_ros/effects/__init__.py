@@ -14,6 +14,7 @@ from stiction_ros.effects.disturbance import (
     SineDisturbance,
     StepDisturbance,
 )
+from stiction_ros.effects.friction_parameters import FrictionLaw
 from stiction_ros.effects.stiction_choudhury import ChoudhuryStiction
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
@@ -42,6 +43,7 @@ __all__ = [
     "ChoudhuryStiction",
     "DriftDisturbance",
     "FloatArray",
+    "FrictionLaw",
     "HeStiction",
     "KanoStiction",
     "Memory",

@@ -7,10 +7,27 @@ after a reversal before the stem moves, J = f_S − f_D the jump that the stem t
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, Self
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
-from stiction_ros.effects.behaviour import Behaviour, parameter
+import numpy as np
+
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, SimulatesGrid, parameter
 from stiction_ros.errors import InputError
+
+
+@runtime_checkable
+class FrictionLaw(SimulatesGrid, Protocol):
+    """A stiction law that is simulated on whole grids and can be given by (f_S, f_D)."""
+
+    @classmethod
+    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Behaviour:
+        """Return the law with f_S and f_D in %."""
+        ...
+
+    @classmethod
+    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
+        """Return rows of the law's own first two parameters for rows (f_S, f_D), shape (G, 2)."""
+        ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +51,16 @@ class FrictionPair(Behaviour):
                 where="f_d",
                 fix="dynamic friction cannot exceed static friction, so lower f_d or raise f_s",
             )
+
+    @classmethod
+    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
+        """Build from f_S and f_D in %, other parameters at their defaults."""
+        return cls(static_friction, dynamic_friction)
+
+    @classmethod
+    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
+        """Return rows (f_S, f_D), %, as they are, shape (G, 2)."""
+        return grid
 
     @property
     def jump(self) -> float:
@@ -66,6 +93,11 @@ class SlipJumpPair(Behaviour):
     def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
         """Build from f_S and f_D in %: S = f_S + f_D, J = f_S − f_D."""
         return cls(static_friction + dynamic_friction, static_friction - dynamic_friction)
+
+    @classmethod
+    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
+        """Return rows (S, J), %, of rows (f_S, f_D), shape (G, 2)."""
+        return np.column_stack([grid[:, 0] + grid[:, 1], grid[:, 0] - grid[:, 1]])
 
     @property
     def static_friction(self) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stiction_ros.identification.certificate import certificates
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.intervals import friction_intervals
 from stiction_ros.identification.long_records import carried_over, liveliest_part
@@ -22,6 +23,7 @@ from stiction_ros.identification.models import (
 from stiction_ros.identification.one_step_best import one_step_best
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.patterns import has_cells
 from stiction_ros.identification.preparation import (
     input_order_for,
     prepare,
@@ -61,7 +63,7 @@ def identify(
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    part = liveliest_part(data)
+    part = liveliest_part(data) if has_cells(data.law) else data
     orders, linear, outcome, table = choose(part, options)
     model = outcome.model
     report(0.4)
@@ -78,7 +80,7 @@ def identify(
     if options.one_step_best and options.law == "he":
         one_step = one_step_best(record, data, model, orders)
     report(1.0)
-    told = ambiguities(record, delays, outcome.rivals)
+    told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(model, valves, table, told, one_step)
     return conclude(record, data, findings, time.perf_counter() - begun)
 

@@ -4,14 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
+from stiction_ros.effects import (
+    ChoudhuryStiction,
+    FloatArray,
+    FrictionLaw,
+    HeStiction,
+    KanoStiction,
+    SemiPhysicalStiction,
+    XchStiction,
+)
 from stiction_ros.errors import InputError
 
-LAWS: dict[str, type[SimulatesGrid]] = {"he": HeStiction}
+LAWS: dict[str, type[FrictionLaw]] = {
+    "he": HeStiction,
+    "semi_physical": SemiPhysicalStiction,
+    "kano": KanoStiction,
+    "choudhury": ChoudhuryStiction,
+    "xch": XchStiction,
+}
 
 
-def find_law(name: str) -> type[SimulatesGrid]:
+def find_law(name: str) -> type[FrictionLaw]:
     """Return the friction law called ``name`` that simulates whole grids.
 
     Raises:
@@ -91,10 +104,13 @@ def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) ->
 
 
 def simulate(
-    law: type[SimulatesGrid], grid: FloatArray, u: FloatArray, start: FloatArray | float
+    law: type[FrictionLaw], grid: FloatArray, u: FloatArray, start: FloatArray | float
 ) -> FloatArray:
-    """Return stems, shape (G, N), contiguous, for rows (f_S, f_D) and OP u, shape (N,)."""
-    return np.ascontiguousarray(law.simulate_grid(grid, u, start).T)
+    """Return stems, shape (G, N), contiguous, for rows (f_S, f_D) and OP u, shape (N,).
+
+    Laws with other parameters, such as S and J, get those that are equivalent.
+    """
+    return np.ascontiguousarray(law.simulate_grid(law.rows_of_frictions(grid), u, start).T)
 
 
 def count_moves(stems: FloatArray) -> FloatArray:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
+from stiction_ros.identification.growing_search import swarm_round
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
@@ -20,8 +20,9 @@ from stiction_ros.identification.pattern_search import (
     best_in_cells,
     nearby_delays,
     points_of,
-    refine,
 )
+from stiction_ros.identification.patterns import has_cells
+from stiction_ros.identification.polygon_search import PolygonMap, refine_near
 
 # f_S, f_D and one more for the choice among very many patterns.
 FREEDOM = 3
@@ -67,14 +68,14 @@ def friction_intervals(
     """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
     threshold = float(chi2.ppf(confidence, FREEDOM))
-    near: PatternMap | None = None
-    if data.law is HeStiction:
-        model, near = refine(data, model, orders, valve, threshold, wander=0)
+    near: PatternMap | PolygonMap | None
+    model, near = refine_near(data, model, orders, valve, threshold, wander=0)
+    if has_cells(data.law):
         scan = _far_patterns(data, model, orders, valve)
-        if near is not None:
-            scan = PatternScan.joined([scan, near.scan])
     else:
         scan = _grid_points(data, model, orders, valve)
+    if near is not None:
+        scan = PatternScan.joined([scan, near.scan])
     start = float(model.start[valve])
     ranges = nearby_delays(data, model, valve, 0)
     zero = scan_valve(data, model, orders, valve, np.zeros((1, 2)), start, ranges=ranges)
@@ -93,7 +94,7 @@ def friction_intervals(
         dynamic_estimate=estimate[1],
         zero_loss=float(scan.loss[0]) - floor,
         deadband_loss=_deadband_loss(scan) - floor,
-        patterns=0 if near is None else len(near.scan.loss),
+        patterns=0 if near is None else near.patterns,
         closed=near is not None and near.closed,
         model=model,
         profile=_profile(scan, floor, limit),
@@ -111,23 +112,18 @@ def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Patte
 
 
 def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
-    """Return grids over the triangle, finer and finer towards the model; points, not cells."""
+    """Return grids over the triangle and a swarm round the model; points, not cells."""
     limit = float(data.limit[valve])
     grids, step = [coarse_grid(limit), _deadbands(limit)], limit / 30.0
     for _ in range(8):
         grids.append(finer_grid(model.friction[valve][None, :], step, limit))
         step /= 3.0
-    return point_patterns(
-        scan_valve(
-            data,
-            model,
-            orders,
-            valve,
-            np.vstack(grids),
-            float(model.start[valve]),
-            ranges=nearby_delays(data, model, valve, 0),
-        )
-    )
+    grid = np.vstack(grids)
+    rows = np.column_stack([grid, np.full(len(grid), model.start[valve])])
+    rows = np.vstack([rows, swarm_round(model, valve, limit)])
+    ranges = nearby_delays(data, model, valve, 0)
+    scan = scan_valve(data, model, orders, valve, rows[:, :2], rows[:, 2], ranges=ranges)
+    return point_patterns(scan)
 
 
 def _deadbands(limit: float) -> FloatArray:

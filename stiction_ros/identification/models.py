@@ -10,7 +10,7 @@ import enum
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, SimulatesGrid
+from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction_grid import (
     count_moves,
     simulate,
@@ -64,7 +64,7 @@ class Data:
 
     y: FloatArray
     u: FloatArray
-    law: type[SimulatesGrid]
+    law: type[FrictionLaw]
     limit: FloatArray
     delay: tuple[int, int]
     min_moves: int

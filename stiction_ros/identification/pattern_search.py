@@ -27,6 +27,8 @@ from stiction_ros.identification.patterns import (
     Cells,
     beginning_of,
     cells_at,
+    first_slip_range,
+    has_cells,
     levels_of,
     resting_cells,
 )
@@ -109,7 +111,7 @@ class PatternSearch:
         criterion: Criterion = Criterion.INNOVATIONS,
     ) -> None:
         """Build the criterion; with ``begin`` the stem before its first slip is left free."""
-        self.u = data.u[valve]
+        self.u, self.law = data.u[valve], data.law
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
         self.ranges, self.begin, self.criterion = ranges, begin, criterion
@@ -127,19 +129,20 @@ class PatternSearch:
     def _evaluate(self, cells: Cells) -> PatternScan:
         dynamic = cells.dynamic
         dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
-        level, curvature, loss, delays = self._minimised(cells.bases, cells.signs, dynamic)
+        level, curvature, loss, delays = self.minimised(cells.bases, cells.signs, dynamic)
         moves = (np.diff(cells.bases, axis=1) != 0.0).sum(axis=1).astype(float)
         return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
 
     def best_level(self, friction: FloatArray) -> float:
         """Return the stem before the first sample that suits (f_S, f_D) best, %."""
         f_s, f_d = (float(value) for value in friction)
-        ranges = levels_of(self.u, f_s, MOST_LEVELS)
+        ranges = levels_of(self.u, f_s, MOST_LEVELS, self.law)
         point = np.array([[f_s - f_d, f_s + f_d]])
-        cells = resting_cells(self.u, ranges.mean(axis=1), np.repeat(point, len(ranges), axis=0))
+        points = np.repeat(point, len(ranges), axis=0)
+        cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)
         before = cells.signs == 0.0
         bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
-        level, _, loss, _ = self._minimised(bases, -before.astype(float), ranges)
+        level, _, loss, _ = self.minimised(bases, -before.astype(float), ranges)
         best = int(loss.argmin())
         inside = 1e-9 * (ranges[best, 1] - ranges[best, 0])
         return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
@@ -154,13 +157,13 @@ class PatternSearch:
         f_d = float(scan.level[index])
         low, high = scan.static_range(index, (f_d, f_d))
         high = min(high, self.limit)
-        cells = cells_at(self.u, begin, points_of(np.array([[0.5 * (low + high), f_d]])))
+        point = points_of(np.array([[0.5 * (low + high), f_d]]))
+        cells = cells_at(self.u, begin, point, self.law)
         before = cells.signs == 0.0
         bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
         around = begin.level + 0.1 * self.limit * np.array([[-1.0, 1.0]])
-        level = float(self._minimised(bases, -before.astype(float), around)[0][0])
-        least = float(np.abs(self.u[: begin.first] - level).max(initial=0.0))
-        most = float(begin.direction * (self.u[begin.first] - level))
+        level = float(self.minimised(bases, -before.astype(float), around)[0][0])
+        least, most = first_slip_range(self.u, level, begin, self.law)
         if max(low, least) < min(high, most):
             static = 0.5 * (max(low, least) + min(high, most))
         else:
@@ -168,7 +171,7 @@ class PatternSearch:
             level = self.best_level(np.array([static, f_d]))
         return np.array([static, f_d]), level - float(self.u[0])
 
-    def _minimised(
+    def minimised(
         self, bases: FloatArray, signs: FloatArray, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Minimise over the level x in base − x · sign, per pattern inside its range.
@@ -222,7 +225,7 @@ class PatternSearch:
             count += len(todo)
             if count > most:
                 return None
-            cells = cells_at(self.u, begin, _points(todo))
+            cells = cells_at(self.u, begin, _points(todo), self.law)
             found.append(self.evaluate(cells))
             todo = self._admissible(_remainders(todo, cells.bounds))
         return PatternScan.joined(found)
@@ -286,6 +289,11 @@ class PatternMap:
     rectangle: FloatArray
     closed: bool
 
+    @property
+    def patterns(self) -> int:
+        """Number of cells."""
+        return len(self.scan.loss)
+
 
 def neighbourhood(
     search: PatternSearch, begin: Beginning, friction: FloatArray, threshold: float, most: int
@@ -297,7 +305,7 @@ def neighbourhood(
         most: largest number of cells.
     """
     centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
-    scan = search.evaluate(cells_at(search.u, begin, centre[None, :]))
+    scan = search.evaluate(cells_at(search.u, begin, centre[None, :], search.law))
     reach = 0.002 * search.limit * min(1.0, SAMPLES / len(search.u))
     rectangle = np.array(
         [centre[0] - reach, centre[0] + reach, centre[1] - reach, centre[1] + reach]
@@ -352,20 +360,22 @@ def refine(
     """Return the model with the best pattern of its neighbourhood, and that neighbourhood.
 
     Repeated with the prefilter of the better model until nothing changes. The map is None
-    for a valve without friction or one that never slips.
+    for a valve without friction, one that never slips and a law without cells.
 
     Args:
         threshold: excess of the loss over the best from which a pattern is rejected.
         wander: how many samples delays may change in one round.
     """
     reachable = None
+    if not has_cells(data.law):
+        return model, None
     for _ in range(ROUNDS):
         if model.friction[valve, 0] <= 0.0:
             return model, None
         ranges = nearby_delays(data, model, valve, wander)
         plain = PatternSearch(data, model, orders, valve, ranges)
         level = plain.best_level(model.friction[valve])
-        begin = beginning_of(plain.u, level, float(model.friction[valve, 0]))
+        begin = beginning_of(plain.u, level, float(model.friction[valve, 0]), data.law)
         if begin.first == len(plain.u):
             return model, None
         search = PatternSearch(data, model, orders, valve, ranges, begin)
@@ -403,6 +413,6 @@ def best_in_cells(
         start: stem before the first sample minus u_0, %.
     """
     levels = np.full(len(friction), float(search.u[0]) + start)
-    scan = search.evaluate(resting_cells(search.u, levels, points_of(friction)))
+    scan = search.evaluate(resting_cells(search.u, levels, points_of(friction), search.law))
     rows = [scan.middle(index, search.limit) for index in range(len(friction))]
     return np.array(rows), scan

@@ -1,12 +1,15 @@
-r"""Every switching pattern of He's valve inside a rectangle of frictions.
+r"""Every switching pattern of a valve inside a rectangle of frictions.
 
-After its first slip the stem is :math:`\chi = u_s - \sigma f_D`, with the sample s and the
-direction σ of the last slip, and (4) becomes two comparisons: the valve slips on in the same
-direction when :math:`\sigma (u_k - u_s) > J` and back when :math:`-\sigma (u_k - u_s) > S`, with
-J = f_S − f_D and S = f_S + f_D. So the frictions with one and the same pattern of slips fill a
+Under He's law the stem is, after its first slip, :math:`\chi = u_s - \sigma f_D`, with the
+sample s and the direction σ of the last slip, and (4) becomes two comparisons: the valve slips
+on in the same direction when :math:`\sigma (u_k - u_s) > J` and back when
+:math:`-\sigma (u_k - u_s) > S`, with J = f_S − f_D and S = f_S + f_D.
+So the frictions with one and the same pattern of slips fill a
 rectangle in the plane of (J, S), a *cell*, and the cells tile the plane. Inside a cell u_s and σ
 are fixed and the stem is affine in f_D. Cells are listed one after another until nothing of
 the rectangle is left: an exact enumeration, without a step size.
+
+The laws with a moving state have such cells as well (:mod:`.moving_patterns`).
 
 What happens before the first slip depends on the unknown stem position at the start. A valve
 starts either at a given level, and then slips as (4) says, or its first slip is given.
@@ -18,7 +21,9 @@ import dataclasses
 
 import numpy as np
 
+from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.moving_patterns import RULES
 
 SWARM = 2
 FEW = 40
@@ -65,8 +70,17 @@ class Cells:
         return Cells(self.bounds[rows], self.bases[rows], self.signs[rows])
 
 
-def beginning_of(u: FloatArray, level: float, static: float) -> Beginning:
+def has_cells(law: type[FrictionLaw]) -> bool:
+    """Return whether the switching patterns of a law can be enumerated."""
+    return law is HeStiction or law in RULES
+
+
+def beginning_of(
+    u: FloatArray, level: float, static: float, law: type[FrictionLaw] = HeStiction
+) -> Beginning:
     """Return the beginning of a valve that rests at ``level`` with static friction f_S."""
+    if law in RULES:
+        return Beginning(level, *RULES[law](u).first_slip(level, static))
     error = u - level
     slips = np.flatnonzero(np.abs(error) > static)
     if not len(slips):
@@ -74,12 +88,29 @@ def beginning_of(u: FloatArray, level: float, static: float) -> Beginning:
     return Beginning(level, int(slips[0]), float(np.sign(error[slips[0]])))
 
 
-def levels_of(u: FloatArray, static: float, most: int) -> FloatArray:
+def first_slip_range(
+    u: FloatArray, level: float, begin: Beginning, law: type[FrictionLaw] = HeStiction
+) -> tuple[float, float]:
+    """Return the f_S, %, with which a valve that rests at ``level`` first slips as it did."""
+    if law in RULES:
+        may = RULES[law](u).resting_samples(level)
+        lead = np.where(may, np.abs(u - level), 0.0)
+        return float(lead[: begin.first].max(initial=0.0)), float(lead[begin.first])
+    least = float(np.abs(u[: begin.first] - level).max(initial=0.0))
+    return least, float(begin.direction * (u[begin.first] - level))
+
+
+def levels_of(
+    u: FloatArray, static: float, most: int, law: type[FrictionLaw] = HeStiction
+) -> FloatArray:
     """Return ranges of the level before the first sample, one per first slip, shape (G, 2).
 
     The ranges tile u_0 ± f_S; inside each the first slip is the same. When there are more
     than ``most``, the widest are returned.
     """
+    if law in RULES:
+        may = RULES[law](u).resting_samples(float(u[0]))
+        u = u[may] if may.any() else u
     edges = [float(u[0]) - static, float(u[0]) + static]
     highs = np.unique(np.maximum.accumulate(u)) - static
     lows = np.unique(np.minimum.accumulate(u)) + static
@@ -90,14 +121,21 @@ def levels_of(u: FloatArray, static: float, most: int) -> FloatArray:
     return np.column_stack([ends[:-1], ends[1:]])[widest]
 
 
-def cells_at(u: FloatArray, begin: Beginning, points: FloatArray) -> Cells:
+def cells_at(
+    u: FloatArray, begin: Beginning, points: FloatArray, law: type[FrictionLaw] = HeStiction
+) -> Cells:
     """Return the cells that hold the points (J, S), shape (G, 2), behind a given first slip."""
+    if law in RULES:
+        first = (begin.first, begin.direction)
+        return _moving_cells(u, points, np.full(len(points), begin.level), law, first)
     base = np.full(len(points), begin.level)
     sign = np.zeros(len(points))
     return _cells(u, points, base, sign, begin)
 
 
-def resting_cells(u: FloatArray, levels: FloatArray, points: FloatArray) -> Cells:
+def resting_cells(
+    u: FloatArray, levels: FloatArray, points: FloatArray, law: type[FrictionLaw] = HeStiction
+) -> Cells:
     """Return the cells of the points (J, S), shape (G, 2), of valves that rest at ``levels``.
 
     The f_S at which the first slip would change is not among their bounds.
@@ -105,7 +143,28 @@ def resting_cells(u: FloatArray, levels: FloatArray, points: FloatArray) -> Cell
     Args:
         levels: stem position before the first sample, %, shape (G,).
     """
+    if law in RULES:
+        return _moving_cells(u, points, levels, law, None)
     return _cells(u, points, levels.copy(), np.zeros(len(points)), None)
+
+
+def _moving_cells(
+    u: FloatArray,
+    points: FloatArray,
+    levels: FloatArray,
+    law: type[FrictionLaw],
+    first: tuple[int, float] | None,
+) -> Cells:
+    rules = RULES[law](u)
+    traces = [
+        rules.trace(point, level, first)
+        for point, level in zip(points.tolist(), levels.tolist(), strict=True)
+    ]
+    return Cells(
+        np.array([trace.bounds for trace in traces]).reshape(-1, 4),
+        np.array([trace.base for trace in traces]).reshape(-1, len(u)),
+        np.array([trace.sign for trace in traces]).reshape(-1, len(u)),
+    )
 
 
 def _cells(

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import (
     coarse_grid,
@@ -22,6 +21,7 @@ from stiction_ros.identification.friction_grid import (
     finer_grid,
     line_grid,
 )
+from stiction_ros.identification.growing_search import growing_search
 from stiction_ros.identification.models import (
     Criterion,
     Data,
@@ -40,8 +40,9 @@ from stiction_ros.identification.pattern_search import (
     best_in_cells,
     nearby_delays,
     points_of,
-    refine,
 )
+from stiction_ros.identification.patterns import has_cells
+from stiction_ros.identification.polygon_search import refine_near
 
 STEPS = 50
 LINES = 14
@@ -108,6 +109,10 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
 def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
     """Return the best model over the whole triangle of one valve, never worse than before."""
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
+    if not has_cells(data.law):
+        grown = growing_search(data, model, orders, valve)
+        if grown is not None and grown.loss < model.loss:
+            return grown
     rivals = []
     for criterion, scan in first.scans.items():
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
@@ -126,7 +131,7 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
     if model.friction[valve, 0] == 0.0:
         return model
     limit = float(data.limit[valve])
-    best, _ = refine(data, model, orders, valve, REJECTED)
+    best, _ = refine_near(data, model, orders, valve, REJECTED)
     for _ in range(SWEEPS):
         before, friction = best.loss, best.friction[valve]
         jumps, reverses = neighbouring_lines(data, best, orders, valve)
@@ -140,7 +145,7 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
         if best.loss > before - LEAST_GAIN:
             break
         best = comb(data, best, orders, valve)
-        best, _ = refine(data, best, orders, valve, REJECTED)
+        best, _ = refine_near(data, best, orders, valve, REJECTED)
     return best
 
 
@@ -150,7 +155,7 @@ def neighbouring_lines(
     """Return J and S of the model and, where the law has cells, just beyond its cell."""
     friction = model.friction[valve]
     (jump, reverse), limit = points_of(friction[None, :])[0], float(data.limit[valve])
-    if data.law is not HeStiction:
+    if not has_cells(data.law):
         return np.array([jump]), np.array([reverse])
     search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
     _, cells = best_in_cells(search, friction[None, :], float(model.start[valve]))
@@ -210,7 +215,7 @@ def zoom(
     if not len(parents):
         return nothing
     patterns = None
-    if data.law is HeStiction:
+    if has_cells(data.law):
         patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
         parents, _ = best_in_cells(patterns, parents, start)
     step = APART * limit

@@ -40,6 +40,13 @@ def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[
     assert "usage: stiction " + name in capsys.readouterr().out
 
 
+def test_identify_lists_the_friction_laws(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parser().parse_args(["identify", "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    assert "he | semi_physical | kano | choudhury | xch" in told
+
+
 def test_identify_prints_the_contract_as_json(
     record: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.effects import FloatArray, HeStiction
+from stiction_ros.effects import Behaviour, FloatArray, HeStiction
 from stiction_ros.records.record import Record
 
 A = (-2.0914, 1.3749, -0.2725)
@@ -20,14 +20,20 @@ def example1(
     gain: float = 2.0,
     integral_time: float = 20.0,
     disturbance: FloatArray | None = None,
+    valve: Behaviour | None = None,
 ) -> Record:
-    """Process (18) under PI control with set-point steps; σ = 0.01 on PV or in (18)."""
+    """Process (18) under PI control with set-point steps; σ = 0.01 on PV or in (18).
+
+    The valve follows He's law with ``friction`` unless ``valve`` says otherwise.
+    """
     values = 0.01 * np.random.default_rng(seed).standard_normal(samples)
-    valve = HeStiction(*friction)
+    law = valve or HeStiction(*friction)
+    memory = law.rest(0.0)
+    ideal = valve is None and max(friction) == 0.0
     set_points = np.array([0.0, 2.0, 2.0, -1.0, -1.0, 3.0, 1.0, 1.0])
     sp = set_points[np.arange(samples) * 8 // samples]
     y, pv, op, stem = (np.zeros(samples + 10) for _ in range(4))  # the last ten stay zero
-    command = error = position = 0.0
+    command = error = 0.0
     for k in range(samples):
         y[k] = sum(-A[i] * y[k - i - 1] + B[i] * stem[k - i - 1 - DELAY] for i in range(3))
         y[k] += values[k] if noise == "equation" else 0.0
@@ -37,8 +43,8 @@ def example1(
         error += change
         command += gain * (change + error / integral_time)
         op[k] = command
-        position = float(valve.step(position, command)[1]) if max(friction) > 0.0 else command
-        stem[k] = position
+        memory, stem[k] = law.step(memory, float(command), float(k))
+        stem[k] = command if ideal else stem[k]
     columns = (part[:samples, None] for part in (op, pv, sp, stem))
     return Record("example1", 1.0, ("V1",), ("PV1",), *columns)
 

@@ -117,7 +117,7 @@ def test_short_record_is_refused() -> None:
 
 
 def test_unknown_law_is_refused() -> None:
-    with pytest.raises(InputError, match="known laws: he"):
+    with pytest.raises(InputError, match="known laws: he, semi_physical"):
         identify(loops.example1(0, samples=400), IdentificationOptions(law="nobody"))
 
 
