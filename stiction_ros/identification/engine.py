@@ -173,6 +173,9 @@ def estimate_valves(
             estimate = (0.0, 0.0)
             model = without_friction(data, model, orders, j)
         figures["deadband_loss"] = intervals.deadband_loss
+        if record.stem is not None:
+            error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
+            figures["stem_error"] = float(np.mean(error**2))
         figures["patterns"] = float(intervals.patterns)
         figures["patterns_closed"] = float(intervals.closed)
         found.append((estimate, static, dynamic, verdict, figures, intervals.profile))

@@ -8,6 +8,11 @@ Evidence, all under the noise model:
 - ``free_run_ratio``: free-run error without friction over that with friction.
 - ``half_1``, ``half_2``: −2 log likelihood gained by friction in either half of the record.
 - ``share``: f_S over the OP span; ``moves``: number of stem moves.
+- ``deadband_loss``: −2 log likelihood lost by J = 0.
+- ``patterns``, ``patterns_closed``: switching patterns enumerated round the best, and whether
+  all at the edge were rejected.
+- ``stem_error``: mean squared error of the stem, %², where the record holds the true one (the
+  paper's Remark 2).
 """
 
 from __future__ import annotations

@@ -32,6 +32,7 @@ def test_example1_for_both_noise_placements(noise: str) -> None:
     assert output.fit_free_run > 70.0
     assert record.stem is not None
     assert np.sqrt(np.mean((found.stem - record.stem) ** 2)) < 0.3
+    assert valve.evidence["stem_error"] == pytest.approx(np.mean((found.stem - record.stem) ** 2))
     assert not found.stem.flags.writeable
 
 
