@@ -44,10 +44,10 @@ from stiction_ros.identification.pattern_search import (
 from stiction_ros.identification.patterns import has_cells
 from stiction_ros.identification.polygon_search import refine_near
 
-STEPS = 50
+STEPS = 80
 LINES = 14
-WORK = 8_000_000
-MOST_POINTS = 9000
+WORK = 24_000_000
+MOST_POINTS = 12_000
 COARSE = 0.05
 APART = 0.03
 FINEST = 0.004
