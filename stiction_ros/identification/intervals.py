@@ -13,9 +13,9 @@ from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
 from stiction_ros.identification.growing_search import swarm_round
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_scan import PatternScan
 from stiction_ros.identification.pattern_search import (
     PatternMap,
-    PatternScan,
     PatternSearch,
     best_in_cells,
     nearby_delays,

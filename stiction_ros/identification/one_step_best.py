@@ -23,10 +23,10 @@ from stiction_ros.identification.equation_error import (
 from stiction_ros.identification.friction_grid import finer_grid
 from stiction_ros.identification.models import Criterion, Data, Model, scan_valve
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_scan import PatternScan
 from stiction_ros.identification.pattern_search import (
     CELL_SAMPLES,
     SAMPLES,
-    PatternScan,
     PatternSearch,
     neighbourhood,
 )

@@ -17,9 +17,9 @@ from stiction_ros.effects import SemiPhysicalStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.models import Data, Model, with_valve
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_scan import PatternScan
 from stiction_ros.identification.pattern_search import (
     PatternMap,
-    PatternScan,
     PatternSearch,
     nearby_delays,
     refine,
