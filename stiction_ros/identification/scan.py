@@ -116,10 +116,17 @@ class OutputScan:
         nb, size = self.orders.input, right.shape[1]
         delays = len(self.lags) - nb + 1
         lag = np.arange(delays)[:, None] + np.arange(nb)
-        matrix = gram[lag[:, :, None], lag[:, None, :]].transpose(3, 0, 1, 2)
-        vector = right[lag].transpose(2, 0, 1)
+        matrix = gram[lag[:, :, None], lag[:, None, :]].transpose(3, 0, 1, 2).copy()
+        vector = right[lag].transpose(2, 0, 1).copy()
+        # What the rest explains to the last digit says nothing: its Gram matrix is rounding.
+        diagonal = np.arange(nb)
+        empty = ~(matrix[..., diagonal, diagonal] > 0.0).all(axis=-1)
+        matrix[empty] = np.eye(nb)
+        vector[empty] = 0.0
+        matrix[..., diagonal, diagonal] *= 1.0 + 1e-12 * (1.0 + diagonal)
         solution = np.linalg.solve(matrix, vector[..., None])[..., 0]
         explained = np.einsum("gti,gti->gt", vector, solution).reshape(size, delays)
+        explained[explained > self.rest_energy * (1.0 + 1e-9)] = 0.0
         return np.asarray(np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy))
 
     def _products(self, x: FloatArray, s: FloatArray) -> FloatArray:

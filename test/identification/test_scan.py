@@ -43,3 +43,15 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     for f in range(3):
         expected = scan.energy(bases - levels[:, f : f + 1] * signs)
         assert energy[:, f] == pytest.approx(expected, rel=1e-7)
+
+
+def test_stem_that_the_rest_explains_to_the_last_digit_explains_nothing() -> None:
+    generator = np.random.default_rng(0)
+    y = 1e3 * generator.standard_normal(300).cumsum()
+    stems = np.stack([np.roll(y, 2), np.full(300, 1e6), np.zeros(300), y[::-1]])
+    one = np.ones(1)
+    scan = OutputScan(y, np.empty((0, 300)), (), Orders(4, 2, 0, 20), (0, 3), one, one)
+    energy = scan.energy(stems)
+    assert np.isfinite(energy).all()
+    assert energy[1:3] == pytest.approx(scan.rest_energy, rel=1e-6)
+    assert (energy[0] > 0.9 * scan.rest_energy).all()
