@@ -142,7 +142,7 @@ def ros_environment() -> dict[str, str]:
     environment.setdefault("ROS_DOMAIN_ID", str(random.SystemRandom().randint(1, 100)))
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         environment.setdefault(variable, "1")
-    environment[DIE_WITH_PARENT] = "1"
+    environment[DIE_WITH_PARENT] = str(os.getpid())
     for directory in config_directories():
         profile = directory / "fastdds.xml"
         if profile.is_file():

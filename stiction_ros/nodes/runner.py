@@ -36,11 +36,11 @@ def run(
     if "-h" in arguments[1:] or "--help" in arguments[1:]:
         print(HELP.format(name=name, description=description), end="")
         return 0
-    if os.environ.get(DIE_WITH_PARENT):
-        die_with_parent(signal.SIGTERM)
     stop: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: stop.append(received))
+    if os.environ.get(DIE_WITH_PARENT):
+        die_with_parent(signal.SIGTERM, int(os.environ[DIE_WITH_PARENT]))
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node: ManagedNode | None = None
     try:

@@ -52,4 +52,6 @@ class FitWorker:
 def _settle() -> None:
     """Prepare the worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    die_with_parent(signal.SIGKILL)
+    parent = multiprocessing.parent_process()
+    if parent is not None and parent.pid is not None:
+        die_with_parent(signal.SIGKILL, parent.pid)
