@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import OutputModel
+from stiction_ros.identification.equation_error import ArxOrders, fit_arx
 from stiction_ros.records import Record
 
 
@@ -38,17 +39,9 @@ def one_step_estimate(record: Record, stem: FloatArray, output: OutputModel) -> 
         output: whose orders and delays are used.
     """
     y = record.pv[:, record.outputs.index(output.name)]
-    columns = [(-y, lag) for lag in range(1, len(output.a) + 1)]
-    for valve, b in output.b.items():
-        chi = stem[:, record.valves.index(valve)]
-        columns += [(chi, lag + output.delay[valve]) for lag in range(1, len(b) + 1)]
-    first = max(lag for _, lag in columns)
-    regressors = np.column_stack(
-        [signal[first - lag : len(y) - lag] for signal, lag in columns] + [np.ones(len(y) - first)]
-    )
-    # Centring and scaling keep the constant from spoiling the other columns.
-    middle, spread = regressors.mean(axis=0), regressors.std(axis=0)
-    middle[-1], spread[spread == 0.0] = 0.0, 1.0
-    scaled = (regressors - middle) / spread
-    theta = np.linalg.lstsq(scaled, y[first:], rcond=None)[0]
-    return np.concatenate([y[:first], scaled @ theta])
+    stems = np.array([stem[:, record.valves.index(valve)] for valve in output.b])
+    delays = tuple(output.delay[valve] for valve in output.b)
+    past = len(next(iter(output.b.values())))
+    orders = ArxOrders(len(output.a), past, max(len(output.a), past + max(delays)))
+    residuals = fit_arx(y, stems, delays, orders).residuals
+    return np.concatenate([y[: orders.first], y[orders.first :] - residuals])

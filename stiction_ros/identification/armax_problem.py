@@ -16,8 +16,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification import polynomials
 
 MAX_RADIUS = 0.9995
+INSIDE = 0.98
 """Largest |root| of a searched A or C."""
 
 
@@ -137,13 +139,9 @@ def radius(polynomial: FloatArray) -> float:
     return float(np.abs(np.roots(polynomial)).max(initial=0.0))
 
 
-def stabilised(polynomial: FloatArray, limit: float = 0.98) -> FloatArray:
-    """Return the polynomial with roots outside ``limit`` moved onto it, angles kept."""
-    roots = np.roots(polynomial)
-    size = np.abs(roots)
-    if not len(roots) or size.max() <= limit:
-        return polynomial
-    return np.real(np.poly(np.where(size > limit, roots / np.maximum(size, 1e-12) * limit, roots)))
+def stabilised(polynomial: FloatArray) -> FloatArray:
+    """Return the polynomial with roots outside ``INSIDE`` moved onto it, angles kept."""
+    return polynomials.stabilised(polynomial, INSIDE)
 
 
 def descend(problem: Problem, point: Point, max_iterations: int = 60) -> tuple[Point, bool]:

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.linear_data import nrmse_fit
 from stiction_ros.identification.models import Data, Model
 from stiction_ros.identification.output_error import OutputFit
 from stiction_ros.identification.results import (
@@ -28,14 +28,14 @@ class Findings:
         model: the final model.
         valves: the estimates.
         orders: all orders that were compared.
-        ambiguities: sentences on delays and valves that explain the record equally well.
+        remarks: sentences for people on ambiguities and on what is exact.
         one_step: the least SE and what it belongs to, or None.
     """
 
     model: Model
     valves: tuple[ValveEstimate, ...]
     orders: tuple[OrderRow, ...]
-    ambiguities: tuple[str, ...]
+    remarks: tuple[str, ...]
     one_step: SearchLog | None
 
 
@@ -45,7 +45,7 @@ def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Ide
     stem = model.stems.T + record.op.mean(axis=0)
     stem.flags.writeable = False
     outputs = tuple(output_model(record, i, fit, data) for i, fit in enumerate(model.fits))
-    notes = [*record.notes, *found.ambiguities, *_one_step_notes(record, model, found.one_step)]
+    notes = [*record.notes, *found.remarks, *_one_step_notes(record, model, found.one_step)]
     for j, tag in enumerate(record.valves):
         if record.op[:, j].min() < 0.0 or record.op[:, j].max() > 100.0:
             notes.append(f"op of {tag} lies outside 0 to 100 %; friction is in the op's own units")
@@ -79,7 +79,7 @@ def output_model(record: Record, i: int, fit: OutputFit, data: Data) -> OutputMo
     bias = fit.constant * scale + float(fit.a.sum()) * mean
     bias -= float(b.sum(axis=1) @ record.op.mean(axis=0))
     y = data.y[i]
-    free = fit_percent(y[len(y) - len(fit.free_run) :], fit.free_run)
+    free = nrmse_fit(y[len(y) - len(fit.free_run) :], fit.free_run)
     tail = y[len(y) - fit.count :]
     return OutputModel(
         name=record.outputs[i],
@@ -88,15 +88,9 @@ def output_model(record: Record, i: int, fit: OutputFit, data: Data) -> OutputMo
         delay=dict(zip(record.valves, fit.delays, strict=True)),
         bias=bias,
         noise_std=float(np.sqrt(fit.energy / max(fit.count - fit.parameters, 1))) * scale,
-        fit_one_step=fit_percent(tail, tail - fit.innovations),
+        fit_one_step=nrmse_fit(tail, tail - fit.innovations),
         fit_free_run=free,
     )
-
-
-def fit_percent(y: FloatArray, predicted: FloatArray) -> float:
-    """Return the NRMSE fit 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %."""
-    spread = float(np.linalg.norm(y - y.mean()))
-    return 100.0 * (1.0 - float(np.linalg.norm(y - predicted)) / max(spread, 1e-300))
 
 
 def _one_step_notes(record: Record, model: Model, best: SearchLog | None) -> list[str]:

@@ -20,6 +20,7 @@ from scipy.signal import lfilter, lfiltic
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.polynomials import stabilised
 from stiction_ros.records.record import Record
 
 RANK_TOLERANCE = 1e-12
@@ -207,9 +208,7 @@ def stable_arx(
     fit = fit_arx(y, stems, delays, orders)
     if fit.largest_root < 1.0:
         return fit
-    roots = np.roots(np.concatenate([[1.0], fit.a]))
-    size = np.abs(roots)
-    a = np.real(np.poly(np.where(size > 0.99, 0.99 * roots / np.maximum(size, 1e-12), roots)))[1:]
+    a = stabilised(np.concatenate([[1.0], fit.a]))[1:]
     phi = regressors(y, stems, delays, orders)
     rest = y[orders.first :] - phi[:, : orders.output] @ a
     columns = np.column_stack([phi[:, orders.output :], np.ones(len(rest))])

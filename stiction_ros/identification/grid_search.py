@@ -28,7 +28,6 @@ from stiction_ros.identification.equation_error import (
     fit_outputs,
     simulate_stems,
 )
-from stiction_ros.identification.nlp import final_smoothing, smoothed_stems
 from stiction_ros.identification.one_step_result import (
     Answer,
     check_record,
@@ -39,6 +38,7 @@ from stiction_ros.identification.one_step_result import (
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import FitStatus, Identification
 from stiction_ros.identification.search_log import SearchLog
+from stiction_ros.identification.smoothed_stems import final_smoothing, smoothed_stems
 from stiction_ros.records.record import Record
 
 MAX_POINTS = 2_000_000

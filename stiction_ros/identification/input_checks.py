@@ -1,4 +1,6 @@
-r"""Were OP and PV swapped in a record? Two signs; only clear ones count.
+r"""Can a record be worked on, and were OP and PV swapped in it?
+
+Of a swap there are two signs; only clear ones count.
 
 *Set-point.* PV tracks SP, OP does not. Where the column called OP lies at least ten times
 closer to SP than the column called PV and has no lasting offset from it, they are swapped.
@@ -22,8 +24,10 @@ import enum
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 from stiction_ros.records.record import Record
 
+TOO_SHORT = "take a longer record, lower orders or a narrower delay range"
 CLOSER = 0.1  # distance of OP from SP over that of PV from which they are swapped
 OFFSET = 0.3  # lasting offset, as a share of the standard deviation of the error
 TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
@@ -36,6 +40,42 @@ SHARE = 0.7
 SINGULAR = 1e-10  # smallest ratio of singular values; below it the relation is not unique
 AT_ONCE = 1e-3  # least share of the lag-0 coefficient in the largest one
 SIDES = 100.0  # how much closer to zero the coefficients of one side must add up
+
+
+def require_signals(record: Record) -> None:
+    """Refuse a record without valves or outputs, or with a signal that never moves.
+
+    Raises:
+        InputError: no valve, no output, or a constant OP or PV.
+    """
+    require_tags(record)
+    require_motion(record, "op", record.op, record.valves)
+    require_motion(record, "pv", record.pv, record.outputs)
+
+
+def require_tags(record: Record) -> None:
+    """Refuse a record without valves or outputs."""
+    if not record.valves or not record.outputs:
+        raise InputError("needs at least one valve and one output", where=record.name)
+
+
+def require_motion(record: Record, what: str, values: FloatArray, tags: tuple[str, ...]) -> None:
+    """Refuse columns, shape (N, number of tags), of which one never moves."""
+    for tag, column in zip(tags, values.T, strict=True):
+        if len(column) and np.ptp(column) <= 1e-9 * max(1.0, float(np.abs(column).max())):
+            raise InputError(
+                f"{what} of {tag} is constant",
+                where=record.name,
+                fix="choose a window in which the loop moves",
+            )
+
+
+def require_samples(record: Record, needed: int, fix: str) -> None:
+    """Refuse a record of fewer than ``needed`` samples."""
+    if len(record) < needed:
+        raise InputError(
+            f"{len(record)} samples are too few, {needed} are needed", where=record.name, fix=fix
+        )
 
 
 class SwapRule(enum.StrEnum):

@@ -41,8 +41,7 @@ class FrictionIntervals:
         static_estimate: middle of ``static`` if itself not rejected, otherwise the middle of
             the best pattern, %.
         dynamic_estimate: f_D of the best fit, %.
-        zero_loss: how much worse f_S = 0 is, in units of −2 log likelihood.
-        deadband_loss: how much worse the best f_D = f_S is, same units.
+        deadband_loss: how much worse the best f_D = f_S is, in units of −2 log likelihood.
         patterns: number of switching patterns enumerated round the best one; 0 when the
             law has none or the valve does not slip.
         closed: whether that enumeration reached rejected patterns on every side.
@@ -54,7 +53,6 @@ class FrictionIntervals:
     dynamic: Interval
     static_estimate: float
     dynamic_estimate: float
-    zero_loss: float
     deadband_loss: float
     patterns: int
     closed: bool
@@ -92,7 +90,6 @@ def friction_intervals(
         dynamic=dynamic,
         static_estimate=estimate[0],
         dynamic_estimate=estimate[1],
-        zero_loss=float(scan.loss[0]) - floor,
         deadband_loss=_deadband_loss(scan) - floor,
         patterns=0 if near is None else near.patterns,
         closed=near is not None and near.closed,

@@ -9,6 +9,11 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.input_checks import (
+    require_motion,
+    require_samples,
+    require_tags,
+)
 from stiction_ros.records.record import Record
 
 MIN_SAMPLES = 40
@@ -86,28 +91,16 @@ def prepare_linear(record: Record, stem: FloatArray | None = None) -> LinearData
         InputError: no valve or output, a constant signal, fewer than ``MIN_SAMPLES`` samples,
             stems of another shape or not finite.
     """
-    if not record.valves or not record.outputs:
-        raise InputError("needs at least one valve and one output", where=record.name)
-    if len(record) < MIN_SAMPLES:
-        raise InputError(
-            f"{len(record)} samples are too few, {MIN_SAMPLES} are needed",
-            where=record.name,
-            fix="take a longer record",
-        )
+    require_tags(record)
+    require_samples(record, MIN_SAMPLES, "take a longer record")
     inputs = record.op if stem is None else np.asarray(stem, dtype=float)
     if inputs.shape != record.op.shape:
         raise InputError(f"stem has shape {inputs.shape}, not {record.op.shape}", where=record.name)
     if not np.isfinite(inputs).all():
         raise InputError("a stem position is not finite", where=record.name)
     key = "op" if stem is None else "stem"
-    for what, values, tags in ((key, inputs, record.valves), ("pv", record.pv, record.outputs)):
-        for tag, column in zip(tags, values.T, strict=True):
-            if np.ptp(column) <= 1e-9 * max(1.0, float(np.abs(column).max())):
-                raise InputError(
-                    f"{what} of {tag} is constant",
-                    where=record.name,
-                    fix="choose a window in which the loop moves",
-                )
+    require_motion(record, key, inputs, record.valves)
+    require_motion(record, "pv", record.pv, record.outputs)
     u_mean, u_scale = inputs.mean(axis=0), inputs.std(axis=0)
     y_mean, y_scale = record.pv.mean(axis=0), record.pv.std(axis=0)
     return LinearData(

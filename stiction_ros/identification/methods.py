@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification import engine, grid_search, nlp
+from stiction_ros.identification import engine, grid_search
 from stiction_ros.identification.input_checks import swapped_columns
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import Identification
@@ -19,9 +19,19 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 Method = Callable[[Record, IdentificationOptions | None, Progress | None], Identification]
 
+
+def _nlp(
+    record: Record, options: IdentificationOptions | None, progress: Progress | None
+) -> Identification:
+    # CasADi is slow to import, and only this method needs it.
+    from stiction_ros.identification import nlp
+
+    return nlp.identify(record, options, progress)
+
+
 METHODS: Mapping[str, Method] = {
     "exact": engine.identify,
-    "nlp": nlp.identify,
+    "nlp": _nlp,
     "grid": grid_search.identify,
 }
 

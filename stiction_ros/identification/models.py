@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -219,6 +220,16 @@ def scan_criteria(
     return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(criteria))]
 
 
+def with_delays(
+    delays: tuple[tuple[int, ...], ...], valve: int, column: Sequence[int] | FloatArray
+) -> tuple[tuple[int, ...], ...]:
+    """Return the delays per output with those of one valve replaced by ``column``, (p,)."""
+    return tuple(
+        tuple(int(new) if j == valve else d for j, d in enumerate(row))
+        for row, new in zip(delays, column, strict=True)
+    )
+
+
 def with_valve(
     data: Data,
     model: Model,
@@ -241,10 +252,7 @@ def with_valve(
             friction=all_friction,
             start=start,
             stems=stems,
-            delays=tuple(
-                tuple(int(delays[i]) if j == valve else d for j, d in enumerate(row))
-                for i, row in enumerate(model.delays)
-            ),
+            delays=with_delays(model.delays, valve, delays),
         ),
         orders,
         warm,
@@ -282,15 +290,12 @@ def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
     low, high = data.delay
     if low == high:
         return model
-    delays = [list(row) for row in model.delays]
-    one = np.ones(1)
-    for i, y in enumerate(data.y):
-        for j in range(len(data.u)):
-            others = [k for k in range(len(data.u)) if k != j]
-            lags = tuple(delays[i][k] for k in others)
-            scan = OutputScan(y, model.stems[others], lags, orders, data.delay, one, one)
-            delays[i][j] = low + int(scan.energy(model.stems[j : j + 1])[0].argmin())
-    return dataclasses.replace(model, delays=tuple(map(tuple, delays)))
+    for j in range(len(data.u)):
+        scans = output_scans(data, model, orders, j, Criterion.ONE_STEP, data.delays)
+        stem = model.stems[j : j + 1]
+        best = [low + int(scan.energy(stem)[0].argmin()) for scan in scans]
+        model = dataclasses.replace(model, delays=with_delays(model.delays, j, best))
+    return model
 
 
 def improve_delays(data: Data, model: Model, orders: Orders) -> Model:

@@ -26,7 +26,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
 from stiction_ros.identification.apparent_stiction import apparent_stiction
 from stiction_ros.identification.equation_error import Delays, evaluate
 from stiction_ros.identification.friction_programme import (
@@ -45,11 +44,11 @@ from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.programme_data import ProgrammeData
 from stiction_ros.identification.results import FitStatus, Identification
 from stiction_ros.identification.search_log import SearchLog, SolvedStart
+from stiction_ros.identification.smoothed_stems import final_smoothing, smoothed_stems
 from stiction_ros.identification.starts import STEP, Start, StartKind, draw_starts
 from stiction_ros.records.record import Record
 
 MAX_CHOICES = 500
-SMOOTHING = 1e4
 ROUGH = (2.8, 4.0, 8.0)  # τ S_0 of the strongly smoothed stages
 ENDS = 2
 LEVELS = 4
@@ -307,31 +306,6 @@ class _Search:
         )
         objective = float(np.mean([fit.squared_error for fit in fits]))
         return Answer(FitStatus.OK, "", friction, fits, stems), objective
-
-
-def final_smoothing(limits: FloatArray) -> FloatArray:
-    """Return τ at which (5) equals (4), shape (m,), 1/%: 10⁴, more where OP spans below 10 %.
-
-    Args:
-        limits: f_max of every valve, shape (m,), %.
-    """
-    return np.maximum(SMOOTHING, 10.0 * SMOOTHING / np.maximum(limits, 1e-9))
-
-
-def smoothed_stems(op: FloatArray, friction: FloatArray, smoothing: FloatArray) -> FloatArray:
-    """Return stems of the smoothed law (5), shape (m, N), %, from rest at the first OP.
-
-    Args:
-        op: shape (N, m), %.
-        friction: rows (f_S, f_D), shape (m, 2), %.
-        smoothing: τ of every valve, shape (m,), 1/%.
-    """
-    stems = []
-    for u, (static, dynamic), tau in zip(op.T, friction.tolist(), smoothing.tolist(), strict=True):
-        static, dynamic = max(static, 0.0), max(dynamic, 0.0)
-        law = SmoothedHeStiction(max(static, dynamic), dynamic, tau)
-        stems.append(law.simulate(u, float(u[0])))
-    return np.array(stems)
 
 
 def _objective(candidate: _Candidate) -> float:

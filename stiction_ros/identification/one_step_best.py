@@ -21,7 +21,13 @@ from stiction_ros.identification.equation_error import (
     squared_error,
 )
 from stiction_ros.identification.friction_grid import finer_grid
-from stiction_ros.identification.models import Criterion, Data, Model, scan_valve
+from stiction_ros.identification.models import (
+    Criterion,
+    Data,
+    Model,
+    scan_valve,
+    with_delays,
+)
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_scan import PatternScan
 from stiction_ros.identification.pattern_search import (
@@ -159,10 +165,7 @@ class _Search:
         for index in np.argsort(scan.loss, kind="stable"):
             if self._scaled(float(scan.loss[index])) > best.error * (1.0 + NEAR):
                 break
-            delays = tuple(
-                tuple(int(scan.delays[index, i]) if j == valve else d for j, d in enumerate(row))
-                for i, row in enumerate(best.delays)
-            )
+            delays = with_delays(best.delays, valve, scan.delays[index])
             found = self._in_cell(best, valve, scan, int(index), band, delays)
             if found is not None:
                 best = min(best, found, key=lambda point: point.error)

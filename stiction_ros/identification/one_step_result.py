@@ -10,6 +10,12 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.equation_error import ArxFit, ArxOrders, Delays
+from stiction_ros.identification.input_checks import (
+    TOO_SHORT,
+    require_samples,
+    require_signals,
+)
+from stiction_ros.identification.linear_data import nrmse_fit
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import (
     FitStatus,
@@ -58,27 +64,12 @@ def check_record(record: Record, options: IdentificationOptions) -> ArxOrders:
         raise InputError(
             f"method {options.method} has no law {options.law!r}", where="law", fix="use he"
         )
-    if not record.valves or not record.outputs:
-        raise InputError("needs at least one valve and one output", where=record.name)
-    signals = (("op", record.op, record.valves), ("pv", record.pv, record.outputs))
-    for key, values, tags in signals:
-        for tag, part in zip(tags, values.T, strict=True):
-            if len(part) and np.ptp(part) <= 1e-9 * max(1.0, float(np.abs(part).max())):
-                raise InputError(
-                    f"{key} of {tag} is constant",
-                    where=record.name,
-                    fix="choose a window in which the loop moves",
-                )
+    require_signals(record)
     output = DEFAULT_ORDER if options.output_order is None else options.output_order
     past = output if options.input_order is None else options.input_order
     orders = ArxOrders.over(output, past, [options.delay[1]] * len(record.valves))
     needed = orders.first + max(MIN_SAMPLES, 5 * (output + len(record.valves) * past + 3))
-    if len(record) < needed:
-        raise InputError(
-            f"{len(record)} samples are too few, {needed} are needed",
-            where=record.name,
-            fix="take a longer record, lower orders or a narrower delay range",
-        )
+    require_samples(record, needed, TOO_SHORT)
     return orders
 
 
@@ -194,14 +185,6 @@ def output_model(
         delay=dict(zip(record.valves, fit.delays, strict=True)),
         bias=fit.constant,
         noise_std=float(np.sqrt(variance)),
-        fit_one_step=fit_percent(tail, tail - fit.residuals),
-        fit_free_run=fit_percent(tail, fit.free_run(y, stems, first)),
+        fit_one_step=nrmse_fit(tail, tail - fit.residuals),
+        fit_free_run=nrmse_fit(tail, fit.free_run(y, stems, first)),
     )
-
-
-def fit_percent(y: FloatArray, predicted: FloatArray) -> float:
-    """Return the NRMSE fit 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %; −∞ where ŷ overflows."""
-    spread = max(float(np.linalg.norm(y - y.mean())), 1e-300)
-    with np.errstate(over="ignore", invalid="ignore"):
-        error = float(np.linalg.norm(y - predicted))
-    return 100.0 * (1.0 - error / spread) if np.isfinite(error) else float("-inf")

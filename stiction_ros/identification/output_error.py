@@ -24,6 +24,7 @@ from scipy.linalg import cho_solve, lapack, solve_triangular
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.polynomials import stabilised
 
 MAX_RADIUS = 0.9995
 FREE_RUN_WEIGHT = 0.02
@@ -88,16 +89,6 @@ class OutputFit:
     def bic(self) -> float:
         """Return n log(mean squared innovation) + parameters · log n."""
         return self.loss + self.parameters * float(np.log(self.count))
-
-
-def stabilised(a: FloatArray, radius: float = 0.99) -> FloatArray:
-    """Return A with roots outside ``radius`` pulled back onto it."""
-    roots = np.roots(a)
-    size = np.abs(roots)
-    if not len(roots) or size.max() <= radius:
-        return a
-    roots = np.where(size > radius, roots / np.maximum(size, 1e-12) * radius, roots)
-    return np.real(np.poly(roots))
 
 
 def equation_error_start(

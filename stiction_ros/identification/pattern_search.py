@@ -91,9 +91,7 @@ class PatternSearch:
         point = np.array([[f_s - f_d, f_s + f_d]])
         points = np.repeat(point, len(ranges), axis=0)
         cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)
-        before = cells.signs == 0.0
-        bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
-        level, _, loss, _ = self.minimised(bases, -before.astype(float), ranges)
+        level, loss = self._levels_before(cells, f_d, ranges)
         best = int(loss.argmin())
         inside = 1e-9 * (ranges[best, 1] - ranges[best, 0])
         return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
@@ -110,10 +108,8 @@ class PatternSearch:
         high = min(high, self.limit)
         point = points_of(np.array([[0.5 * (low + high), f_d]]))
         cells = cells_at(self.u, begin, point, self.law)
-        before = cells.signs == 0.0
-        bases = np.where(before, 0.0, cells.bases - f_d * cells.signs)
         around = begin.level + 0.1 * self.limit * np.array([[-1.0, 1.0]])
-        level = float(self.minimised(bases, -before.astype(float), around)[0][0])
+        level = float(self._levels_before(cells, f_d, around)[0][0])
         least, most = first_slip_range(self.u, level, begin, self.law)
         if max(low, least) < min(high, most):
             static = 0.5 * (max(low, least) + min(high, most))
@@ -121,6 +117,15 @@ class PatternSearch:
             static = 0.5 * (low + high)
             level = self.best_level(np.array([static, f_d]))
         return np.array([static, f_d]), level - float(self.u[0])
+
+    def _levels_before(
+        self, cells: Cells, dynamic: float, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the best stem before the first slip at f_D, and its loss, per cell."""
+        before = cells.signs == 0.0
+        bases = np.where(before, 0.0, cells.bases - dynamic * cells.signs)
+        level, _, loss, _ = self.minimised(bases, -before.astype(float), ranges)
+        return level, loss
 
     def minimised(
         self, bases: FloatArray, signs: FloatArray, ranges: FloatArray

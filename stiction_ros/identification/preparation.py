@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.errors import InputError
 from stiction_ros.identification.friction_grid import find_law
+from stiction_ros.identification.input_checks import (
+    TOO_SHORT,
+    require_samples,
+    require_signals,
+)
 from stiction_ros.identification.models import Data
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders
@@ -17,31 +21,13 @@ DEFAULT_ORDERS = (1, 2, 3)
 
 def prepare(record: Record, options: IdentificationOptions) -> Data:
     """Return the centred, scaled data; raise :class:`InputError` when they are unusable."""
-    for key, values, tags in (
-        ("op", record.op, record.valves),
-        ("pv", record.pv, record.outputs),
-    ):
-        for column, tag in enumerate(tags):
-            part = values[:, column]
-            if len(part) and np.ptp(part) <= 1e-9 * max(1.0, float(np.abs(part).max())):
-                raise InputError(
-                    f"{key} of {tag} is constant",
-                    where=record.name,
-                    fix="choose a window in which the loop moves",
-                )
-    if not record.valves or not record.outputs:
-        raise InputError("needs at least one valve and one output", where=record.name)
+    require_signals(record)
     orders = window(
         options, max(tried_orders(options)), input_order_for(options, max(tried_orders(options)))
     )
     free = 2 * orders.output + len(record.valves) * orders.input + orders.noise + 3
     needed = orders.first + max(MIN_SAMPLES, 5 * free)
-    if len(record) < needed:
-        raise InputError(
-            f"{len(record)} samples are too few, {needed} are needed",
-            where=record.name,
-            fix="take a longer record, lower orders or a narrower delay range",
-        )
+    require_samples(record, needed, TOO_SHORT)
     u, y = record.op.T, record.pv.T
     span = np.ptp(u, axis=1)
     limit = span if options.friction_limit is None else np.minimum(span, options.friction_limit)

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -65,3 +67,11 @@ def test_unusable_records_are_refused(method: str, case: str) -> None:
         options = dataclasses.replace(options, law="kano")
     with pytest.raises(InputError):
         identify(record, options)
+
+
+def test_casadi_is_left_alone_by_all_but_the_nonlinear_programme() -> None:
+    code = (
+        "import sys, stiction_ros.cli.main, stiction_ros.online.live_estimator; "
+        "sys.exit('casadi' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

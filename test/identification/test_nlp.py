@@ -17,9 +17,9 @@ from stiction_ros.identification import (
 )
 from stiction_ros.identification.equation_error import ArxOrders, squared_error
 from stiction_ros.identification.friction_programme import FrictionProgramme
-from stiction_ros.identification.nlp import final_smoothing, smoothed_stems
 from stiction_ros.identification.programme_data import ProgrammeData
 from stiction_ros.identification.programme_terms import ALPHA, Terms
+from stiction_ros.identification.smoothed_stems import final_smoothing, smoothed_stems
 from stiction_ros.identification.starts import StartKind, border, draw_starts, stiction_line
 from stiction_ros.records.record import Record
 
