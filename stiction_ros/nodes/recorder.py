@@ -18,7 +18,7 @@ from stiction_ros.nodes.messages import SECOND
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.node_settings import RecorderNodeSettings
 from stiction_ros.records.bag_metadata import Qos
-from stiction_ros.records.bag_writer import BagWriter
+from stiction_ros.records.bag_writer import BagWriter, Packing
 from stiction_ros.records.message_definitions import definition
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
@@ -38,7 +38,7 @@ class RecorderNode(ManagedNode):
             self._wanted = re.compile(self.settings.topics)
         except re.error as error:
             raise InputError(f"no regular expression ({error})", where="recorder: topics") from None
-        self.writer = BagWriter(self.settings.directory, compression=self.settings.compression)
+        self.writer = BagWriter(self.settings.directory, Packing(self.settings.compression))
         self._topics: dict[str, str] = {}
         self._skipped: dict[str, str] = {}
         self._simulated: int | None = None

@@ -31,7 +31,7 @@ def read_bag(path: str | Path, *, namespace: str | None = None) -> Record:
     """Read the record of a loop from ``pv``, ``sp``, ``op``, ``stem`` in a bag.
 
     Args:
-        path: see :func:`storage_files`.
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
         namespace: of the loop's topics; needed when the bag holds several loops.
 
     Raises:
