@@ -33,7 +33,7 @@ class Packing:
     """
 
     compression: str = "zstd"
-    chunk_size: int = 1 << 20
+    chunk_size: int = 1 << 18
 
 
 @dataclasses.dataclass(frozen=True)

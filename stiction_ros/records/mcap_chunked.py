@@ -66,7 +66,7 @@ class ChunkedFile:
     """
 
     def __init__(
-        self, output: BinaryIO, *, compression: str = "zstd", chunk_size: int = 1 << 20
+        self, output: BinaryIO, *, compression: str = "zstd", chunk_size: int = 1 << 18
     ) -> None:
         if compression not in COMPRESSIONS:
             raise InputError(

@@ -20,8 +20,6 @@ from stiction_ros.records.mcap_format import (
     CHANNEL,
     CHUNK,
     DATA_END,
-    FOOTER,
-    FOOTER_BODY,
     MAGIC,
     MESSAGE,
     MESSAGE_HEAD,
@@ -36,11 +34,15 @@ from stiction_ros.records.mcap_format import (
     mapping_at,
     text_at,
 )
+from stiction_ros.records.mcap_summary import (
+    FOOTER_SIZE,
+    has_footer,
+    intact_summary,
+    summary_records,
+)
 
 BLOCK = 1 << 20  # bytes read at a time
 _HEADS = frozenset({0, CHUNK, DATA_END})  # records that the loop over the file looks at itself
-_FOOTER_HEAD = RECORD.pack(FOOTER, FOOTER_BODY.size)
-_FOOTER_SIZE = len(_FOOTER_HEAD) + FOOTER_BODY.size + len(MAGIC)
 
 
 class RawMessage(NamedTuple):
@@ -111,6 +113,8 @@ class McapScan:
                 fix="give a rosbag2 directory or a .mcap file",
             )
         size = os.fstat(file.fileno()).st_size
+        if self._salvage:
+            self._learn_from_summary(file)
         place, checksum = len(MAGIC), zlib.crc32(MAGIC)  # of what comes before ``data``
         data, at = b"", 0
         while True:
@@ -211,9 +215,18 @@ class McapScan:
             schema_encoding=schema_encoding,
         )
 
+    def _learn_from_summary(self, file: BinaryIO) -> None:
+        """Take topics from an intact summary: the chunk that announces them may be damaged."""
+        for opcode, body in intact_summary(file):
+            if opcode in (SCHEMA, CHANNEL):
+                self._other(opcode, body)
+        file.seek(len(MAGIC))
+
     def _end_of_data(self, body: bytes, checksum: int, rest: bytes, place: int) -> None:
         """Compare checksum and summary, which begins at ``place``, with what was read."""
         self.finished = True
+        if self.damaged:  # of what was left out nothing more can be said
+            return
         expected = U32.unpack_from(body)[0] if len(body) >= U32.size else 0
         if expected and expected != checksum:
             self._broken(place, "the checksum of the data is wrong")
@@ -226,32 +239,23 @@ class McapScan:
 
     def _summary_fault(self, rest: bytes) -> str:
         """Return what is wrong with what follows the data; empty when nothing is."""
-        tail = rest[-_FOOTER_SIZE:]
-        if not (tail.startswith(_FOOTER_HEAD) and tail.endswith(MAGIC)):
-            return "no footer at its end"
-        (checksum,) = U32.unpack_from(rest, len(rest) - len(MAGIC) - U32.size)
-        if checksum and zlib.crc32(memoryview(rest)[: -len(MAGIC) - U32.size]) != checksum:
-            return "the checksum of the summary is wrong"
-        at = 0
-        while at < len(rest) - _FOOTER_SIZE:
-            opcode, _ = _head(rest, at)
-            end = _end(rest, at)
-            if end > len(rest) - _FOOTER_SIZE:
-                return "a record is longer than the summary"
-            if opcode == STATISTICS and end - at >= RECORD.size + U64.size:
-                (count,) = U64.unpack_from(rest, at + RECORD.size)
-                found = sum(self.counts.values())
-                if count != found:
-                    return f"it holds {found} messages, its summary says {count}"
-            at = end
+        try:
+            for opcode, body in summary_records(rest):
+                if opcode == STATISTICS:
+                    (count,) = U64.unpack_from(body)
+                    found = sum(self.counts.values())
+                    if count != found:
+                        return f"it holds {found} messages, its summary says {count}"
+        except (ValueError, struct.error) as error:
+            return str(error)
         return ""
 
     def _torn(self, file: BinaryIO, left: int) -> None:
         """Note an unfinished file; raise when the file had been finished."""
         size = file.seek(0, os.SEEK_END)
-        file.seek(max(size - _FOOTER_SIZE, 0))
+        file.seek(max(size - FOOTER_SIZE, 0))
         tail = file.read()
-        if tail.startswith(_FOOTER_HEAD) and tail.endswith(MAGIC):
+        if has_footer(tail):
             self._broken(size - left, "a record is longer than the file")
             return
         more = f", its last {left} bytes are no whole record and are left out" if left else ""

@@ -56,8 +56,8 @@ def listing_notes(path: str | Path, counts: Mapping[str, int]) -> list[str]:
         counts: messages by topic, as they were read.
 
     Returns:
-        One sentence for each topic whose number of messages in ``metadata.yaml`` is
-        another, for files there that it does not list, and for missing split numbers.
+        One sentence each: on numbers of messages that are others in ``metadata.yaml``, on
+        files that it does not list, on missing numbers of splits.
     """
     path = Path(path)
     if not path.is_dir():
@@ -71,12 +71,20 @@ def listing_notes(path: str | Path, counts: Mapping[str, int]) -> list[str]:
     listed_files = {file.name for file in _listed_files(path, information)}
     unlisted = {file.name for file in there} - listed_files
     notes = [f"{name} is not in {METADATA}, left out" for name in sorted(unlisted)]
-    listed = _listed_counts(path, information)
-    for topic in sorted(listed.keys() | counts.keys()):
-        says, holds = listed.get(topic, 0), counts.get(topic, 0)
-        if says != holds:
-            notes.append(f"{METADATA} says {says} messages of {topic}, the files hold {holds}")
-    return notes
+    return notes + _differences(_listed_counts(path, information), counts)
+
+
+def _differences(listed: Mapping[str, int], counts: Mapping[str, int]) -> list[str]:
+    """Return one sentence when ``metadata.yaml`` lists other counts than the files hold."""
+    differing = [
+        f"{counts.get(topic, 0)} of {listed.get(topic, 0)} on {topic}"
+        for topic in sorted(listed.keys() | counts.keys())
+        if listed.get(topic, 0) != counts.get(topic, 0)
+    ]
+    if not differing:
+        return []
+    more = f" and on {len(differing) - 3} more topics" if len(differing) > 3 else ""
+    return [f"the files hold other messages than {METADATA} says: {', '.join(differing[:3])}{more}"]
 
 
 def _information(path: Path) -> Mapping[str, Any]:
