@@ -26,19 +26,18 @@ from stiction_ros.records.mcap_format import (
     METADATA,
     RECORD,
     SCHEMA,
-    STATISTICS,
     U16,
     U32,
-    U64,
     chunk_data,
     mapping_at,
     text_at,
 )
 from stiction_ros.records.mcap_summary import (
     FOOTER_SIZE,
+    SummaryError,
     has_footer,
     intact_summary,
-    summary_records,
+    message_count,
 )
 
 BLOCK = 1 << 20  # bytes read at a time
@@ -73,11 +72,10 @@ class McapScan:
         topics: channel id to topic, filled as :meth:`messages` goes on.
         counts: messages by channel id, as far as :meth:`messages` has come.
         metadata: name and content of every metadata record met so far.
-        finished: whether the end of the data was reached; False for a file whose writer
-            was killed.
+        finished: whether it ends as a finished file does; False for a file whose writer
+            was killed, or whose summary is damaged.
         notes: what was left out, one sentence each.
-        damaged: whether there is a note on damage, which only a salvage survives, or on a
-            summary that contradicts intact data.
+        damaged: whether there is a note on damage of the data, which only a salvage survives.
     """
 
     def __init__(self, path: Path, *, salvage: bool = False) -> None:
@@ -230,25 +228,19 @@ class McapScan:
         expected = U32.unpack_from(body)[0] if len(body) >= U32.size else 0
         if expected and expected != checksum:
             self._broken(place, "the checksum of the data is wrong")
-        fault = self._summary_fault(rest)
-        if fault and expected == checksum:
-            self.damaged = True
-            self.notes.append(f"the summary of {self.path.name} is damaged ({fault}), not its data")
-        elif fault:
-            self._broken(place, fault)
-
-    def _summary_fault(self, rest: bytes) -> str:
-        """Return what is wrong with what follows the data; empty when nothing is."""
+            return
+        found = sum(self.counts.values())
         try:
-            for opcode, body in summary_records(rest):
-                if opcode == STATISTICS:
-                    (count,) = U64.unpack_from(body)
-                    found = sum(self.counts.values())
-                    if count != found:
-                        return f"it holds {found} messages, its summary says {count}"
-        except (ValueError, struct.error) as error:
-            return str(error)
-        return ""
+            told = message_count(rest)
+            fault = "" if told in (None, found) else f"it says {told} messages, there are {found}"
+            if fault and not expected:
+                self._broken(place, f"summary: {fault}")
+                return
+        except SummaryError as error:
+            fault = str(error)
+        if fault:
+            self.finished = False
+            self.notes.append(f"the summary of {self.path.name} is damaged ({fault}), not its data")
 
     def _torn(self, file: BinaryIO, left: int) -> None:
         """Note an unfinished file; raise when the file had been finished."""
