@@ -43,7 +43,7 @@ class RecorderNode(ManagedNode):
         self._unheard: dict[str, str] = {}
         self._lost = 0
         self._simulated: int | None = None
-        self._timers = [
+        self._looking = [
             self.create_timer(DISCOVERY_PERIOD, self._discover),
             self.create_timer(1.0, self._look_for_unheard),
         ]
@@ -69,7 +69,7 @@ class RecorderNode(ManagedNode):
         if self.writer is None:
             return
         writer, self.writer = self.writer, None
-        for timer in self._timers:
+        for timer in self._looking:
             self.destroy_timer(timer)
         try:
             writer.close()
@@ -123,7 +123,7 @@ class RecorderNode(ManagedNode):
                 continue
             for info in self.get_publishers_info_by_topic(name):
                 compatibility, why = qos_check_compatible(info.qos_profile, asked)
-                if compatibility is QoSCompatibility.ERROR:
+                if compatibility == QoSCompatibility.ERROR:  # equal, not the same object
                     self._unheard[name] = f"{info.node_name}: {why.strip()}"
                     self.get_logger().warning(f"{name} of {self._unheard[name]} is not recorded")
                     break
