@@ -102,7 +102,13 @@ class LoopSignals:
             InputError: see :func:`read_bag`.
         """
         notes = list(notes)
-        space = self.loop(namespace)
+        try:
+            space = self.loop(namespace)
+        except InputError as error:
+            unread = [note for note in notes if "cannot be decoded" in note]
+            if unread:
+                raise InputError(error.what, where=error.where, fix="; ".join(unread)) from None
+            raise
         signals = self._samples[space]
         pv, op = signals["pv"], signals["op"]
         stamps = np.array(sorted(pv.keys() & op.keys()), dtype=np.int64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import os
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from stiction_ros.records.bag_finish import (
 )
 from stiction_ros.records.bag_metadata import BagFile
 from stiction_ros.records.mcap_scan import McapScan
-from stiction_ros.records.storage_files import METADATA, found_files, listing_notes
+from stiction_ros.records.storage_files import METADATA, found_files, listing_notes, refuse_foreign
 
 
 class RepairStatus(enum.StrEnum):
@@ -62,12 +62,14 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
         packing: of files that are rewritten.
 
     Raises:
-        InputError: no such bag, or a file that is no MCAP file at all.
+        InputError: no such bag, one of another kind, or a file that is no MCAP file at all.
         OSError: the storage refuses.
     """
     path = Path(path)
     if not path.exists():
         raise InputError("no such bag", where=str(path), fix="check the path")
+    if path.is_dir():
+        refuse_foreign(path)
     files = found_files(path) if path.is_dir() else (path,)
     contents = [_look(file) for file in files]
     notes = [note for content in contents for note in content.notes]
@@ -109,9 +111,7 @@ def _look(path: Path) -> FileContent:
 def _mend(path: Path, content: FileContent, packing: Packing, clock: int | None) -> FileContent:
     """Rewrite one file; a damaged one stays beside the new one under another name."""
     if content.damaged:
-        kept = path.with_suffix(".mcap.damaged")
-        kept.unlink(missing_ok=True)
-        os.link(path, kept)
+        shutil.copy2(path, path.with_suffix(".mcap.damaged"))
     return rewrite(path, packing, clock=clock, salvage=True)
 
 

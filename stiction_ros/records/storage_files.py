@@ -34,6 +34,19 @@ def storage_files(path: str | Path) -> tuple[Path, ...]:
     return found_files(path)
 
 
+def refuse_foreign(directory: Path) -> None:
+    """Raise InputError when a readable ``metadata.yaml`` tells of a bag of another kind."""
+    where = directory / METADATA
+    if not where.is_file():
+        return
+    try:
+        information = _information(directory)
+    except InputError:
+        return  # unreadable, so it tells nothing
+    if "version" in information and "storage_identifier" in information:
+        _refuse_foreign(information, str(where))
+
+
 def found_files(directory: Path) -> tuple[Path, ...]:
     """Return the MCAP files in a directory, by the number at the end of their names.
 
@@ -98,6 +111,23 @@ def _information(path: Path) -> Mapping[str, Any]:
         raise _unreadable(where, error) from None
 
 
+def _refuse_foreign(information: Mapping[str, Any], where: str) -> None:
+    try:
+        version = int(information["version"])
+        storage = str(information["storage_identifier"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise _unreadable(Path(where), error) from None
+    mode = str(information.get("compression_mode") or "")
+    if version > VERSION:
+        raise InputError(f"has version {version}, newer than {VERSION}", where=where)
+    if storage != "mcap" or mode.lower() in ("file", "message"):
+        raise InputError(
+            f"the storage is {storage} {mode}".strip(),
+            where=where,
+            fix="convert it with `ros2 bag convert` to plain mcap",
+        )
+
+
 def _unreadable(where: Path, error: Exception) -> InputError:
     return InputError(
         f"cannot be read ({type(error).__name__})",
@@ -108,21 +138,11 @@ def _unreadable(where: Path, error: Exception) -> InputError:
 
 def _listed_files(path: Path, information: Mapping[str, Any]) -> tuple[Path, ...]:
     where = str(path / METADATA)
+    _refuse_foreign(information, where)
     try:
-        version = int(information["version"])
-        storage = str(information["storage_identifier"])
-        mode = str(information.get("compression_mode") or "")
         names = [str(name) for name in information["relative_file_paths"]]
-    except (ValueError, TypeError, KeyError) as error:
+    except (TypeError, KeyError) as error:
         raise _unreadable(path / METADATA, error) from None
-    if version > VERSION:
-        raise InputError(f"has version {version}, newer than {VERSION}", where=where)
-    if storage != "mcap" or mode.lower() in ("file", "message"):
-        raise InputError(
-            f"the storage is {storage} {mode}".strip(),
-            where=where,
-            fix="convert it with `ros2 bag convert` to plain mcap",
-        )
     files = tuple(path / Path(name).name for name in names)
     for file in files:
         if not file.is_file():

@@ -88,6 +88,28 @@ def test_errors(tmp_path: Path) -> None:
         repair_bag(tmp_path / "x.mcap")
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("version", 12, "has version 12, newer than 9"),
+        ("storage_identifier", "sqlite3", "the storage is sqlite3"),
+        ("compression_mode", "MESSAGE", "the storage is mcap MESSAGE; convert it"),
+    ],
+)
+def test_a_bag_of_another_kind_is_left_alone(key: str, value: object, said: str, bag: Bag) -> None:
+    path = killed(bag)
+    bag.writer.close()
+    listing = path / "metadata.yaml"
+    document = yaml.safe_load(listing.read_text())
+    document["rosbag2_bagfile_information"][key] = value
+    listing.write_text(yaml.safe_dump(document))
+    before = listing.read_bytes()
+    for use in (repair_bag, raw):
+        with pytest.raises(InputError, match=said):
+            use(path)
+    assert listing.read_bytes() == before
+
+
 def test_the_command(bag: Bag, capsys: pytest.CaptureFixture[str]) -> None:
     path = killed(bag)
     assert main(["repair", str(path), "--json", "-"]) == 0
