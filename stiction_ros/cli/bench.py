@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli import bench_graph, bench_identification
+from stiction_ros.cli import bench_graph, bench_identification, bench_record
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
@@ -79,14 +79,23 @@ def machine() -> str:
 
 
 def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
+    _refuse_options(options)
+    return bench_graph.graph(show)
+
+
+def _record(options: argparse.Namespace, show: Bar) -> list[Row]:
+    _refuse_options(options)
+    return bench_record.record(show)
+
+
+def _refuse_options(options: argparse.Namespace) -> None:
     for key in ("repeat", "seed", "longest", "quick"):
         if getattr(options, key) is not None:
             raise InputError(
-                "benchmark graph has no such option",
+                f"benchmark {options.name} has no such option",
                 where=f"--{key}",
                 fix="leave it out, or measure identification",
             )
-    return bench_graph.graph(show)
 
 
 def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
@@ -126,4 +135,5 @@ def _number(value: float) -> str:
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
+    "record": _record,
 }
