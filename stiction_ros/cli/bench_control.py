@@ -165,8 +165,7 @@ def _unaware_rows(loop: Loop, count: int) -> list[Row]:
     fast, plans = _timed(lambda at: _plan(quadratic, at), problems)
     ours = [_first_op(plan) for plan in plans]
     case = f"tank, N_H = {design.unaware.horizon}"
-    solver = _plain_ipopt(design)
-    times, theirs = _timed(solver, problems)
+    times, theirs = _timed(_plain_ipopt(design), problems)
     rows = [row(case, (SU, IPOPT), fast, times, _agreement(ours, theirs, times))]
     package = bench_do_mpc.load()
     if package is None:
@@ -177,6 +176,9 @@ def _unaware_rows(loop: Loop, count: int) -> list[Row]:
         return rows
     other = bench_do_mpc.DoMpc(package, design.model, design.unaware, design.limits.stem)
     times, theirs = _timed(other, problems)
+    # Before and after the baseline, as the speed of a machine drifts.
+    fast = np.append(fast, _timed(lambda at: _plan(quadratic, at), problems)[0])
+    whole = np.append(whole, _whole_steps(design, loop.record))
     name = f"do-mpc {package.__version__}, make_step"
     note = _agreement(ours, theirs, times)
     more = f"{note}; observer and target are counted on this side only"
@@ -219,6 +221,7 @@ def _quadratic_row(case: str, loop: Loop, count: int, horizon: int | None) -> Ro
     quadratic = UnawareMpc(design.model, design.unaware, design.limits)
     fast, plans = _timed(lambda at: _plan(quadratic, at), problems)
     slow, theirs = _timed(_plain_ipopt(design), problems)
+    fast = np.append(fast, _timed(lambda at: _plan(quadratic, at), problems)[0])
     ours = [_first_op(plan) for plan in plans]
     return row(case, (SU, IPOPT), fast, slow, _agreement(ours, theirs, slow))
 
@@ -234,6 +237,8 @@ def _embedding_row(case: str, loop: Loop, count: int, horizon: int | None) -> Ro
     tuning = PaperTuning(augmented_weights(WeightPreset.CORRECTED, design.model, length))
     printed = PrintedEmbeddingMpc(design.model, tuning, design.limits, loop.frictions)
     slow, plans = _timed(lambda at: printed.plan(at.state, at.target, at.stem), problems)
+    again, _ = _timed(lambda at: formulation.plan(at.state, at.target, at.stem), problems)
+    fast = np.append(fast, again)
     iterations = np.median([plan.iterations for plan in plans if plan is not None])
     note = f"{len(problems)} problems, {iterations:.0f} iterations; {_last(slow)}"
     if case == "tank":
