@@ -17,7 +17,7 @@ from stiction_ros.cli import bench_do_mpc
 from stiction_ros.cli.bench_row import Row, row
 from stiction_ros.cli.scenarios import find
 from stiction_ros.control import ControlDesign, ControlMode, ControlSettings, MpcController, Plan
-from stiction_ros.control.augmented_cost import AugmentedCost, Situation
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.control.observer import Observer
 from stiction_ros.control.paper_weights import (
     AugmentedWeights,
@@ -99,7 +99,7 @@ class Loop:
             settings = dataclasses.replace(settings, horizon=horizon)
         return settings.design(self.model)
 
-    def problems(self, count: int, *, aware: bool) -> list[Situation]:
+    def problems(self, count: int, *, aware: bool) -> list[PlanProblem]:
         """Return ``count`` problems spread over the record; ``aware`` takes χ̂ for the stem."""
         record, design = self.record, self.design()
         assert record.sp is not None
@@ -117,7 +117,7 @@ class Loop:
             observer.correct(record.pv[k])
             target = selector.select(record.sp[k], observer.disturbance, nothing)
             if target is not None and k >= SETTLE:
-                found.append(Situation(observer.state, stems[k - 1], target))
+                found.append(PlanProblem(observer.state, stems[k - 1], target))
         picks = np.linspace(0, len(found) - 1, min(count, len(found))).round().astype(int)
         return [found[k] for k in picks]
 
@@ -246,7 +246,7 @@ def _embedding_row(case: str, loop: Loop, count: int, horizon: int | None) -> Ro
     return row(case, (SE, PRINTED), fast, slow, note)
 
 
-def _plain_ipopt(design: ControlDesign) -> Callable[[Situation], FloatArray]:
+def _plain_ipopt(design: ControlDesign) -> Callable[[PlanProblem], FloatArray]:
     """Return (19) as a sparse programme of CasADi that IPOPT solves; built once."""
     m, weights = len(design.model.stem0), design.unaware
     nothing = np.zeros((m, m))
@@ -257,7 +257,7 @@ def _plain_ipopt(design: ControlDesign) -> Callable[[Situation], FloatArray]:
     cost = AugmentedCost(design.model, augmented, healthy)
     programme = SmoothedProgramme(design.model, PaperTuning(augmented), healthy, design.limits.stem)
 
-    def solve(at: Situation) -> FloatArray:
+    def solve(at: PlanProblem) -> FloatArray:
         start = np.tile(at.stem, (cost.horizon, 1))
         found = programme.solve(at, start, start)
         return np.full(m, np.nan) if found.op is None else found.op[0]
@@ -280,7 +280,7 @@ def _whole_steps(design: ControlDesign, record: Record) -> FloatArray:
 
 
 def _timed(
-    method: Callable[[Situation], T], problems: Sequence[Situation]
+    method: Callable[[PlanProblem], T], problems: Sequence[PlanProblem]
 ) -> tuple[FloatArray, list[T]]:
     """Return ms and answer of every problem; the first is solved once more ahead of all."""
     method(problems[0])
@@ -292,7 +292,7 @@ def _timed(
     return times, answers
 
 
-def _plan(quadratic: UnawareMpc, at: Situation) -> Plan | None:
+def _plan(quadratic: UnawareMpc, at: PlanProblem) -> Plan | None:
     return quadratic.plan(at.state, at.target, at.stem)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.control.augmented_cost import Situation
+from stiction_ros.control.augmented_cost import PlanProblem
 from stiction_ros.control.horizon import HorizonWeights
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.processes import LinearModel
@@ -64,7 +64,7 @@ class DoMpc:
         self._mpc: Any = mpc
         self._started = False
 
-    def __call__(self, at: Situation) -> FloatArray:
+    def __call__(self, at: PlanProblem) -> FloatArray:
         """Return the first OP, shape (m,), %."""
         mpc = self._mpc
         self._template["_tvp", :, "goal"] = at.target.stem

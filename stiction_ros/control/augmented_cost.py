@@ -16,7 +16,7 @@ from stiction_ros.processes import LinearModel
 
 
 @dataclasses.dataclass(frozen=True)
-class Situation:
+class PlanProblem:
     """What a plan starts from.
 
     Attributes:
@@ -59,11 +59,11 @@ class AugmentedCost:
                 stems[:, j] = friction.simulate(op[:, j], start=float(start[j]))
         return stems
 
-    def __call__(self, situation: Situation, op: FloatArray) -> float:
+    def __call__(self, situation: PlanProblem, op: FloatArray) -> float:
         """Return the cost of ``op``, shape (N, m), %, in the units of the weights."""
         return self.of_stems(situation, op, self.stems(op, situation.stem))
 
-    def of_stems(self, situation: Situation, op: FloatArray, stems: FloatArray) -> float:
+    def of_stems(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> float:
         """Return the cost of ``op`` when its stems, shape (N, m), are known already."""
         target, weights = situation.target, self.weights
         state, last = situation.state - target.state, situation.stem - target.stem

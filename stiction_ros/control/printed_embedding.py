@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.augmented_cost import AugmentedCost, Situation
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.control.horizon import HorizonLimits
 from stiction_ros.control.paper_weights import PaperTuning, WarmStart
+from stiction_ros.control.printed_inversion import he_frictions
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.searched_start import SearchedStart
 from stiction_ros.control.smoothed_programme import ProgrammeStatus, SmoothedProgramme
 from stiction_ros.control.target import Target
 from stiction_ros.control.warm_start import compensation
 from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
@@ -61,25 +63,27 @@ class PrintedEmbeddingMpc:
         model: LinearModel,
         tuning: PaperTuning,
         limits: HorizonLimits,
-        frictions: tuple[HeStiction | None, ...],
+        frictions: Sequence[Behaviour | None],
     ) -> None:
         """Build the programme once.
 
         Raises:
-            InputError: no sticky valve, or bounds that this formulation does not know.
+            InputError: no sticky valve, a law other than He's, or bounds that this formulation
+                does not know.
         """
-        _check(limits, frictions)
-        self.tuning, self.frictions = tuning, frictions
+        known = he_frictions(frictions)
+        _check(limits, known)
+        self.tuning, self.frictions = tuning, known
         self._limits = limits.stem
-        self.cost = AugmentedCost(model, tuning.weights, frictions)
-        self._programme = SmoothedProgramme(model, tuning, frictions, limits.stem)
+        self.cost = AugmentedCost(model, tuning.weights, known)
+        self._programme = SmoothedProgramme(model, tuning, known, limits.stem)
         searches = tuning.warm_start is WarmStart.SEARCH
         self._search = SearchedStart(self.cost, limits.stem) if searches else None
         self._before: FloatArray | None = None  # u_{k−1}
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> PrintedPlan | None:
         """Return the better plan from ξ̂ (n,) and the stem estimates ``last`` (m,), or None."""
-        situation = Situation(state, last, target)
+        situation = PlanProblem(state, last, target)
         start = self.warm_start(situation)
         stems = self.cost.stems(start, last)
         start_cost = self.cost.of_stems(situation, start, stems)
@@ -106,7 +110,7 @@ class PrintedEmbeddingMpc:
             warm_start_cost=start_cost,
         )
 
-    def warm_start(self, situation: Situation) -> FloatArray:
+    def warm_start(self, situation: PlanProblem) -> FloatArray:
         """Return the sequence that the programme starts from, shape (N, m), %."""
         if self._search is not None:
             found = self._search.find(situation)
@@ -122,7 +126,7 @@ class PrintedEmbeddingMpc:
                 op[:, j] = compensation(friction, float(before[j]), ends, horizon, a)
         return np.clip(op, self._limits[:, 0], self._limits[:, 1])
 
-    def _outputs(self, situation: Situation, stems: FloatArray) -> FloatArray:
+    def _outputs(self, situation: PlanProblem, stems: FloatArray) -> FloatArray:
         target, part = situation.target, self.cost.part
         state = situation.state - target.state
         now = part.model.c @ state

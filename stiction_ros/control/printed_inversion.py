@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
 from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.errors import InputError
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -36,9 +38,13 @@ class PrintedInversionMpc:
 
     mode = ControlMode.INVERSION
 
-    def __init__(self, linear: UnawareMpc, frictions: tuple[HeStiction | None, ...]) -> None:
-        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one."""
-        self.linear, self.frictions = linear, frictions
+    def __init__(self, linear: UnawareMpc, frictions: Sequence[Behaviour | None]) -> None:
+        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one.
+
+        Raises:
+            InputError: a law other than He's.
+        """
+        self.linear, self.frictions = linear, he_frictions(frictions)
         self._before: FloatArray | None = None  # u_{k−1}
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> InvertedPlan | None:
@@ -59,3 +65,21 @@ class PrintedInversionMpc:
         self._before = op.copy()
         values = {f.name: getattr(plan, f.name) for f in dataclasses.fields(plan)}
         return InvertedPlan(**values | {"op": op}, process_input=wanted.copy())
+
+
+def he_frictions(frictions: Sequence[Behaviour | None]) -> tuple[HeStiction | None, ...]:
+    """Return ``frictions`` when all of them follow He's law, which is the paper's.
+
+    Raises:
+        InputError: another law.
+    """
+    known: list[HeStiction | None] = []
+    for friction in frictions:
+        if friction is not None and not isinstance(friction, HeStiction):
+            raise InputError(
+                f"the paper's controllers know He's law, not {friction.title()}",
+                where="formulation",
+                fix="use formulation: exact",
+            )
+        known.append(friction)
+    return tuple(known)

@@ -8,7 +8,7 @@ import itertools
 import daqp
 import numpy as np
 
-from stiction_ros.control.augmented_cost import AugmentedCost, Situation
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 
@@ -52,7 +52,7 @@ class SearchedStart:
             chosen = dict(zip(sticky, combination, strict=True))
             self._programmes.append(_RouteProgramme(cost, limits, chosen))
 
-    def find(self, situation: Situation) -> FloatArray | None:
+    def find(self, situation: PlanProblem) -> FloatArray | None:
         """Return OP, shape (N, m), % within the limits; None when no route is feasible."""
         best: tuple[float, FloatArray] | None = None
         for programme in self._programmes:
@@ -110,7 +110,7 @@ class _RouteProgramme:
         dynamic = np.array([0.0 if f is None else f.dynamic_friction for f in cost.frictions])
         return hessian + 2.0 * penalty, 2.0 * penalty @ (slips * dynamic).reshape(-1)
 
-    def solve(self, situation: Situation) -> FloatArray | None:
+    def solve(self, situation: PlanProblem) -> FloatArray | None:
         """Return OP over the horizon, shape (N, m), %, or None."""
         target = situation.target
         last = situation.stem - target.stem
@@ -159,7 +159,7 @@ class _RouteProgramme:
                 rows.append(row)
         return np.array(rows).reshape(len(rows), self._shape.shape[1])
 
-    def _bounds(self, situation: Situation) -> tuple[FloatArray, FloatArray]:
+    def _bounds(self, situation: PlanProblem) -> tuple[FloatArray, FloatArray]:
         """Return bounds on the stems off the target, then on the turns."""
         target = situation.target
         count = self._shape.shape[1]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.control.augmented_cost import Situation
+from stiction_ros.control.augmented_cost import PlanProblem
 from stiction_ros.control.paper_weights import PaperTuning
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
@@ -131,7 +131,7 @@ class SmoothedProgramme:
             "error_on_fail": False,
         }
 
-    def solve(self, situation: Situation, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
+    def solve(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
         """Return the local optimum that IPOPT reaches.
 
         Args:
@@ -158,7 +158,7 @@ class SmoothedProgramme:
         inside = np.clip(found, self._limits[:, 0], self._limits[:, 1])
         return ProgrammeResult(status, inside, cost, iterations)
 
-    def _guess(self, situation: Situation, op: FloatArray, stems: FloatArray) -> FloatArray:
+    def _guess(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> FloatArray:
         """Return all unknowns of the start, simulated, shape (N (m + s + n),)."""
         model, target = self.model, situation.target
         state = situation.state - target.state

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from loops import stable_model, target_at
 
-from stiction_ros.control.augmented_cost import Situation
+from stiction_ros.control.augmented_cost import PlanProblem
 from stiction_ros.control.paper_weights import (
     AugmentedWeights,
     PaperTuning,
@@ -35,9 +35,9 @@ def tuning(
     return PaperTuning(weights(model, horizon), start)
 
 
-def situation(model: LinearModel, away: float, stem: float = 50.0) -> Situation:
+def situation(model: LinearModel, away: float, stem: float = 50.0) -> PlanProblem:
     """At rest with the stems at (``stem``, 50); the target lies ``away`` from the first stem."""
     start = np.array([stem, 50.0])
     rest = target_at(model, start)
     goal = target_at(model, start + np.array([away, 0.0]))
-    return Situation(rest.state, start, goal)
+    return PlanProblem(rest.state, start, goal)

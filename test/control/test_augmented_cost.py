@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from loops import stable_model, target_at
 from paper_cases import STICKY
 
-from stiction_ros.control.augmented_cost import AugmentedCost, Situation
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.control.paper_weights import AugmentedWeights
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.processes import LinearModel
@@ -22,7 +22,7 @@ def random_weights(random: np.random.Generator, horizon: int, m: int, n: int) ->
 
 
 def equation_22(
-    model: LinearModel, weights: AugmentedWeights, at: Situation, op: FloatArray
+    model: LinearModel, weights: AugmentedWeights, at: PlanProblem, op: FloatArray
 ) -> float:
     """(22) summed sample by sample along the simulated loop; the first valve sticks."""
     state, stem, cost = at.state, at.stem, 0.0
@@ -46,7 +46,7 @@ def test_cost_is_22_summed_along_the_hard_model(seed: int, horizon: int, m: int)
     model = stable_model(seed, 3, m, 2)
     weights = random_weights(random, horizon, m, 3)
     target = target_at(model, random.uniform(20.0, 80.0, m))
-    at = Situation(random.normal(size=3), random.uniform(20.0, 80.0, m), target)
+    at = PlanProblem(random.normal(size=3), random.uniform(20.0, 80.0, m), target)
     op = random.uniform(30.0, 70.0, (horizon, m))
     cost = AugmentedCost(model, weights, (STICKY, *[None] * (m - 1)))
     assert cost(at, op) == pytest.approx(equation_22(model, weights, at, op), rel=1e-8)

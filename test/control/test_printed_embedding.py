@@ -8,9 +8,10 @@ from loops import limits_for, outputs_of
 from paper_cases import STICKY, situation, tuning, two_valves
 
 from stiction_ros.control import ControlMode
-from stiction_ros.control.augmented_cost import Situation
+from stiction_ros.control.augmented_cost import PlanProblem
 from stiction_ros.control.paper_weights import WarmStart
 from stiction_ros.control.printed_embedding import Choice, PrintedEmbeddingMpc, PrintedPlan
+from stiction_ros.effects import KanoStiction
 from stiction_ros.errors import InputError
 
 MODEL = two_valves()
@@ -25,7 +26,7 @@ def controller(start: WarmStart = WarmStart.COMPENSATION, horizon: int = 12) -> 
 COMPENSATING, SEARCHING = controller(), controller(WarmStart.SEARCH)
 
 
-def plan(mpc: PrintedEmbeddingMpc, at: Situation) -> PrintedPlan:
+def plan(mpc: PrintedEmbeddingMpc, at: PlanProblem) -> PrintedPlan:
     found = mpc.plan(at.state, at.target, at.stem)
     assert found is not None
     return found
@@ -93,3 +94,9 @@ def test_bounds_that_it_does_not_know_are_refused(bounds: dict[str, object], whe
 def test_a_loop_without_sticky_valves_is_refused() -> None:
     with pytest.raises(InputError, match="0 sticky valves"):
         PrintedEmbeddingMpc(MODEL, tuning(MODEL), limits_for(MODEL), (None, None))
+
+
+def test_another_law_than_he_s_is_refused() -> None:
+    with pytest.raises(InputError, match="He's law") as caught:
+        PrintedEmbeddingMpc(MODEL, tuning(MODEL), limits_for(MODEL), (KanoStiction(8.0, 7.0), None))
+    assert (caught.value.where, bool(caught.value.fix)) == ("formulation", True)

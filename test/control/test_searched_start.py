@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from loops import stable_model, target_at
 from paper_cases import LIMITS, STICKY, situation, two_valves, weights
 
-from stiction_ros.control.augmented_cost import AugmentedCost, Situation
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.control.searched_start import SearchedStart
 from stiction_ros.effects import HeStiction
 
@@ -23,7 +23,7 @@ def test_it_finds_what_a_fine_grid_finds() -> None:
     chosen = dataclasses.replace(weights(model, 6), op=np.zeros((1, 1)))
     cost = AugmentedCost(model, chosen, (STICKY,))
     rest, goal = target_at(model, np.array([50.0])), target_at(model, np.array([53.0]))
-    at = Situation(rest.state, rest.stem, goal)
+    at = PlanProblem(rest.state, rest.stem, goal)
     least = np.inf
     for first, second, dwell in itertools.product(
         np.arange(30.0, 70.0, 0.25), np.arange(45.0, 60.0, 0.25), (1, 2, 4)
@@ -68,6 +68,6 @@ def test_two_sticky_valves_move_together() -> None:
     cost = AugmentedCost(MODEL, weights(MODEL, 30), (STICKY, HeStiction(4.0, 1.0)))
     rest = target_at(MODEL, np.array([50.0, 50.0]))
     goal = target_at(MODEL, np.array([60.0, 43.0]))
-    found = SearchedStart(cost, LIMITS).find(Situation(rest.state, rest.stem, goal))
+    found = SearchedStart(cost, LIMITS).find(PlanProblem(rest.state, rest.stem, goal))
     assert found is not None
     assert cost.stems(found, rest.stem)[-1] == pytest.approx(goal.stem, abs=0.5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from paper_cases import LIMITS, STICKY, situation, tuning, two_valves
 
-from stiction_ros.control.augmented_cost import AugmentedCost, Situation
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
 from stiction_ros.control.paper_weights import PaperTuning
 from stiction_ros.control.smoothed_programme import (
     ProgrammeResult,
@@ -19,7 +19,7 @@ MODEL = two_valves()
 FRICTIONS = (STICKY, None)
 
 
-def solve(at: Situation, chosen: PaperTuning | None = None) -> ProgrammeResult:
+def solve(at: PlanProblem, chosen: PaperTuning | None = None) -> ProgrammeResult:
     """From OP at the target, where the stem stays or goes by itself."""
     chosen = chosen or tuning(MODEL)
     op = np.tile(at.target.stem, (chosen.weights.horizon, 1))
