@@ -60,6 +60,8 @@ CROSS = 200
 LEAST_GAIN = 0.5
 ALIKE = 0.9
 EQUAL = 10.0
+BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of the stem, shares of f_S away from OP
+FURTHER = 2  # beginnings that are searched further
 
 
 def first_grid(limit: float, samples: int) -> FloatArray:
@@ -73,6 +75,22 @@ def first_grid(limit: float, samples: int) -> FloatArray:
 
 
 @dataclasses.dataclass(frozen=True)
+class Elsewhere:
+    """One scan of stems that begin away from OP.
+
+    Until a valve first slips its stem is where it was left. When that takes long, the right
+    friction is found only from the right beginning.
+
+    Attributes:
+        starts: stem before the first sample minus first OP, %, shape (G,).
+        scan: of these.
+    """
+
+    starts: FloatArray
+    scan: ValveScan
+
+
+@dataclasses.dataclass(frozen=True)
 class FirstScan:
     """The whole triangle of one valve under three criteria.
 
@@ -80,16 +98,28 @@ class FirstScan:
         model: the model whose other valves and noise the scans saw.
         valve: index.
         scans: by criterion.
+        elsewhere: one-step scans of stems that begin away from OP.
     """
 
     model: Model
     valve: int
     scans: Mapping[Criterion, ValveScan]
+    elsewhere: tuple[Elsewhere, ...]
 
     @property
     def gain(self) -> float:
         """By how much the best friction beats none, in the criterion where it does most."""
-        return max(float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values())
+        one_step = float(self.scans[Criterion.ONE_STEP].loss[0])
+        gains = [float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values()]
+        gains += [one_step - float(other.scan.loss.min()) for other in self.elsewhere]
+        return max(gains)
+
+    @property
+    def better_beginnings(self) -> list[Elsewhere]:
+        """The best scans from elsewhere that beat all that begin at OP."""
+        least = float(self.scans[Criterion.ONE_STEP].loss.min()) - EQUAL
+        better = [other for other in self.elsewhere if other.scan.loss.min() < least]
+        return sorted(better, key=lambda other: float(other.scan.loss.min()))[:FURTHER]
 
 
 def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstScan:
@@ -100,9 +130,20 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
     one_step = scan_valve(data, model, orders, valve, fine, start, Criterion.ONE_STEP)
     others = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
     scans = scan_criteria(data, model, orders, valve, coarse, start, others)
-    return FirstScan(
-        model, valve, {Criterion.ONE_STEP: one_step, **dict(zip(others, scans, strict=True))}
-    )
+    by_criterion = {Criterion.ONE_STEP: one_step, **dict(zip(others, scans, strict=True))}
+    return FirstScan(model, valve, by_criterion, _elsewhere(data, model, orders, valve))
+
+
+def _elsewhere(data: Data, model: Model, orders: Orders, valve: int) -> tuple[Elsewhere, ...]:
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    points = WORK / (data.y.shape[1] * len(BEGINNINGS))
+    grid = even_grid(limit, min(STEPS, int(np.sqrt(points))))
+    found = []
+    for share in BEGINNINGS:
+        starts = start + share * grid[:, 0]
+        scan = scan_valve(data, model, orders, valve, grid, starts, Criterion.ONE_STEP)
+        found.append(Elsewhere(starts, scan))
+    return tuple(found)
 
 
 def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
@@ -117,6 +158,17 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
         parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
         rivals.append(descend(data, model, orders, valve, parents, criterion, data.delays, False))
+    for other in first.better_beginnings:
+        chosen = other.scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)
+        if not chosen:
+            continue
+        start = model.start.copy()
+        start[valve] = other.starts[chosen[0]]
+        moved, parents = dataclasses.replace(model, start=start), other.scan.grid[chosen]
+        ranges = data.delays
+        rivals.append(
+            descend(data, moved, orders, valve, parents, Criterion.ONE_STEP, ranges, False)
+        )
     best = model
     for rival in sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]:
         if rival.friction[valve, 0] > 0.0:
