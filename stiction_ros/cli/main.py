@@ -19,6 +19,7 @@ from stiction_ros.cli import (
     experiment,
     fit_linear,
     identify,
+    replay,
     report,
     study,
 )
@@ -26,7 +27,7 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, fit_linear, example, experiment, report, study, bench)
+COMMANDS = (demo, identify, fit_linear, example, experiment, replay, report, study, bench)
 
 
 def parser() -> argparse.ArgumentParser:
