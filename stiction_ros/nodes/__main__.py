@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-NODES = ("plant", "controller", "estimator", "recorder")
+NODES = ("plant", "controller", "estimator", "recorder", "player")
 
 
 def main() -> int:
