@@ -14,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from stiction_ros import __version__
 from stiction_ros.cli import (
     bench,
+    convert,
     demo,
     example,
     experiment,
@@ -27,7 +28,7 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, fit_linear, example, experiment, replay, report, study, bench)
+COMMANDS = (demo, identify, fit_linear, example, experiment, convert, replay, report, study, bench)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -8,7 +8,7 @@ from typing import Any
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.online.replay import replay
-from stiction_ros.online.replay_result import FitMatch, Match, Replay, swap_of
+from stiction_ros.online.replay_result import FitMatch, Match, Replay
 
 
 def add(commands: Any) -> None:
@@ -54,7 +54,7 @@ def _print(bag: str, found: Replay) -> None:
     if found.modes is not None:
         times = [
             "never" if change is None else f"at {found.seconds(change.stamp):.9g} s"
-            for change in (swap_of(found.modes.recorded), swap_of(found.modes.replayed))
+            for change in found.modes.swaps
         ]
         console.print(f"swap: recorded {times[0]}, replayed {times[1]}")
         word = str(found.modes.match).replace("_", " ")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -19,8 +19,8 @@ from stiction_ros.online.replay_controller import (
     replay_controller,
 )
 from stiction_ros.online.replay_estimator import ReplayedEstimator
-from stiction_ros.online.replay_matching import match_fit, match_modes
-from stiction_ros.online.replay_result import FitMatch, Match, Replay
+from stiction_ros.online.replay_matching import match_fit, match_modes, trust_is_known
+from stiction_ros.online.replay_result import FitMatch, Match, ModeMatch, Replay
 from stiction_ros.settings import from_mapping
 
 T = TypeVar("T")
@@ -58,16 +58,16 @@ def replay(
     origin, notes = _origin(bag, settings, first)
     estimator = _estimate(bag, settings, origin, progress)
     whole = origin >= first
-    fits = tuple(match_fit(bag, fit) for fit in estimator.fits)
-    notes += _remarks(bag, estimator, fits, whole)
+    known = trust_is_known(bag, estimator.fits, settings.fit_first - 1)
+    fits = tuple(match_fit(bag, fit, known) for fit in estimator.fits)
+    notes += _remarks(bag)
+    if estimator.missed:
+        notes.append(f"{estimator.missed} samples are missing within the bag")
+    if not whole:
+        notes.append(_late_start(estimator, fits, known))
     control = _control(bag, estimator, origin, first, str(path))
-    modes = None
-    if control is not None:
-        start = -math.inf if whole else first
-        recorded = [change for change in bag.modes if change.stamp > start]
-        replayed = [change for change in control.changes if change.stamp > start]
-        modes = match_modes(recorded, replayed)
-        notes += control.notes
+    modes = None if control is None else _modes(bag, control, first, whole, known)
+    notes += () if control is None else control.notes
     return Replay(
         bag=bag,
         origin=origin,
@@ -114,34 +114,47 @@ def _control(
         return None
     settings = _settings(ControllerNodeSettings, config, where)
     model = LoopModel.from_mapping(dict(config.model), f"{where}: {config.node}/config: model")
-    offers = _offers(bag, estimator, origin, first, round(model.sample_time * SECOND))
+    offers = _offers(bag, estimator, first, round(model.sample_time * SECOND))
     return replay_controller(bag, settings, model, offers, origin)
 
 
 def _offers(
-    bag: ReplayBag, estimator: ReplayedEstimator, origin: int, first: int, step: int
+    bag: ReplayBag, estimator: ReplayedEstimator, first: int, step: int
 ) -> tuple[Offer, ...]:
-    """Return the replayed loop models, after the recorded one in force when the bag begins.
+    """Return the recorded loop models of fits before the bag, then the replayed ones.
 
     A model takes effect at its ``valid_from``, or where it came in the bag if that is later.
     """
+    origin, latency = estimator.origin, estimator.settings.fit_latency * step
     begin = max((first - origin) // step, 0)
     came = {model.valid_from: model.ops_before + begin for model in bag.models}
-    found = []
-    earlier = [model for model in bag.models if model.valid_from <= first]
-    if earlier:
-        found.append(Offer(earlier[-1].text, begin))
-    for fit in estimator.fits:
-        if fit.model_text and int(fit.token) > first:
-            sample = (int(fit.token) - origin) // step
-            found.append(Offer(fit.model_text, max(sample, came.get(int(fit.token), 0))))
-    return tuple(found)
+    earlier = [m for m in bag.models if m.valid_from - latency < first]
+    replayed = [fit for fit in estimator.fits if fit.model_text]
+    texts = [(m.text, m.valid_from) for m in earlier]
+    texts += [(fit.model_text, int(fit.token)) for fit in replayed]
+    return tuple(
+        Offer(text, max((valid_from - origin) // step, came.get(valid_from, 0), begin))
+        for text, valid_from in texts
+    )
 
 
-def _remarks(
-    bag: ReplayBag, estimator: ReplayedEstimator, fits: tuple[FitMatch, ...], whole: bool
-) -> list[str]:
-    """Return what stands in the way of equality."""
+def _modes(
+    bag: ReplayBag, control: ReplayedControl, first: int, whole: bool, known: bool
+) -> ModeMatch:
+    """Compare the changes of mode; of a bag that begins late those after its first sample."""
+    if whole:
+        return match_modes(bag.modes, control.changes)
+    recorded = tuple(change for change in bag.modes if change.stamp > first)
+    replayed = tuple(change for change in control.changes if change.stamp > first)
+    before = control.changes[0].mode if control.changes else ""
+    if not known:
+        why = "what was trusted before the bag is not known"
+        return ModeMatch(recorded, replayed, Match.NOT_COMPARED, why, before)
+    return dataclasses.replace(match_modes(recorded, replayed), before=before)
+
+
+def _remarks(bag: ReplayBag) -> list[str]:
+    """Return what the bag itself says against equality."""
     notes = list(bag.notes)
     configs = [config for config in (bag.estimator, bag.controller) if config is not None]
     notes += [
@@ -153,21 +166,16 @@ def _remarks(
         notes.append("recorded at realtime pace: late messages may have come in another order")
     if bag.controller is None:
         notes.append("no configuration of a controller: changes of mode are not replayed")
-    if not whole:
-        notes.append(_late_start(estimator, fits))
-    if estimator.missed:
-        notes.append(f"{estimator.missed} samples are missing within the bag")
     return notes
 
 
-def _late_start(estimator: ReplayedEstimator, fits: tuple[FitMatch, ...]) -> str:
+def _late_start(estimator: ReplayedEstimator, fits: tuple[FitMatch, ...], known: bool) -> str:
     begin = f"the bag begins at sample {estimator.first} of the run"
     compared = next((fit.fit for fit in fits if fit.match is not Match.NOT_COMPARED), None)
     if compared is None:
-        return f"{begin} and holds no whole window with its fit: nothing is compared"
-    taken = [fit.fit for fit in fits if not fit.fit.whole and fit.fit.update is not None]
-    known = bool(taken) and taken[0].end + 1 == estimator.settings.fit_first
-    trust = "all fits before are in the bag" if known else "what was trusted before is not known"
+        return f"{begin} and holds no whole window with its fit: no fit is compared, nor op"
+    trust = "trust is built on all of them" if known else "what was trusted before is not known"
     return (
-        f"{begin}: op is not compared, fits are from the window to sample {compared.end}, {trust}"
+        f"{begin}: op is not compared, fits are from the window that ends at "
+        f"{(compared.stamp - estimator.origin) / SECOND:.9g} s, {trust}"
     )

@@ -270,7 +270,7 @@ def _hardware(config: NodeConfig) -> str:
 
 
 def _is_of(status: Any, loops: set[str]) -> bool:
-    return str(status.hardware_id) in loops
+    return not status.hardware_id or str(status.hardware_id) in loops
 
 
 def _changed_parameters(messages: Iterable[BagMessage], configs: Iterable[NodeConfig]) -> list[str]:

@@ -90,6 +90,11 @@ class ReplayedEstimator:
         self._live: LiveEstimator | None = None
         self._token = ""
 
+    @property
+    def origin(self) -> int:
+        """Stamp of sample 0 of the run, ns; there must have been a ``pv``."""
+        return self._pairs.stamp_of(0)
+
     def take(self, signal: Signal) -> list[ReplayedFit]:
         """Take one message of ``pv`` or ``op`` and return the fits that it makes due."""
         before = len(self.fits)

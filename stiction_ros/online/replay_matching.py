@@ -16,20 +16,36 @@ from stiction_ros.records.run_log import ModeChange
 _TIMES = ("seconds",)  # wall time of a fit is another each time
 
 
-def match_fit(bag: ReplayBag, fit: ReplayedFit) -> FitMatch:
-    """Compare one fit with ``stiction``, ``loop_model`` and the fit told in ``/diagnostics``."""
+def match_fit(bag: ReplayBag, fit: ReplayedFit, trust_known: bool = True) -> FitMatch:
+    """Compare one fit with ``stiction``, ``loop_model`` and the fit told in ``/diagnostics``.
+
+    Args:
+        bag, fit: what was recorded and what the replay gives.
+        trust_known: whether trust was built on all fits of the run; otherwise only the fit
+            itself is compared, not what is trusted after it.
+    """
     if not fit.whole:
-        why = "the window begins before the bag"
-        return FitMatch(fit, Match.NOT_COMPARED, why if fit.update is None else f"{why}, taken in")
+        taken = "" if fit.update is None else ", the recorded fit is taken"
+        return FitMatch(fit, Match.NOT_COMPARED, f"window begins before the bag{taken}")
     published = bag.published_fits.get(fit.stamp)
     if published is None:
         return FitMatch(fit, Match.NOT_COMPARED, "not in the bag")
-    difference = (
-        _rows_differ(published, fit)
-        or _identification_differs(bag, fit)
-        or _model_differs(bag, fit)
-    )
+    difference = _rows_differ(published, fit) or _identification_differs(bag, fit)
+    if trust_known and not difference:
+        difference = _trust_differs(bag, published, fit)
     return FitMatch(fit, Match.DIFFERENT if difference else Match.EQUAL, difference)
+
+
+def trust_is_known(bag: ReplayBag, fits: Sequence[ReplayedFit], first: int) -> bool:
+    """Return whether trust was built on every fit of the run, the one at sample ``first`` on."""
+    return bool(fits and fits[0].end == first) and all(
+        fit.whole or fit.update is not None or _told_unusable(bag, fit) for fit in fits
+    )
+
+
+def _told_unusable(bag: ReplayBag, fit: ReplayedFit) -> bool:
+    published = bag.published_fits.get(fit.stamp)
+    return published is not None and not published.rows
 
 
 def match_modes(recorded: Sequence[ModeChange], replayed: Sequence[ModeChange]) -> ModeMatch:
@@ -62,8 +78,6 @@ def _rows_differ(published: PublishedFit, fit: ReplayedFit) -> str:
         ):
             if old != new and not (math.isnan(old) and math.isnan(new)):
                 return f"{name}, {key}: recorded {old!r}, replayed {new!r}"
-    if published.token != fit.token:
-        return f"model in force: recorded {published.token!r}, replayed {fit.token!r}"
     return ""
 
 
@@ -73,9 +87,16 @@ def _identification_differs(bag: ReplayBag, fit: ReplayedFit) -> str:
         return ""
     # Through text and back, as the recorded one went: JSON knows no tuples and no infinity.
     found = json.loads(json_text(fit.update.identification.to_json(), indent=None))
-    difference = first_difference(told.identification, found)
-    if difference:
-        return difference
+    return first_difference(told.identification, found)
+
+
+def _trust_differs(bag: ReplayBag, published: PublishedFit, fit: ReplayedFit) -> str:
+    """Compare what is trusted after the fit, and the loop model that comes of it."""
+    if published.token != fit.token:
+        return f"model in force: recorded {published.token!r}, replayed {fit.token!r}"
+    told = bag.told_fits.get(fit.stamp)
+    if told is None or fit.update is None:
+        return _model_differs(bag, fit)
     trusted = {
         f"{valve}.{key}": value
         for valve, friction in fit.update.trusted.items()
@@ -84,7 +105,7 @@ def _identification_differs(bag: ReplayBag, fit: ReplayedFit) -> str:
             ("f_d", friction.dynamic_friction),
         )
     }
-    return first_difference(dict(told.trusted), trusted, "trusted")
+    return first_difference(dict(told.trusted), trusted, "trusted") or _model_differs(bag, fit)
 
 
 def _model_differs(bag: ReplayBag, fit: ReplayedFit) -> str:

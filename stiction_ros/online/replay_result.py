@@ -45,12 +45,19 @@ class ModeMatch:
         recorded, replayed: in their order.
         match: equal when stamps, modes, models, reasons and frictions are.
         difference: the first difference, or why nothing is compared; empty when equal.
+        before: mode in force when a bag that begins late begins; empty otherwise.
     """
 
     recorded: tuple[ModeChange, ...]
     replayed: tuple[ModeChange, ...]
     match: Match
     difference: str
+    before: str = ""
+
+    @property
+    def swaps(self) -> tuple[ModeChange | None, ModeChange | None]:
+        """The swap that was recorded and the replayed one."""
+        return swap_of(self.recorded, self.before), swap_of(self.replayed, self.before)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,7 +152,7 @@ class Replay:
         }
 
     def _swap(self, modes: ModeMatch) -> dict[str, float | None]:
-        recorded, replayed = swap_of(modes.recorded), swap_of(modes.replayed)
+        recorded, replayed = modes.swaps
         return {
             "recorded": None if recorded is None else self.seconds(recorded.stamp),
             "replayed": None if replayed is None else self.seconds(replayed.stamp),
@@ -161,9 +168,8 @@ class Replay:
         }
 
 
-def swap_of(changes: Sequence[ModeChange]) -> ModeChange | None:
+def swap_of(changes: Sequence[ModeChange], before: str = "") -> ModeChange | None:
     """Return the first change from ``unaware`` to a mode that knows of the friction."""
-    before = ""
     for change in changes:
         if before == "unaware" and change.mode in ("embedding", "inversion"):
             return change
