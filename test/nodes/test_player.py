@@ -198,8 +198,8 @@ def test_pause_and_resume(graph: Graph) -> None:
     stage = Stage(graph, {"/pv": JointState}, rate=200.0)
     graph.spin_until(lambda: len(stage.seen["/pv"]) > 20, "the first samples")
     assert stage.call("pause").success
-    graph.spin_some(20)
-    count = len(stage.seen["/pv"])
+    count = stage.node.outlets["/pv"].count
+    graph.spin_until(lambda: len(stage.seen["/pv"]) == count, "what was under way")
     graph.spin_some(50)
     assert len(stage.seen["/pv"]) == count
     assert not stage.node.finished
@@ -233,8 +233,8 @@ def test_after_a_rest_it_goes_on_where_it_was(graph: Graph) -> None:
     stage = Stage(graph, {"/pv": JointState}, rate=2000.0, topics="/pv")
     graph.spin_until(lambda: len(stage.seen["/pv"]) > 50, "the first samples")
     stage.node.trigger_deactivate()
-    graph.spin_some(20)
-    count = len(stage.seen["/pv"])
+    count = stage.node.outlets["/pv"].count
+    graph.spin_until(lambda: len(stage.seen["/pv"]) == count, "what was under way")
     graph.spin_some(50)
     assert len(stage.seen["/pv"]) == count
     stage.node.trigger_activate()
