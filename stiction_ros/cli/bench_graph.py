@@ -21,6 +21,7 @@ from stiction_ros.records.bag_messages import read_raw
 
 ECHOES = 2000
 SAMPLES = 1500
+UNAWARE: Mapping[str, Any] = {"mode": "unaware"}
 NAMES = ("lockstep sample, recorded", "echo between two processes")
 
 
@@ -33,7 +34,7 @@ def graph(show: Bar) -> list[Row]:
     rows = []
     for name in ("siso", "tank"):
         first = _echo(name)
-        cycle = _lockstep(name, {"mode": "unaware"}, show)
+        cycle = _lockstep(name, UNAWARE, show)
         second = _echo(name)
         echo = np.concatenate([first, second])
         fitted = _lockstep(name, {}, show)
@@ -48,24 +49,37 @@ def graph(show: Bar) -> list[Row]:
 def _lockstep(name: str, controller: Mapping[str, Any], show: Bar) -> Any:
     """Return ms per sample of a recorded lockstep run."""
     with tempfile.TemporaryDirectory() as folder:
-        directory = Path(folder)
-        nodes = node_parameters(find(name), directory)
-        nodes["controller"].update(controller)
-        if controller:
-            nodes.pop("estimator")
-            nodes["plant"]["samples"] = SAMPLES
-            for node in nodes.values():
-                node["wait_for"] = [w for w in node.get("wait_for", []) if w != "estimator"]
-        processes = NodeProcesses(nodes, directory)
-        try:
-            processes.start()
-            processes.wait(show)
-        finally:
-            processes.stop()
-        processes.check()
-        bag = directory / "bag"
+        bag = record_run(name, Path(folder), show, controller)
         sent = [m.publish_time for m in read_raw(bag) if m.topic.name == "/pv"]
     return np.diff(np.array(sent[len(sent) // 20 :])) / 1e6
+
+
+def record_run(
+    name: str, directory: Path, show: Bar, controller: Mapping[str, Any] = UNAWARE
+) -> Path:
+    """Run a scenario in lockstep and return its bag.
+
+    Args:
+        name: of the scenario.
+        directory: for parameters, logs and the bag.
+        show: progress.
+        controller: parameters in place of the scenario's; with any there is no estimator.
+    """
+    nodes = node_parameters(find(name), directory)
+    nodes["controller"].update(controller)
+    if controller:
+        nodes.pop("estimator")
+        nodes["plant"]["samples"] = SAMPLES
+        for node in nodes.values():
+            node["wait_for"] = [w for w in node.get("wait_for", []) if w != "estimator"]
+    processes = NodeProcesses(nodes, directory)
+    try:
+        processes.start()
+        processes.wait(show)
+    finally:
+        processes.stop()
+    processes.check()
+    return directory / "bag"
 
 
 def _echo(name: str) -> Any:

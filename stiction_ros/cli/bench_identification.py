@@ -147,6 +147,10 @@ def identification(plan: Plan, show: Show) -> list[Row]:
         plan: what to work through.
         show: called with the share done, 0 to 1, and what is being done.
     """
+    from stiction_ros.identification.warm_up import compile_loops
+
+    show(0.0, "compiling")
+    compile_loops()
     lengths = [n for n in plan.lengths if n <= plan.longest]
     stages = _Stages(show, 3 * len(plan.duels) + len(lengths) + len(plan.valves))
     rows = []

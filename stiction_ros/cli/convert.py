@@ -30,7 +30,6 @@ def add(commands: Any) -> None:
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     parser.add_argument("out", metavar="OUT", help="F.csv, or the directory of a new bag")
     add_columns(parser)
-    parser.add_argument("--namespace", metavar="NS", help="of the loop, when a bag holds several")
     parser.add_argument(
         "--iso", action="store_true", help="time stamps in ISO 8601 (UTC) in a CSV file"
     )

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import add_columns, columns, delay_range
+from stiction_ros.cli.identify import add_columns, delay_range, opened
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
@@ -19,7 +19,6 @@ from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
 from stiction_ros.identification.linear_result import LinearIdentification
 from stiction_ros.identification.subspace import StateSpaceFit
 from stiction_ros.identification.subspace_projection import SubspaceMethod
-from stiction_ros.records.open_record import open_record
 
 
 def add(commands: Any) -> None:
@@ -60,7 +59,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record = open_record(options.record, columns(options))
+    record = opened(options)
     settings = LinearOptions(
         kind=LinearKind(options.kind),
         order=options.order,

@@ -18,6 +18,7 @@ from stiction_ros.identification import METHODS, Identification, IdentificationO
 from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.csv_file import CsvColumns
 from stiction_ros.records.open_record import open_record
+from stiction_ros.records.record import Record
 
 
 def add(commands: Any) -> None:
@@ -56,7 +57,7 @@ def add(commands: Any) -> None:
 
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
-    """Add the options that name the columns of a CSV file."""
+    """Add the options that name the columns of a CSV file, or the loop in a bag."""
     group = parser.add_argument_group("columns of a CSV file (default: t, OP, PV[, SP][, STEM])")
     for option, text in (
         ("op", "controller output of a valve"),
@@ -68,6 +69,9 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
             f"--{option}", action="append", type=_pair, default=[], metavar="TAG=COL", help=text
         )
     group.add_argument("--time", metavar="COL", help="seconds or ISO time stamps")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="of the loop's topics, for a bag that holds several loops"
+    )
 
 
 def columns(options: argparse.Namespace) -> CsvColumns:
@@ -81,6 +85,11 @@ def columns(options: argparse.Namespace) -> CsvColumns:
     return CsvColumns(**chosen)
 
 
+def opened(options: argparse.Namespace) -> Record:
+    """Return the record that the command line names."""
+    return open_record(options.record, columns(options), namespace=options.namespace)
+
+
 def delay_range(text: str) -> tuple[int, int]:
     """Return ``LO:HI`` (or one number) as a range."""
     low, _, high = text.partition(":")
@@ -92,7 +101,7 @@ def delay_range(text: str) -> tuple[int, int]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record = open_record(options.record, columns(options))
+    record = opened(options)
     settings = IdentificationOptions(
         method=options.method,
         output_order=options.na,

@@ -20,6 +20,7 @@ from stiction_ros.cli import (
     experiment,
     fit_linear,
     identify,
+    repair,
     replay,
     report,
     study,
@@ -28,7 +29,19 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, fit_linear, example, experiment, convert, replay, report, study, bench)
+COMMANDS = (
+    demo,
+    identify,
+    fit_linear,
+    example,
+    experiment,
+    convert,
+    replay,
+    report,
+    repair,
+    study,
+    bench,
+)
 
 
 def parser() -> argparse.ArgumentParser:

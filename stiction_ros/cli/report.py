@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.identify import add_columns, columns
+from stiction_ros.cli.identify import add_columns, opened
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.records.bag_messages import read_raw
-from stiction_ros.records.open_record import is_bag, open_record
+from stiction_ros.records.open_record import is_bag
 
 
 def add(commands: Any) -> None:
@@ -45,9 +45,9 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out)
     try:
         if is_bag(options.record) and holds_live_run(options.record):
-            print(report_run(options.record, out).page)
+            print(report_run(options.record, out, namespace=options.namespace).page)
         else:
-            record = open_record(options.record, columns(options))
+            record = opened(options)
             print(report_record(record, identify(record, IdentificationOptions()), out))
     except OSError as error:
         raise InputError(

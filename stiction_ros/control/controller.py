@@ -13,6 +13,9 @@ from stiction_ros.control.embedding import EmbeddingMpc, EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.inversion import InversionMpc
 from stiction_ros.control.observer import Observer, ObserverTuning
+from stiction_ros.control.paper_weights import PaperTuning
+from stiction_ros.control.printed_embedding import PrintedEmbeddingMpc
+from stiction_ros.control.printed_inversion import InvertedPlan, PrintedInversionMpc
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
 from stiction_ros.control.target import Target, TargetSelector
 from stiction_ros.control.unaware import UnawareMpc
@@ -43,6 +46,7 @@ class ControlDesign:
         observer: observer tuning.
         jumps: how sticky valves are moved.
         hand_over_samples: past samples replayed into the observer of a new controller.
+        paper: the paper's own embedding and inversion; None for those of this package.
     """
 
     model: LinearModel
@@ -53,6 +57,7 @@ class ControlDesign:
     observer: ObserverTuning
     jumps: EmbeddingTuning = EmbeddingTuning()
     hand_over_samples: int = 200
+    paper: PaperTuning | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,12 +100,17 @@ class MpcController:
         if self.mode is ControlMode.HOLD:
             return None
         if self.mode is ControlMode.EMBEDDING:
+            if design.paper is not None:
+                return PrintedEmbeddingMpc(
+                    design.model, design.paper, design.limits, self.frictions
+                )
             return EmbeddingMpc(
                 design.model, design.embedding, design.limits, self.frictions, design.jumps
             )
         unaware = UnawareMpc(design.model, design.unaware, design.limits)
         if self.mode is ControlMode.INVERSION:
-            return InversionMpc(unaware, self.frictions)
+            inversion = InversionMpc if design.paper is None else PrintedInversionMpc
+            return inversion(unaware, self.frictions)
         return unaware
 
     def start(self, op: FloatArray, pv: FloatArray) -> None:
@@ -154,6 +164,8 @@ class MpcController:
         op = np.clip(op, limits[:, 0], limits[:, 1])
         if self._started:
             self._move_stems(op)
+            if isinstance(plan, InvertedPlan):
+                self.stem = plan.process_input
             self.observer.predict(self.stem, dv)
         seconds = time.perf_counter() - begin
         return StepResult(status, reason, self.mode, op, plan, miss, seconds)

@@ -90,7 +90,9 @@ class HorizonCost:
 
     def outputs(self, state: FloatArray, plan: FloatArray) -> FloatArray:
         """Return output deviations from the target, shape (N, p), for samples 1 … N."""
-        return np.asarray(self.free_output @ state + self.forced_output @ plan.reshape(-1))
+        free = self.free_output.reshape(-1, len(state)) @ state  # one product, not one a sample
+        free += self.forced_output.reshape(len(free), -1) @ plan.reshape(-1)
+        return np.asarray(free.reshape(self.horizon, -1))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -28,30 +28,33 @@ class UnawareMpc:
         rows = (np.eye(size) - np.eye(size, k=-m))[picks]
         self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output)
         self._offset = np.zeros(size)
+        self._lower, self._upper = np.empty(size + len(picks)), np.empty(size + len(picks))
+        self._moves = np.tile(limits.move[limited], weights.horizon)
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
         """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None."""
-        horizon = self.cost.horizon
+        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         deviation = last - target.stem
-        low = np.tile(self.limits.stem[:, 0] - target.stem, horizon)
-        high = np.tile(self.limits.stem[:, 1] - target.stem, horizon)
-        moves = np.tile(self.limits.move[self._limited], horizon)
-        first = np.zeros_like(moves)
-        first[: len(self._limited)] = deviation[self._limited]
+        self._fill_bounds(low - target.stem, high - target.stem, deviation)
         solution = self._qp.solve(
-            state - target.state,
-            deviation,
-            self._offset,
-            np.concatenate([low, first - moves]),
-            np.concatenate([high, first + moves]),
-            target.pv,
+            state - target.state, deviation, self._offset, self._lower, self._upper, target.pv
         )
         if solution is None:
             return None
         stem = solution.plan + target.stem
-        op = np.clip(stem[0], self.limits.stem[:, 0], self.limits.stem[:, 1])
+        op = np.minimum(np.maximum(stem[0], low), high)
         pv = predicted_outputs(self.cost, state, target, solution.plan)
         return Plan(op, stem, pv, solution.slack)
+
+    def _fill_bounds(self, low: FloatArray, high: FloatArray, deviation: FloatArray) -> None:
+        """Write bounds on all stems off the target, then on their limited moves."""
+        size, count = len(self._offset), len(self._limited)
+        self._lower[:size].reshape(-1, self._width)[:] = low
+        self._upper[:size].reshape(-1, self._width)[:] = high
+        if count:
+            self._lower[size:], self._upper[size:] = -self._moves, self._moves
+            self._lower[size : size + count] += deviation[self._limited]
+            self._upper[size : size + count] += deviation[self._limited]
 
 
 def predicted_outputs(
@@ -59,5 +62,7 @@ def predicted_outputs(
 ) -> FloatArray:
     """Return outputs at samples 0 … N, shape (N + 1, p), for stems ``plan`` off the target."""
     deviation = state - target.state
-    now = cost.model.c @ deviation
-    return np.vstack([now, cost.outputs(deviation, plan)]) + target.pv
+    pv = np.empty((cost.horizon + 1, len(target.pv)))
+    pv[0] = cost.model.c @ deviation
+    pv[1:] = cost.outputs(deviation, plan)
+    return np.asarray(pv + target.pv)

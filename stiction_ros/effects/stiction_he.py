@@ -10,9 +10,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction_parameters import FrictionPair
 
-SWARM = 5
-FEW = 20
-
 
 @dataclasses.dataclass(frozen=True)
 class HeStiction(FrictionPair):
@@ -50,32 +47,13 @@ class HeStiction(FrictionPair):
     def simulate_grid(
         cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once.
+        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
+        # Compiled code takes half a second to import, which nodes that scan no grid save.
+        from stiction_ros.effects.stiction_he_grid import he_stems
 
-        Samples at which no stem of the grid can slip cost one comparison.
-        """
-        if len(grid) <= FEW:
-            starts = np.broadcast_to(np.asarray(start, dtype=float), len(grid))
-            rows = zip(grid[:, :2].tolist(), starts.tolist(), strict=True)
-            return np.stack([_simulate_one(cls(*row), values, at) for row, at in rows], axis=1)
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        stem = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
-        stems, begins = [stem.copy()], [0]
-        low, high = _dead_zone(stem, static)
-        busy = 0
-        for k, value in enumerate(values.tolist()):
-            if not busy and low <= value <= high:
-                continue
-            error = value - stem
-            np.copyto(stem, value - np.copysign(dynamic, error), where=np.abs(error) > static)
-            stems.append(stem.copy())
-            begins.append(k)
-            # Slips come in swarms: the dead zone is not worth its price at every sample.
-            busy = busy - 1 if busy else SWARM
-            if not busy:
-                low, high = _dead_zone(stem, static)
-        lengths = np.diff([*begins, len(values)])
-        return np.repeat(np.stack(stems, axis=1), lengths, axis=1).T
+        starts = np.broadcast_to(np.asarray(start, dtype=float), static.shape)
+        return he_stems(static, dynamic, np.asarray(values, dtype=float), starts.copy())
 
     def inverse(self, memory: Memory, wanted: float) -> float:
         """Return the OP that moves the stem to ``wanted`` if the valve can go there.
@@ -89,22 +67,3 @@ class HeStiction(FrictionPair):
             return float(memory)
         size = max(abs(move), self.jump * (1.0 + 1e-9) + 1e-9)
         return float(memory + np.copysign(size + self.dynamic_friction, move))
-
-
-def _dead_zone(stem: FloatArray, static: FloatArray) -> tuple[float, float]:
-    """Return OP values between which surely no stem slips."""
-    if not len(stem):
-        return -np.inf, np.inf
-    low, high = float((stem - static).max()), float((stem + static).min())
-    slack = 1e-9 * (1.0 + abs(low) + abs(high))
-    return low + slack, high - slack
-
-
-def _simulate_one(valve: HeStiction, values: FloatArray, stem: float) -> FloatArray:
-    static, stems, begins = valve.static_friction, [stem], [0]
-    for k, value in enumerate(values.tolist()):
-        if abs(value - stem) > static:
-            stem = float(valve.step(stem, value)[1])
-            stems.append(stem)
-            begins.append(k)
-    return np.repeat(stems, np.diff([*begins, len(values)]))

@@ -106,13 +106,8 @@ def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) ->
 def simulate(
     law: type[FrictionLaw], grid: FloatArray, u: FloatArray, start: FloatArray | float
 ) -> FloatArray:
-    """Return stems, shape (G, N), contiguous, for rows (f_S, f_D) and OP u, shape (N,).
+    """Return stems, shape (N, G), for rows (f_S, f_D) and OP u, shape (N,).
 
     Laws with other parameters, such as S and J, get those that are equivalent.
     """
-    return np.ascontiguousarray(law.simulate_grid(law.rows_of_frictions(grid), u, start).T)
-
-
-def count_moves(stems: FloatArray) -> FloatArray:
-    """Return how often each stem moved, shape (G,)."""
-    return np.asarray((np.diff(stems, axis=1) != 0.0).sum(axis=1), dtype=float)
+    return law.simulate_grid(law.rows_of_frictions(grid), u, start)

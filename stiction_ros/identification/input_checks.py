@@ -260,13 +260,18 @@ def _fit(
     scale = np.array([column.std() for column in columns]) + 1e-300
     regressors, target = np.column_stack(columns) / scale, own[order:] / own.std()
     moving = target != 0.0
-    for first in np.unique(np.linspace(0, count - width, WINDOWS).astype(int)):
-        rows = slice(first, first + width)
-        theta, _, _, singular = np.linalg.lstsq(regressors[rows], target[rows], rcond=None)
-        if past is _Past.AND_PRESENT and singular[-1] <= SINGULAR * singular[0]:
-            continue
-        if np.abs(regressors[rows] @ theta - target[rows]).max() > EXACT:
-            continue
+    starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
+    rows = starts[:, None] + np.arange(width)
+    left, singular, right = np.linalg.svd(regressors[rows], full_matrices=False)
+    kept = singular > np.finfo(float).eps * width * singular[:, :1]
+    along = np.einsum("wij,wi->wj", left, target[rows])
+    along = np.where(kept, along / np.where(kept, singular, 1.0), 0.0)
+    solutions = np.einsum("wji,wj->wi", right, along)
+    if past is _Past.AND_PRESENT:
+        unique = singular[:, -1] > SINGULAR * singular[:, 0]
+        solutions, rows = solutions[unique], rows[unique]
+    residual = np.einsum("wij,wj->wi", regressors[rows], solutions) - target[rows]
+    for theta in solutions[np.abs(residual).max(axis=1) <= EXACT]:
         error = np.abs(regressors[moving] @ theta - target[moving])
         if np.mean(error < CLOSE) >= SHARE:
             return np.asarray(theta * own.std() / scale)

@@ -7,10 +7,10 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification import engine, grid_search
 from stiction_ros.identification.input_checks import swapped_columns
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import Identification
@@ -20,19 +20,22 @@ Progress = Callable[[float], None]
 Method = Callable[[Record, IdentificationOptions | None, Progress | None], Identification]
 
 
-def _nlp(
-    record: Record, options: IdentificationOptions | None, progress: Progress | None
-) -> Identification:
-    # CasADi is slow to import, and only this method needs it.
-    from stiction_ros.identification import nlp
+def _in_module(name: str) -> Method:
+    """Return ``identify`` of a module here, imported when called: they load slowly."""
 
-    return nlp.identify(record, options, progress)
+    def run(
+        record: Record, options: IdentificationOptions | None, progress: Progress | None
+    ) -> Identification:
+        method: Method = importlib.import_module(f"stiction_ros.identification.{name}").identify
+        return method(record, options, progress)
+
+    return run
 
 
 METHODS: Mapping[str, Method] = {
-    "exact": engine.identify,
-    "nlp": _nlp,
-    "grid": grid_search.identify,
+    "exact": _in_module("engine"),
+    "nlp": _in_module("nlp"),
+    "grid": _in_module("grid_search"),
 }
 
 

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects import FloatArray, FrictionLaw
-from stiction_ros.identification.friction_grid import (
-    count_moves,
-    simulate,
-)
+from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.scan import OutputScan
+from stiction_ros.identification.stem_kernels import count_moves
 
-BLOCK = 4_000_000
+BLOCK = 160_000
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
 
@@ -139,7 +137,7 @@ def stem_of(data: Data, valve: int, friction: FloatArray, start: float) -> Float
     """Return the stem of one valve, shape (N,)."""
     u = data.u[valve]
     stems = simulate(data.law, friction[None, :], u, float(u[0] + start))
-    return np.asarray(stems[0])
+    return np.ascontiguousarray(stems[:, 0])
 
 
 def output_scans(
@@ -292,7 +290,7 @@ def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
         return model
     for j in range(len(data.u)):
         scans = output_scans(data, model, orders, j, Criterion.ONE_STEP, data.delays)
-        stem = model.stems[j : j + 1]
+        stem = model.stems[j][:, None]
         best = [low + int(scan.energy(stem)[0].argmin()) for scan in scans]
         model = dataclasses.replace(model, delays=with_delays(model.delays, j, best))
     return model

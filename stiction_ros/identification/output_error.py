@@ -15,20 +15,26 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_solve, lapack, solve_triangular
+from scipy.linalg import lapack
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.output_error_kernels import (
+    Point,
+    Problem,
+    evaluate,
+    is_stable,
+    normal_equations,
+)
 from stiction_ros.identification.polynomials import stabilised
 
-MAX_RADIUS = 0.9995
 FREE_RUN_WEIGHT = 0.02
 THIN = 4
+MAX_RADIUS = 0.9995
+HARDEST = 1e6  # damping
 ROUGH_GAIN = 0.3
 FINE_GAIN = 1e-3
 
@@ -104,102 +110,48 @@ def equation_error_start(
     return stabilised(np.concatenate([[1.0], theta[: orders.output]]))
 
 
-class _Problem:
-    """Evaluates residuals and their derivative for given A and D.
+def _problem(y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders) -> Problem:
+    """Return the problem of one output.
 
     The linear columns are lagged signals. Neighbouring lags of a slow signal are almost
     parallel, so each is replaced by its differences: the same space, well conditioned, which
     allows normal equations.
     """
-
-    def __init__(
-        self, y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders
-    ) -> None:
-        self.y, self.orders, self.delays = y, orders, delays
-        self.begin = orders.first - orders.noise
-        self.energy = max(float(y[orders.first :] @ y[orders.first :]), 1e-300)
-        self.signals = np.zeros((len(stems) + 2, len(y)))
-        self.signals[: len(stems)] = stems
-        self.signals[-2] = 1.0
-        self.signals[-1, self.begin - orders.output + 1] = 1.0
-        self.groups = [(j, delay + 1, orders.input) for j, delay in enumerate(delays)]
-        self.groups += [(-2, 0, 1), (-1, 0, orders.output)]
-        self.size = sum(count for _, _, count in self.groups)
-        # Samples, from `begin` on, at which Σw² is priced: all before the first innovation, as
-        # nothing else holds the initial state there, then every THIN-th.
-        self.priced = np.r_[: orders.noise, orders.noise : len(y) - self.begin : THIN]
-        self.prices = np.sqrt(np.where(self.priced < orders.noise, 1.0, float(THIN)))
-
-    def rows(self, x: FloatArray, begin: int) -> FloatArray:
-        """Return differences of the lagged signals from sample ``begin`` on; (q, N - begin)."""
-        end = x.shape[1]
-        out = np.empty((self.size, end - begin))
-        row = 0
-        for signal, lag, count in self.groups:
-            lags = [x[signal, begin - lag - i : end - lag - i] for i in range(count)]
-            for _ in range(count):
-                out[row] = lags[0]
-                lags = [now - before for now, before in itertools.pairwise(lags)]
-                row += 1
-        return out
-
-    def coefficients(self, theta: FloatArray) -> FloatArray:
-        """Return the coefficients of the lagged signals from those of their differences."""
-        out = np.zeros(self.size)
-        row = 0
-        for _, _, count in self.groups:
-            out[row : row + count] = _difference_table(count).T @ theta[row : row + count]
-            row += count
-        return out
-
-    def evaluate(self, a: FloatArray, noise: FloatArray, weight: float = 0.0) -> _Point:
-        """Return the variable-projection solution at (A, D).
-
-        Args:
-            weight: price of Σw²; 0 for innovations only.
-        """
-        first, begin = self.orders.first, self.begin
-        prices = np.sqrt(weight) * self.prices
-        plain = self.rows(lfilter([1.0], a, self.signals, axis=1), begin)
-        rows = self.rows(lfilter(noise, a, self.signals, axis=1), first)
-        target = lfilter(noise, [1.0], self.y[begin:])[first - begin :]
-        count = len(target)
-        if weight > 0.0:
-            rows = np.hstack([rows, prices * plain[:, self.priced]])
-            target = np.concatenate([target, prices * self.y[begin + self.priced]])
-        theta, root, keep = _least_squares(rows, target)
-        if not keep.all():
-            rows = rows[keep]
-        residual = target - theta[keep] @ rows
-        return _Point(a, noise, theta, rows, root, theta @ plain, residual, count, weight)
+    count, valves = len(y), len(stems)
+    begin = orders.first - orders.noise
+    signals = np.zeros((valves + 2, count))
+    signals[:valves] = stems
+    signals[valves] = 1.0
+    signals[valves + 1, begin - orders.output + 1] = 1.0
+    groups = [(j, delay + 1, orders.input) for j, delay in enumerate(delays)]
+    groups += [(valves, 0, 1), (valves + 1, 0, orders.output)]
+    # Σw² is priced at all samples before the first innovation, as nothing else holds the
+    # initial state there, then at every THIN-th.
+    priced = np.r_[: orders.noise, orders.noise : count - begin : THIN]
+    prices = np.sqrt(np.where(priced < orders.noise, 1.0, float(THIN)))
+    return Problem(
+        np.ascontiguousarray(y), signals, np.array(groups), begin, orders.first, priced, prices
+    )
 
 
-def _least_squares(
-    rows: FloatArray, target: FloatArray
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return theta (q,), the Cholesky factor of the kept rows' Gram matrix, and which are kept.
+def _coefficients(problem: Problem, theta: FloatArray) -> FloatArray:
+    """Return the coefficients of the lagged signals from those of their differences."""
+    out = np.zeros(len(theta))
+    row = 0
+    for count in problem.groups[:, 2].tolist():
+        out[row : row + count] = _difference_table(count).T @ theta[row : row + count]
+        row += count
+    return out
 
-    Rows that depend on those before them are dropped; their theta is 0.
-    """
-    gram = rows @ rows.T
-    right = rows @ target
-    scale = np.sqrt(np.diag(gram)) + 1e-300
-    keep = scale > 1e-12 * scale.max()
-    while True:
-        size = scale[keep]
-        scaled = gram[np.ix_(keep, keep)] / np.outer(size, size)
-        root, info = lapack.dpotrf(scaled, lower=1)
-        bad = int(info) - 1
-        if info == 0:
-            small = np.flatnonzero(np.diag(root) < 1e-6)
-            if not len(small):
-                break
-            bad = int(small[0])
-        keep[np.flatnonzero(keep)[bad]] = False
-    root *= size[:, None]
-    theta = np.zeros(len(rows))
-    theta[keep] = cho_solve((root, True), right[keep], check_finite=False)
-    return theta, root, keep
+
+def _innovations(problem: Problem, point: Point) -> FloatArray:
+    return point.residual[: len(problem.y) - problem.first]
+
+
+def _energy_of_output(problem: Problem) -> float:
+    """Return Σy² over the window."""
+    y = problem.y[problem.first :]
+    return max(float(y @ y), 1e-300)
 
 
 @functools.cache
@@ -210,27 +162,6 @@ def _difference_table(count: int) -> FloatArray:
         for j in range(i + 1):
             table[i, j] = (-1.0) ** j * math.comb(i, j)
     return table
-
-
-@dataclasses.dataclass(frozen=True)
-class _Point:
-    a: FloatArray
-    noise: FloatArray
-    theta: FloatArray
-    rows: FloatArray
-    root: FloatArray
-    free_run: FloatArray
-    residual: FloatArray
-    count: int
-    weight: float
-
-    @property
-    def innovations(self) -> FloatArray:
-        return self.residual[: self.count]
-
-    @property
-    def energy(self) -> float:
-        return float(self.residual @ self.residual)
 
 
 def ar_fit(w: FloatArray, order: int) -> FloatArray:
@@ -247,71 +178,39 @@ def ar_fit(w: FloatArray, order: int) -> FloatArray:
     return np.concatenate([[1.0], -solution])
 
 
-def _normal_equations(problem: _Problem, point: _Point) -> tuple[FloatArray, FloatArray]:
-    """Return Gram matrix and gradient over (a, d) with the linear part projected out.
-
-    Kaufman's form of the derivative of the variable projection. As with the linear columns,
-    the lags of A are replaced by differences; :func:`_descend` turns its steps back.
-    """
-    orders, p = problem.orders, problem.orders.noise
-    count = point.count
-    # dŷ/da_i = −q^-i ŷ/A; what started before `begin` lies in the span of the initial terms.
-    lead = np.zeros(orders.output)
-    slope = np.concatenate([lead, lfilter(point.noise, point.a, point.free_run)])
-    jacobian = np.empty((orders.output + p, len(point.residual)))
-    for i in range(1, orders.output + 1):
-        begin = orders.output + p - i
-        jacobian[i - 1, :count] = slope[begin : begin + count]
-    if point.weight > 0.0:
-        plain = np.concatenate([lead, lfilter([1.0], point.a, point.free_run)])
-        prices = np.sqrt(point.weight) * problem.prices
-        for i in range(1, orders.output + 1):
-            jacobian[i - 1, count:] = prices * plain[orders.output - i + problem.priced]
-    w = problem.y[problem.begin :] - point.free_run
-    for i in range(1, p + 1):
-        jacobian[orders.output + i - 1, :count] = w[p - i : p - i + count]
-        jacobian[orders.output + i - 1, count:] = 0.0
-    jacobian[: orders.output] = _difference_table(orders.output) @ jacobian[: orders.output]
-    cross = solve_triangular(point.root, point.rows @ jacobian.T, lower=True, check_finite=False)
-    return jacobian @ jacobian.T - cross.T @ cross, jacobian @ point.residual
-
-
-def _descend(problem: _Problem, point: _Point, max_iterations: int, least_gain: float) -> _Point:
+def _descend(problem: Problem, point: Point, most: int, least_gain: float) -> Point:
     """Levenberg-Marquardt over (a, d) from ``point``, Σw² priced by its innovations.
 
-    Ends when an iteration lowers the criterion by less than ``least_gain``.
+    Ends after ``most`` iterations, or when one lowers the criterion by less than ``least_gain``.
     """
-    na = problem.orders.output
-    table = _difference_table(na)
-    damping = 1e-4
-    innovations = point.innovations
-    weight = FREE_RUN_WEIGHT * float(innovations @ innovations) / problem.energy
-    point = problem.evaluate(point.a, point.noise, weight)
-    for _ in range(max_iterations):
-        gram, gradient = _normal_equations(problem, point)
+    innovations = _innovations(problem, point)
+    count, order = len(innovations), len(point.a) - 1
+    weight = FREE_RUN_WEIGHT * float(innovations @ innovations) / _energy_of_output(problem)
+    table, damping = _difference_table(order), 1e-4
+    point = evaluate(problem, point.a, point.noise, weight)
+    energy = float(point.residual @ point.residual)
+    for _ in range(most):
+        gram, gradient = normal_equations(problem, point, table)
         scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
         scale[scale < 1e-100] = 1.0  # a coefficient without influence stays where it is
         gram /= np.outer(scale, scale)
         gradient /= scale
-        improved = False
-        while damping < 1e6:
-            system = gram + damping * np.eye(len(gram))
-            step = -np.linalg.solve(system, gradient) / scale
-            a = point.a.copy()
-            a[1:] += table.T @ step[:na]
-            noise = point.noise.copy()
-            noise[1:] += step[na:]
-            if np.abs(np.roots(a)).max(initial=0.0) < MAX_RADIUS:
-                candidate = problem.evaluate(a, noise, weight)
-                if candidate.energy < point.energy:
-                    improved = True
+        before = energy
+        while damping < HARDEST:
+            step = -np.linalg.solve(gram + damping * np.eye(len(gram)), gradient) / scale
+            a, noise = point.a.copy(), point.noise.copy()
+            a[1:] += table.T @ step[:order]
+            noise[1:] += step[order:]
+            if is_stable(a, MAX_RADIUS):
+                candidate = evaluate(problem, a, noise, weight)
+                energy = float(candidate.residual @ candidate.residual)
+                if energy < before:
                     break
             damping *= 5.0
-        if not improved:
+        else:
             return point
-        gain = 1.0 - candidate.energy / point.energy
         point, damping = candidate, max(damping / 10.0, 1e-9)
-        if gain * point.count < least_gain and damping < 1e-5:
+        if (1.0 - energy / before) * count < least_gain and damping < 1e-5:
             break
     return point
 
@@ -334,60 +233,64 @@ def fit_output(
         start: a neighbouring fit of the same orders to start from; None starts from the ARX
             model with both noise placements and keeps the better.
     """
-    problem = _Problem(y, stems, delays, orders)
+    problem = _problem(y, stems, delays, orders)
     if start is not None:
-        starts = [problem.evaluate(start.a, start.noise)]
+        starts = [evaluate(problem, start.a, start.noise, 0.0)]
     else:
         a = equation_error_start(y, stems, delays, orders)
         padded = np.zeros(orders.noise + 1)
         short = min(len(a), len(padded))
         padded[:short] = a[:short]
-        white = problem.evaluate(a, np.eye(1, orders.noise + 1)[0])
-        refined = _steiglitz_mcbride(problem, white)
+        white = evaluate(problem, a, np.eye(1, orders.noise + 1)[0], 0.0)
+        refined = _steiglitz_mcbride(problem, delays, orders, white)
         noise = ar_fit(y[problem.begin :] - refined.free_run, orders.noise)
-        starts = [problem.evaluate(a, padded), problem.evaluate(refined.a, noise)]
+        starts = [evaluate(problem, a, padded, 0.0), evaluate(problem, refined.a, noise, 0.0)]
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
     rough = [_descend(problem, point, max_iterations, ROUGH_GAIN) for point in starts]
     best = min(rough, key=lambda point: _loss(problem, point))
-    return _finished(problem, _descend(problem, best, max_iterations, FINE_GAIN))
+    return _finished(problem, delays, orders, _descend(problem, best, max_iterations, FINE_GAIN))
 
 
-def _steiglitz_mcbride(problem: _Problem, point: _Point, iterations: int = 4) -> _Point:
+def _steiglitz_mcbride(
+    problem: Problem, delays: tuple[int, ...], orders: Orders, point: Point, iterations: int = 4
+) -> Point:
     """Return a better white-noise start: ARX of data filtered by 1/A, repeated."""
-    best, orders, delays = point, problem.orders, problem.delays
+    best, energy = point, float(point.residual @ point.residual)
     for _ in range(iterations):
-        filtered = lfilter([1.0], point.a, np.vstack([problem.y, problem.signals[:-2]]), axis=1)
+        driving = np.vstack([problem.y, problem.signals[:-2]])
+        filtered = lfilter([1.0], point.a, driving, axis=1)
         a = equation_error_start(filtered[0], filtered[1:], delays, orders)
-        point = problem.evaluate(a, point.noise)
-        if point.energy < best.energy:
-            best = point
+        point = evaluate(problem, a, point.noise, 0.0)
+        reached = float(point.residual @ point.residual)
+        if reached < energy:
+            best, energy = point, reached
     return best
 
 
-def _loss(problem: _Problem, point: _Point) -> float:
+def _loss(problem: Problem, point: Point) -> float:
     """Return n log(Σε²/n) + n κ Σw²/Σy²."""
-    innovations = point.innovations
-    energy = max(float(innovations @ innovations), 1e-300)
+    innovations = _innovations(problem, point)
+    count, energy = len(innovations), max(float(innovations @ innovations), 1e-300)
     w = problem.y[problem.begin :] - point.free_run
-    penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
-    return point.count * (float(np.log(energy / point.count)) + penalty)
+    penalty = FREE_RUN_WEIGHT * float(w @ w) / _energy_of_output(problem)
+    return count * (float(np.log(energy / count)) + penalty)
 
 
-def _finished(problem: _Problem, point: _Point) -> OutputFit:
-    orders, valves = problem.orders, len(problem.delays)
-    theta = problem.coefficients(point.theta)
-    innovations = point.innovations
+def _finished(problem: Problem, delays: tuple[int, ...], orders: Orders, point: Point) -> OutputFit:
+    valves = len(delays)
+    theta = _coefficients(problem, point.theta)
+    innovations = _innovations(problem, point)
     return OutputFit(
         orders=orders,
-        delays=problem.delays,
+        delays=delays,
         a=point.a,
         b=theta[: valves * orders.input].reshape(valves, orders.input),
         constant=float(theta[valves * orders.input]),
         noise=point.noise,
         loss=_loss(problem, point),
         energy=max(float(innovations @ innovations), 1e-300),
-        count=point.count,
+        count=len(innovations),
         free_run=point.free_run,
         innovations=innovations,
     )

@@ -34,8 +34,9 @@ from stiction_ros.identification.patterns import (
     resting_cells,
 )
 from stiction_ros.identification.scan import PatternEnergy
+from stiction_ros.identification.stem_kernels import count_moves
 
-BLOCK = 1_500_000
+BLOCK = 160_000
 MOST_CELLS = 3000
 CELL_SAMPLES = 3e7
 SAMPLES = 6000  # up to which neighbourhoods are of full size
@@ -81,7 +82,7 @@ class PatternSearch:
         dynamic = cells.dynamic
         dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
         level, curvature, loss, delays = self.minimised(cells.bases, cells.signs, dynamic)
-        moves = (np.diff(cells.bases, axis=1) != 0.0).sum(axis=1).astype(float)
+        moves = count_moves(np.ascontiguousarray(cells.bases)).astype(float)
         return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
 
     def best_level(self, friction: FloatArray) -> float:
@@ -137,7 +138,7 @@ class PatternSearch:
         """
         energies = [scan.patterns(bases, signs) for scan in self.scans]
         low, high = ranges[:, 0], ranges[:, 1]
-        rows = np.arange(len(bases))
+        rows = np.arange(bases.shape[1])
         for _ in range(ZOOMS):
             levels = low[:, None] + np.linspace(0.0, 1.0, 5) * (high - low)[:, None]
             loss, delays = self._loss_at(energies, levels)

@@ -24,9 +24,7 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.moving_patterns import RULES
-
-SWARM = 2
-FEW = 40
+from stiction_ros.identification.stem_kernels import cell_bounds, he_patterns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,8 +48,8 @@ class Cells:
 
     Attributes:
         bounds: rows (J low, J high, S low, S high), %, shape (G, 4).
-        bases: u at the last slip, before the first slip the stem's level, shape (G, N).
-        signs: direction of the last slip, 0 before the first, shape (G, N).
+        bases: u at the last slip, before the first slip the stem's level, shape (N, G).
+        signs: direction of the last slip, 0 before the first, shape (N, G).
     """
 
     bounds: FloatArray
@@ -67,7 +65,7 @@ class Cells:
 
     def part(self, rows: slice) -> Cells:
         """Return some of the cells."""
-        return Cells(self.bounds[rows], self.bases[rows], self.signs[rows])
+        return Cells(self.bounds[rows], self.bases[:, rows], self.signs[:, rows])
 
 
 def has_cells(law: type[FrictionLaw]) -> bool:
@@ -128,9 +126,7 @@ def cells_at(
     if law in RULES:
         first = (begin.first, begin.direction)
         return _moving_cells(u, points, np.full(len(points), begin.level), law, first)
-    base = np.full(len(points), begin.level)
-    sign = np.zeros(len(points))
-    return _cells(u, points, base, sign, begin)
+    return _cells(u, points, np.full(len(points), begin.level), begin)
 
 
 def resting_cells(
@@ -145,7 +141,7 @@ def resting_cells(
     """
     if law in RULES:
         return _moving_cells(u, points, levels, law, None)
-    return _cells(u, points, levels.copy(), np.zeros(len(points)), None)
+    return _cells(u, points, np.asarray(levels, dtype=float), None)
 
 
 def _moving_cells(
@@ -162,110 +158,13 @@ def _moving_cells(
     ]
     return Cells(
         np.array([trace.bounds for trace in traces]).reshape(-1, 4),
-        np.array([trace.base for trace in traces]).reshape(-1, len(u)),
-        np.array([trace.sign for trace in traces]).reshape(-1, len(u)),
+        np.array([trace.base for trace in traces]).reshape(-1, len(u)).T,
+        np.array([trace.sign for trace in traces]).reshape(-1, len(u)).T,
     )
 
 
-def _cells(
-    u: FloatArray, points: FloatArray, base: FloatArray, sign: FloatArray, begin: Beginning | None
-) -> Cells:
-    bases, signs = _simulate(u, points, base, sign, begin)
-    return Cells(_bounds(u, bases, signs), bases, signs)
-
-
-def _simulate(
-    u: FloatArray, points: FloatArray, base: FloatArray, sign: FloatArray, begin: Beginning | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return u at the last slip and its direction, both of shape (G, N)."""
-    if len(points) <= FEW:
-        rows = [
-            _simulate_one(u, float(point[0]), float(point[1]), level, begin)
-            for point, level in zip(points, base.tolist(), strict=True)
-        ]
-        return np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+def _cells(u: FloatArray, points: FloatArray, level: FloatArray, begin: Beginning | None) -> Cells:
     jump, reverse = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-    values, bases, signs, begins = u.tolist(), [base], [sign], [0]
-    after = 0
-    if begin is not None:
-        after = begin.first + 1
-        if begin.first < len(u):
-            base, sign = np.full_like(base, u[begin.first]), np.full_like(sign, begin.direction)
-            bases.append(base)
-            signs.append(sign)
-            begins.append(begin.first)
-    high, low = _thresholds(base, sign, jump, reverse)
-    ceiling, floor = high.min(), low.max()
-    busy = 0
-    for k in range(after, len(values)):
-        value = values[k]
-        if not busy and floor <= value <= ceiling:
-            continue
-        up, down = value > high, value < low
-        base = np.where(up | down, value, base)
-        sign = np.where(up, 1.0, np.where(down, -1.0, sign))
-        bases.append(base)
-        signs.append(sign)
-        begins.append(k)
-        high, low = _thresholds(base, sign, jump, reverse)
-        busy = busy - 1 if busy else SWARM  # slips come in swarms
-        if not busy:
-            ceiling, floor = high.min(), low.max()
-    lengths = np.diff([*begins, len(values)])
-    return (
-        np.repeat(np.stack(bases, axis=1), lengths, axis=1),
-        np.repeat(np.stack(signs, axis=1), lengths, axis=1),
-    )
-
-
-def _simulate_one(
-    u: FloatArray, jump: float, reverse: float, level: float, begin: Beginning | None
-) -> tuple[FloatArray, FloatArray]:
-    values, bases, signs, begins = u.tolist(), [level], [0.0], [0]
-    after = 0
-    half = 0.5 * (jump + reverse)
-    high, low = level + half, level - half
-    if begin is not None:
-        after = begin.first + 1
-        if begin.first < len(u):
-            bases.append(values[begin.first])
-            signs.append(begin.direction)
-            begins.append(begin.first)
-            high, low = _edges(bases[-1], signs[-1], jump, reverse)
-    for k in range(after, len(values)):
-        value = values[k]
-        if low <= value <= high:
-            continue
-        bases.append(value)
-        signs.append(1.0 if value > high else -1.0)
-        begins.append(k)
-        high, low = _edges(value, signs[-1], jump, reverse)
-    lengths = np.diff([*begins, len(values)])
-    return np.repeat(bases, lengths), np.repeat(signs, lengths)
-
-
-def _edges(base: float, sign: float, jump: float, reverse: float) -> tuple[float, float]:
-    return (base + jump, base - reverse) if sign > 0.0 else (base + reverse, base - jump)
-
-
-def _thresholds(
-    base: FloatArray, sign: FloatArray, jump: FloatArray, reverse: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return OP above and below which the stems slip; f_S before the first slip."""
-    half = 0.5 * (jump + reverse)
-    up = np.where(sign > 0.0, jump, np.where(sign < 0.0, reverse, half))
-    down = np.where(sign > 0.0, reverse, np.where(sign < 0.0, jump, half))
-    return base + up, base - down
-
-
-def _bounds(u: FloatArray, bases: FloatArray, signs: FloatArray) -> FloatArray:
-    """Return per pattern what its stays and slips say of J and S."""
-    out = np.empty((len(bases), 4))
-    lead = signs[:, :-1] * (u[None, 1:] - bases[:, :-1])
-    slips = bases[:, 1:] != bases[:, :-1]
-    stayed = np.where(slips, 0.0, lead)
-    out[:, 0] = np.maximum(stayed.max(axis=1), 0.0)
-    out[:, 2] = np.maximum(-stayed.min(axis=1), 0.0)
-    out[:, 1] = np.where(slips & (lead > 0.0), lead, np.inf).min(axis=1)
-    out[:, 3] = np.where(slips & (lead < 0.0), -lead, np.inf).min(axis=1)
-    return out
+    first, direction = (-1, 0.0) if begin is None else (begin.first, begin.direction)
+    bases, signs = he_patterns(u, jump, reverse, level, first, direction)
+    return Cells(cell_bounds(u, bases, signs), bases, signs)

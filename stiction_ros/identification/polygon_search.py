@@ -160,15 +160,15 @@ def best_start(data: Data, model: Model, orders: Orders, valve: int) -> float:
     if not low < high:
         return float(model.start[valve])
     stem = seen.alpha - seen.beta * friction[1]
-    level = search.minimised(stem[None, :], -seen.gamma[None, :], np.array([[low, high]]))[0][0]
+    level = search.minimised(stem[:, None], -seen.gamma[:, None], np.array([[low, high]]))[0][0]
     margin = INSIDE * (high - low)
     return float(np.clip(level, low + margin, high - margin)) - first
 
 
 def _judge(search: PatternSearch, cells: list[PolygonCell], level: float) -> _Judged:
     """Return every cell's best f_D, a little inside it."""
-    bases = np.array([cell.trace.alpha + level * cell.trace.gamma for cell in cells])
-    slopes = np.array([cell.trace.beta for cell in cells])
+    bases = np.stack([cell.trace.alpha + level * cell.trace.gamma for cell in cells], axis=1)
+    slopes = np.stack([cell.trace.beta for cell in cells], axis=1)
     low = np.array([cell.corners[:, 1].min() for cell in cells])
     high = np.array([cell.corners[:, 1].max() for cell in cells])
     margin = INSIDE * (high - low)

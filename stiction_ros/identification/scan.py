@@ -13,6 +13,12 @@ from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.scan_kernels import (
+    explained_energy,
+    filtered,
+    lagged_products,
+    subtract_projections,
+)
 
 
 class OutputScan:
@@ -41,7 +47,9 @@ class OutputScan:
         free: FloatArray | None = None,
     ) -> None:
         self.orders, self.delay = orders, delay
-        self.numerator, self.denominator = numerator, denominator
+        self.numerator = np.asarray(numerator, dtype=float)
+        self.denominator = np.asarray(denominator, dtype=float)
+        self.plain = len(self.numerator) == 1 and len(self.denominator) == 1
         first, count = orders.first, len(y)
         target = self._filtered(y)
         columns = [target[first - i : count - i] for i in range(1, orders.output + 1)]
@@ -69,91 +77,64 @@ class OutputScan:
         for position, lag in enumerate(self.lags):
             projector[first - lag : count - lag, position, :-1] = basis
             projector[first - lag : count - lag, position, -1] = rest
-        self.projector = projector.reshape(count, -1)
+        self._projector = projector.reshape(count, -1)
+
+    def projected(self, x: FloatArray) -> FloatArray:
+        """Return the products of lagged signals with basis and rest, shape (L, q + 1, G)."""
+        return (self._projector.T @ x).reshape(len(self.lags), self.width, -1)
 
     def _filtered(self, x: FloatArray) -> FloatArray:
-        if len(self.numerator) == 1 and len(self.denominator) == 1:
+        """Return what the prefilter makes of signals, time along the last axis."""
+        if self.plain:
             return x
         return np.asarray(lfilter(self.numerator, self.denominator, x, axis=-1))
 
     def energy(self, stems: FloatArray) -> FloatArray:
-        """Return SE, shape (G, T), for stems of shape (G, N) and T delays."""
-        x = self._filtered(stems)
-        projected = self._projected(x)
-        return self._energy(self._gram(x, x, projected, projected), projected[..., -1])
+        """Return SE, shape (G, T), for stems of shape (N, G) and T delays."""
+        batch = _Batch(self, stems)
+        return self._energy(batch.products(batch), batch.right)
 
     def patterns(self, bases: FloatArray, signs: FloatArray) -> PatternEnergy:
         """Return SE of the stems base − level · sign as a function of the level.
 
         Args:
-            bases, signs: shape (G, N).
+            bases, signs: shape (N, G).
         """
-        x, s = self._filtered(bases), self._filtered(signs)
-        px, ps = self._projected(x), self._projected(s)
-        cross = self._gram(x, s, px, ps)
-        return PatternEnergy(
-            self,
-            (self._gram(x, x, px, px), cross + cross.transpose(1, 0, 2), self._gram(s, s, ps, ps)),
-            (px[..., -1], ps[..., -1]),
-        )
+        x, s = _Batch(self, bases), _Batch(self, signs)
+        cross = x.products(s) + s.products(x)
+        return PatternEnergy(self, (x.products(x), cross, s.products(s)), (x.right, s.right))
 
-    def _gram(self, x: FloatArray, s: FloatArray, px: FloatArray, ps: FloatArray) -> FloatArray:
-        gram = self._products(x, s)
-        if x is s:  # a ridge, as a stem that stands still says nothing
-            diagonal = np.arange(len(gram))
-            gram[diagonal, diagonal] *= 1.0 + 1e-13
-            gram[diagonal, diagonal] += 1e-200
-        gram -= np.einsum("lgq,mgq->lmg", px[..., :-1], ps[..., :-1], optimize=True)
-        return gram
-
-    def _projected(self, x: FloatArray) -> FloatArray:
-        """Return the products of lagged signals with basis and rest, shape (L, G, q + 1)."""
-        product = (x @ self.projector).reshape(len(x), len(self.lags), self.width)
-        return np.ascontiguousarray(product.transpose(1, 0, 2))
-
-    def _energy(self, gram: FloatArray, right: FloatArray) -> FloatArray:
-        """Return SE, shape (G, T), from Gram (L, L, G) and right-hand side (L, G)."""
-        nb, size = self.orders.input, right.shape[1]
-        delays = len(self.lags) - nb + 1
-        lag = np.arange(delays)[:, None] + np.arange(nb)
-        matrix = gram[lag[:, :, None], lag[:, None, :]].transpose(3, 0, 1, 2).copy()
-        vector = right[lag].transpose(2, 0, 1).copy()
-        # What the rest explains to the last digit says nothing: its Gram matrix is rounding.
-        diagonal = np.arange(nb)
-        empty = ~(matrix[..., diagonal, diagonal] > 0.0).all(axis=-1)
-        matrix[empty] = np.eye(nb)
-        vector[empty] = 0.0
-        matrix[..., diagonal, diagonal] *= 1.0 + 1e-12 * (1.0 + diagonal)
-        solution = np.linalg.solve(matrix, vector[..., None])[..., 0]
-        explained = np.einsum("gti,gti->gt", vector, solution).reshape(size, delays)
+    def _energy(self, products: FloatArray, right: FloatArray) -> FloatArray:
+        """Return SE, shape (G, T), from lagged products (n_b, L, G) and right-hand side (L, G)."""
+        explained = explained_energy(products, right)
+        # What the rest explains to the last digit says nothing: its products are rounding.
         explained[explained > self.rest_energy * (1.0 + 1e-9)] = 0.0
         return np.asarray(np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy))
 
-    def _products(self, x: FloatArray, s: FloatArray) -> FloatArray:
-        """Return sums of x[k − l] s[k − m] over the window, shape (L, L, G), |l − m| < n_b."""
-        first, count = self.orders.first, x.shape[1]
-        out = np.zeros((len(self.lags), len(self.lags), len(x)))
-        for d in range(self.orders.input):
-            pairs = [(x, s)] if d == 0 or x is s else [(x, s), (s, x)]
-            for swap, (one, two) in enumerate(pairs):
-                lag = self.lags[0]
-                now = np.einsum(
-                    "gn,gn->g",
-                    one[:, first - lag : count - lag],
-                    two[:, first - lag - d : count - lag - d],
-                )
-                for position in range(len(self.lags) - d):
-                    row, column = position, position + d
-                    if swap:
-                        row, column = column, row
-                    out[row, column] = now
-                    if x is s:
-                        out[column, row] = now
-                    last, before = count - 1 - lag, first - lag - 1
-                    now = (
-                        now + one[:, before] * two[:, before - d] - one[:, last] * two[:, last - d]
-                    )
-                    lag += 1
+
+class _Batch:
+    """Prefiltered signals, shape (N, G), and their products with basis and rest."""
+
+    def __init__(self, scan: OutputScan, signals: FloatArray) -> None:
+        self._scan = scan
+        signals = np.ascontiguousarray(signals, dtype=float)
+        self.x = signals if scan.plain else filtered(scan.numerator, scan.denominator, signals)
+        self._projected = scan.projected(self.x)
+
+    @property
+    def right(self) -> FloatArray:
+        """Products with the rest, shape (L, G)."""
+        return self._projected[:, -1]
+
+    def products(self, other: _Batch) -> FloatArray:
+        """Return lagged products of what the basis leaves of both, shape (n_b, L, G)."""
+        scan = self._scan
+        orders, lags = scan.orders, scan.lags
+        out = lagged_products(self.x, other.x, orders.first, lags[0], len(lags), orders.input)
+        if other is self:  # a ridge, as a stem that stands still says nothing
+            out[0] *= 1.0 + 1e-13
+            out[0] += 1e-200
+        subtract_projections(out, self._projected[:, :-1], other._projected[:, :-1])
         return out
 
 
@@ -163,13 +144,13 @@ class PatternEnergy:
     def __init__(
         self,
         scan: OutputScan,
-        grams: tuple[FloatArray, FloatArray, FloatArray],
+        products: tuple[FloatArray, FloatArray, FloatArray],
         rights: tuple[FloatArray, FloatArray],
     ) -> None:
-        self._scan, self._grams, self._rights = scan, grams, rights
+        self._scan, self._products, self._rights = scan, products, rights
 
     def __call__(self, levels: FloatArray) -> FloatArray:
         """Return SE, shape (G, F, T), for f_D of shape (G, F)."""
-        (xx, cross, ss), (x, s) = self._grams, self._rights
+        (xx, cross, ss), (x, s) = self._products, self._rights
         parts = [self._scan._energy(xx - f * cross + f**2 * ss, x - f * s) for f in levels.T]
         return np.stack(parts, axis=1)

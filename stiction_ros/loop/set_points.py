@@ -70,3 +70,13 @@ class SetPoints:
             time = time % self.repeat
         row = int(np.searchsorted(self.times, time, side="right")) - 1
         return np.asarray(self.values[max(row, 0)])
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the mapping that :meth:`from_mapping` reads."""
+        moves = [
+            {"time": float(time)}
+            | {tag: float(v) for tag, v in zip(self.outputs, row, strict=True)}
+            for time, row in zip(self.times, self.values, strict=True)
+        ]
+        repeat = {"repeat": float(self.repeat)} if np.isfinite(self.repeat) else {}
+        return {**repeat, "moves": moves}

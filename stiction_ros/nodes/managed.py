@@ -291,7 +291,7 @@ class ManagedNode(LifecycleNode):
             (f"published:{self.resolve_topic_name(topic)}", outlet.count)
             for topic, outlet in self.outlets.items()
         ]
-        name, hardware = self.get_name(), self.hardware()
+        name, hardware = self.get_fully_qualified_name()[1:], self.hardware()
         message = DiagnosticArray()
         message.header.stamp = to_stamp(self.stamp)
         message.status = [status(f"{name}: status", hardware, level, text, [*values, *counts])]

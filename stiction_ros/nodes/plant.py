@@ -55,7 +55,8 @@ class PlantNode(ManagedNode):
         self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
 
     def configuration(self) -> dict[str, Any]:
-        return {"seed": self.settings.seed, "model": self.model.to_mapping()}
+        told = {"seed": self.settings.seed, "model": self.model.to_mapping()}
+        return told if self.schedule is None else told | {"set_points": self.schedule.to_mapping()}
 
     def hardware(self) -> str:
         return self.model.name

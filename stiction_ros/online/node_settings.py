@@ -77,11 +77,32 @@ class RecorderNodeSettings(NodeSettings):
     """What is recorded, and where."""
 
     directory: str = setting("bag", "the bag, a directory that holds nothing yet", fixed=True)
-    topics: str = setting(
-        ".*", "regular expression of the full names of the topics to record", fixed=True
+    topics: tuple[str, ...] = setting(
+        (), "names of topics to record, beside those that regex fits", fixed=True
+    )
+    regex: str = setting(
+        ".*",
+        "regular expression of the full names of topics to record; empty for none",
+        fixed=True,
+    )
+    exclude_regex: str = setting(
+        "", "regular expression of the full names of topics to leave out", fixed=True
     )
     compression: str = setting(
         "zstd", "of the finished bag", choices=("zstd", "lz4", "none"), fixed=True
+    )
+    max_bag_size: int = setting(
+        0,
+        "bytes of messages after which the bag goes on in its next file; 0 for never",
+        low=0,
+        fixed=True,
+    )
+    max_bag_duration: float = setting(
+        0.0,
+        "s of log time after which the bag goes on in its next file; 0 for never",
+        low=0.0,
+        high=1e9,
+        fixed=True,
     )
 
 

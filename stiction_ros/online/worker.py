@@ -9,6 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
 from stiction_ros.identification import Identification, IdentificationOptions
+from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.online.live_estimator import fit
 from stiction_ros.orphans import die_with_parent
 from stiction_ros.records import Record
@@ -29,6 +30,7 @@ class FitWorker:
         context = multiprocessing.get_context("spawn")
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
         self._ready = self._pool.submit(os.getpid)
+        self._pool.submit(compile_loops)  # before the first window is full
 
     @property
     def pid(self) -> int:

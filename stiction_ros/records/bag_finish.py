@@ -1,14 +1,12 @@
-"""Turns the journal of a bag writer into a finished rosbag2 bag."""
+"""Turns the journals of a bag writer into a finished rosbag2 bag."""
 
 from __future__ import annotations
 
+import dataclasses
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO
 
-from mcap.writer import CompressionType, Writer
-
-from stiction_ros.errors import InputError
 from stiction_ros.records.bag_metadata import (
     BagFile,
     BagTopic,
@@ -16,135 +14,185 @@ from stiction_ros.records.bag_metadata import (
     metadata_record,
     metadata_yaml,
 )
+from stiction_ros.records.mcap_chunked import ChunkedFile
 from stiction_ros.records.mcap_scan import McapScan
+from stiction_ros.records.run_metadata import RUN, custom_data, merged
+from stiction_ros.records.storage_files import METADATA, found_files
 
 CLOCK = "/clock"
-_COMPRESSIONS = {
-    "zstd": CompressionType.ZSTD,
-    "lz4": CompressionType.LZ4,
-    "none": CompressionType.NONE,
-}
+ROSBAG2 = "rosbag2"
 
 
-def storage_path(directory: Path) -> Path:
-    """Return the MCAP file of the bag ``directory``."""
-    return directory / f"{directory.resolve().name}_0.mcap"
+@dataclasses.dataclass(frozen=True)
+class Packing:
+    """How a finished file is packed.
+
+    Attributes:
+        compression: ``zstd``, ``lz4`` or ``none``.
+        chunk_size: bytes of messages in one chunk before compression.
+    """
+
+    compression: str = "zstd"
+    chunk_size: int = 1 << 18
 
 
-def finish_bag(
-    directory: str | Path, *, compression: str = "zstd", chunk_size: int = 1 << 20
-) -> tuple[str, ...]:
-    """Rewrite the journal of a bag chunked and indexed and write its ``metadata.yaml``.
+@dataclasses.dataclass(frozen=True)
+class FileContent:
+    """What one storage file holds.
+
+    Attributes:
+        file: its name, counts and times.
+        topics: in the order they were announced.
+        run: what its metadata records say of the run.
+        finished: whether its writer closed it.
+        damaged: whether something in it is broken.
+        notes: what was left out, one sentence each.
+    """
+
+    file: BagFile
+    topics: tuple[BagTopic, ...]
+    run: Mapping[str, str]
+    finished: bool
+    damaged: bool
+    notes: tuple[str, ...]
+
+
+def storage_path(directory: Path, number: int = 0) -> Path:
+    """Return an MCAP file of the bag ``directory``; splits are numbered from 0."""
+    return directory / f"{directory.resolve().name}_{number}.mcap"
+
+
+def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str, ...]:
+    """Rewrite the journals of a bag chunked and indexed and write its ``metadata.yaml``.
 
     Where there is a ``/clock``, what was received before its first message (configurations,
     latched topics) came at wall time, years away; it gets that first simulated time.
 
-    The journal is replaced when the new file is complete on the disk, so that a second
-    kill loses nothing either.
+    A journal is replaced when the new file is complete on the disk, so that a second kill
+    loses nothing either.
 
     Args:
         directory: a bag whose writer has ended, by itself or by a kill.
-        compression: ``zstd``, ``lz4`` or ``none``.
-        chunk_size: bytes of messages in one chunk.
+        packing: of the finished files.
 
     Returns:
         What was left out, one sentence each; empty when nothing was.
 
     Raises:
         InputError: no journal there, or a damaged one.
+        OSError: the storage refuses; the journals are then as they were.
     """
     directory = Path(directory)
-    if compression not in _COMPRESSIONS:
-        raise InputError(
-            f"compression {compression!r} is not known", fix=f"use {', '.join(_COMPRESSIONS)}"
-        )
-    path = storage_path(directory)
-    scan = McapScan(path)
+    files = found_files(directory)
+    clock = first_clock(files)
+    contents = [rewrite(file, packing, clock=clock) for file in files]
+    write_listing(directory, contents)
+    return tuple(note for content in contents for note in content.notes)
+
+
+def first_clock(files: Sequence[Path]) -> int | None:
+    """Return the log time of the first message on ``/clock``, ns, or None without one."""
+    for file in files:
+        for message in McapScan(file, salvage=True).messages():
+            if message.topic.name == CLOCK:
+                return message.log_time
+    return None
+
+
+def rewrite(
+    path: Path, packing: Packing, *, clock: int | None = None, salvage: bool = False
+) -> FileContent:
+    """Rewrite one file chunked and indexed, in its place.
+
+    Args:
+        path: the file, a journal for example.
+        packing: of the new file.
+        clock: first simulated time of the bag, ns; messages before the first on ``/clock``
+            whose log time is later get it.
+        salvage: leave out what is damaged, with a note, instead of raising.
+
+    Raises:
+        InputError: damaged.
+        OSError: the storage refuses.
+    """
+    scan = McapScan(path, salvage=salvage)
     partial = path.with_suffix(".mcap.part")
     try:
         with partial.open("wb") as output:
-            writer = Writer(
-                output,
-                chunk_size=chunk_size,
-                compression=_COMPRESSIONS[compression],
-                use_summary_offsets=False,
-                enable_crcs=True,
-                enable_data_crcs=True,
+            target = ChunkedFile(
+                output, compression=packing.compression, chunk_size=packing.chunk_size
             )
-            information = _Rewrite(writer, path.name).run(scan, _first_clock(path))
+            channels = _copy(scan, target, clock)
+            content = _content(path, scan, target, channels)
+            if content.run:
+                target.metadata(RUN, content.run)
+            for name, mapping in scan.metadata:
+                if name not in (RUN, ROSBAG2):
+                    target.metadata(name, mapping)
+            target.metadata(ROSBAG2, metadata_record(_information([content])))
+            target.finish()
             output.flush()
             os.fsync(output.fileno())
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
-    _write_whole(directory / "metadata.yaml", metadata_yaml(information))
-    return tuple(scan.notes)
+    return content
 
 
-def _first_clock(path: Path) -> int | None:
-    """Return the log time of the first message on ``/clock``, or None."""
-    messages = McapScan(path).messages()
-    return next((message.log_time for message in messages if message.topic.name == CLOCK), None)
-
-
-class _Rewrite:
-    """Copies a scan into a new file and sums up what is in it."""
-
-    def __init__(self, writer: Writer, name: str) -> None:
-        self._writer = writer
-        self._name = name
-        self._channels: dict[BagTopic, int] = {}
-        self._schemas: dict[tuple[str, str, str], int] = {}
-
-    def run(self, scan: McapScan, clock: int | None) -> dict[str, object]:
-        """Copy everything, what came before the first ``clock`` at its time; sum it up."""
-        writer = self._writer
-        writer.start(profile="ros2", library="stiction_ros")
-        counts: dict[BagTopic, int] = {}
-        first: int | None = None
-        last: int | None = None
-        for topic, log_time, publish_time, data in scan.messages():
-            if topic.name == CLOCK:
-                clock = None
-            elif clock is not None:
-                log_time = clock
-            channel = self._channels.get(topic) or self._register(topic)
-            count = counts.get(topic, 0)
-            writer.add_message(channel, log_time, data, publish_time, count & 0xFFFFFFFF)
-            counts[topic] = count + 1
-            first = log_time if first is None else min(first, log_time)
-            last = log_time if last is None else max(last, log_time)
-        for topic in scan.topics.values():
-            if topic not in self._channels:
-                self._register(topic)
-        for name, mapping in scan.metadata:
-            if name != "rosbag2":
-                writer.add_metadata(name, mapping)
-        file = BagFile(self._name, {t.name: n for t, n in counts.items()}, first, last)
-        information = bag_information(file, list(scan.topics.values()))
-        writer.add_metadata("rosbag2", metadata_record(information))
-        writer.finish()  # type: ignore[no-untyped-call]
-        return information
-
-    def _register(self, topic: BagTopic) -> int:
-        key = (topic.type, topic.schema_encoding, topic.definition)
-        if key not in self._schemas:
-            self._schemas[key] = self._writer.register_schema(
-                topic.type, topic.schema_encoding, topic.definition.encode()
-            )
-        channel = self._writer.register_channel(
-            topic.name, topic.encoding, self._schemas[key], topic.channel_metadata()
-        )
-        self._channels[topic] = channel
-        return channel
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write a file so that a reader sees the old one or the new one."""
-    partial = path.with_suffix(path.suffix + ".part")
-    stream: IO[str]
+def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
+    """Write ``metadata.yaml`` for the files of a bag, one at least, in their order."""
+    text = metadata_yaml(_information(contents))
+    partial = directory / f"{METADATA}.part"
     with partial.open("w", encoding="utf-8") as stream:
         stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
-    os.replace(partial, path)
+    os.replace(partial, directory / METADATA)  # a reader sees the old one or the new one
+
+
+def _copy(scan: McapScan, target: ChunkedFile, clock: int | None) -> dict[BagTopic, int]:
+    """Copy all messages and topics; return the channels of the topics."""
+    channels: dict[BagTopic, int] = {}
+    for topic, log_time, publish_time, data in scan.messages():
+        channel = channels.get(topic)
+        if channel is None:
+            channel = channels[topic] = target.topic(topic)
+        if clock is not None:
+            if topic.name == CLOCK:
+                clock = None
+            else:
+                log_time = min(log_time, clock)
+        target.message(channel, log_time, publish_time, data)
+    for topic in scan.topics.values():
+        if topic not in channels:
+            channels[topic] = target.topic(topic)
+    return channels
+
+
+def _content(
+    path: Path, scan: McapScan, target: ChunkedFile, channels: Mapping[BagTopic, int]
+) -> FileContent:
+    counts: dict[str, int] = {}
+    for topic, channel in channels.items():
+        counts[topic.name] = counts.get(topic.name, 0) + target.counts[channel]
+    first, last = target.span()
+    file = BagFile(path.name, counts, first, last)
+    return content_of(file, scan)
+
+
+def content_of(file: BagFile, scan: McapScan) -> FileContent:
+    """Return what a file holds after a scan of all its messages."""
+    topics = tuple(scan.topics.values())
+    run = merged(scan.metadata)
+    return FileContent(file, topics, run, scan.finished, scan.damaged, tuple(scan.notes))
+
+
+def _information(contents: Sequence[FileContent]) -> dict[str, object]:
+    topics: dict[str, BagTopic] = {}
+    run: dict[str, str] = {}
+    for content in contents:
+        run.update(content.run)
+        for topic in content.topics:
+            topics.setdefault(topic.name, topic)
+    files = [content.file for content in contents]
+    return bag_information(files, list(topics.values()), custom=custom_data(run))

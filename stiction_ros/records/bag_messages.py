@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 import struct
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import yaml
 from mcap.exceptions import McapError
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag_metadata import VERSION, BagTopic
+from stiction_ros.records.bag_metadata import BagTopic
 from stiction_ros.records.mcap_scan import McapScan, RawMessage
+from stiction_ros.records.storage_files import listing_notes, storage_files
+
+__all__ = [
+    "BagMessage",
+    "MessageDecoder",
+    "last_part",
+    "read_messages",
+    "read_raw",
+    "stamp_ns",
+    "storage_files",
+]
 
 Wanted = Callable[[BagTopic], bool]
 
@@ -40,44 +50,26 @@ class BagMessage:
     message: Any
 
 
-def storage_files(path: str | Path) -> tuple[Path, ...]:
-    """Return the MCAP files of a bag in their order.
-
-    Args:
-        path: a rosbag2 directory, finished or not, or one ``.mcap`` file.
-
-    Raises:
-        InputError: no such bag, a file of it missing, another storage, a newer version.
-    """
-    path = Path(path)
-    where = str(path)
-    if path.is_file():
-        return (path,)
-    if not path.is_dir():
-        raise InputError("no such bag", where=where, fix="check the path")
-    if (path / "metadata.yaml").is_file():
-        return _listed_files(path)
-    files = sorted(path.glob("*.mcap"), key=_number)
-    if not files:
-        raise InputError("holds no .mcap file", where=where, fix="give a rosbag2 directory")
-    return tuple(files)
-
-
 def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:
     """Yield every message of a bag as bytes, in the order it was written.
 
     Args:
-        path: see :func:`storage_files`.
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
         notes: gets what was left out, one sentence each.
 
     Raises:
         InputError: no such bag, or damaged; complete messages before the damage come first.
     """
+    counts: Counter[str] = Counter()
     for file in storage_files(path):
         scan = McapScan(file)
         yield from scan.messages()
+        for channel, count in scan.counts.items():
+            counts[scan.topics[channel].name] += count
         if notes is not None:
             notes.extend(scan.notes)
+    if notes is not None:
+        notes.extend(listing_notes(path, counts))
 
 
 def read_messages(
@@ -86,7 +78,7 @@ def read_messages(
     """Yield the decoded messages of a bag in the order they were written.
 
     Args:
-        path: see :func:`storage_files`.
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
         wanted: which topics to decode and yield; all when not given.
         notes: gets what was left out, one sentence each; topics that are not in CDR with
             ``ros2msg`` definitions are among them.
@@ -164,38 +156,3 @@ def stamp_ns(message: Any) -> int:
     """Return the stamp of a message with a header, ns."""
     stamp = message.header.stamp
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
-
-
-def _listed_files(path: Path) -> tuple[Path, ...]:
-    where = str(path / "metadata.yaml")
-    try:
-        text = (path / "metadata.yaml").read_text(encoding="utf-8")
-        information = yaml.safe_load(text)["rosbag2_bagfile_information"]
-        version = int(information["version"])
-        storage = str(information["storage_identifier"])
-        names = [str(name) for name in information["relative_file_paths"]]
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
-        raise InputError(
-            f"cannot be read ({type(error).__name__})", where=where, fix="make it anew by a reindex"
-        ) from None
-    if version > VERSION:
-        raise InputError(f"has version {version}, newer than {VERSION}", where=where)
-    if storage != "mcap" or information.get("compression_mode", "").lower() in ("file", "message"):
-        raise InputError(
-            f"the storage is {storage} {information.get('compression_mode', '')}".strip(),
-            where=where,
-            fix="convert it with `ros2 bag convert` to plain mcap",
-        )
-    files = tuple(path / Path(name).name for name in names)
-    for file in files:
-        if not file.is_file():
-            raise InputError(f"{file.name} is missing", where=str(path), fix="put it back")
-    if not files:
-        raise InputError("lists no file", where=where)
-    return files
-
-
-def _number(path: Path) -> tuple[int, str]:
-    """Sort ``bag_10.mcap`` after ``bag_9.mcap``."""
-    found = re.search(r"_(\d+)$", path.stem)
-    return (int(found[1]) if found else -1, path.name)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,6 +17,8 @@ VERSION = 9
 
 INFINITE_NS = 2**63 - 1
 """Nanoseconds by which ROS writes an infinite duration."""
+
+_FASTEST: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # PyYAML may lack its C part
 
 _WORDS = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
@@ -98,6 +102,9 @@ class BagTopic:
     encoding: str = "cdr"
     schema_encoding: str = "ros2msg"
 
+    def __hash__(self) -> int:
+        return hash(self.name)  # looked up for every message; the definition is long
+
     def channel_metadata(self) -> dict[str, str]:
         """Return the metadata of the topic's MCAP channel."""
         return {"offered_qos_profiles": self.qos_yaml, "topic_type_hash": self.type_hash}
@@ -129,32 +136,54 @@ class BagFile:
         }
 
 
+def joined(files: Sequence[BagFile]) -> BagFile:
+    """Return what is in all files together, under the name of the first."""
+    counts: Counter[str] = Counter()
+    for file in files:
+        counts.update(file.counts)
+    first = min((file.first for file in files if file.first is not None), default=None)
+    last = max((file.last for file in files if file.last is not None), default=None)
+    return BagFile(files[0].name, dict(counts), first, last)
+
+
 def bag_information(
-    file: BagFile, topics: Sequence[BagTopic], *, ros_distro: str = "jazzy"
+    files: Sequence[BagFile],
+    topics: Sequence[BagTopic],
+    *,
+    custom: Mapping[str, str] | None = None,
+    ros_distro: str = "jazzy",
 ) -> dict[str, Any]:
-    """Return the mapping ``rosbag2_bagfile_information`` of a bag with one storage file."""
+    """Return the mapping ``rosbag2_bagfile_information`` of a bag.
+
+    Args:
+        files: its storage files in order, one at least.
+        topics: each once.
+        custom: short texts about the run, such as its seed.
+        ros_distro: of the recorder.
+    """
+    whole = joined(files)
     return {
         "version": VERSION,
         "storage_identifier": "mcap",
-        **file.span,
+        **whole.span,
         "topics_with_message_count": [
             {
                 "topic_metadata": {
                     "name": topic.name,
                     "type": topic.type,
                     "serialization_format": topic.encoding,
-                    "offered_qos_profiles": yaml.safe_load(topic.qos_yaml) or [],
+                    "offered_qos_profiles": _profiles(topic.qos_yaml),
                     "type_description_hash": topic.type_hash,
                 },
-                "message_count": file.counts.get(topic.name, 0),
+                "message_count": whole.counts.get(topic.name, 0),
             }
             for topic in topics
         ],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file.name],
-        "files": [{"path": file.name, **_reordered(file.span)}],
-        "custom_data": None,
+        "relative_file_paths": [file.name for file in files],
+        "files": [{"path": file.name, **_reordered(file.span)} for file in files],
+        "custom_data": dict(custom) if custom else None,
         "ros_distro": ros_distro,
     }
 
@@ -173,7 +202,12 @@ def _reordered(span: dict[str, Any]) -> dict[str, Any]:
     return {key: span[key] for key in ("starting_time", "duration", "message_count")}
 
 
-class _Dumper(yaml.SafeDumper):
+@functools.lru_cache(maxsize=64)
+def _profiles(text: str) -> Any:
+    return yaml.safe_load(text) or []
+
+
+class _Dumper(_FASTEST):  # type: ignore[misc]
     """Writes equal mappings out again instead of by alias."""
 
     def ignore_aliases(self, data: Any) -> bool:

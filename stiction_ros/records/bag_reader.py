@@ -31,7 +31,7 @@ def read_bag(path: str | Path, *, namespace: str | None = None) -> Record:
     """Read the record of a loop from ``pv``, ``sp``, ``op``, ``stem`` in a bag.
 
     Args:
-        path: see :func:`storage_files`.
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
         namespace: of the loop's topics; needed when the bag holds several loops.
 
     Raises:
@@ -102,7 +102,13 @@ class LoopSignals:
             InputError: see :func:`read_bag`.
         """
         notes = list(notes)
-        space = self._loop(namespace)
+        try:
+            space = self.loop(namespace)
+        except InputError as error:
+            unread = [note for note in notes if "cannot be decoded" in note]
+            if unread:
+                raise InputError(error.what, where=error.where, fix="; ".join(unread)) from None
+            raise
         signals = self._samples[space]
         pv, op = signals["pv"], signals["op"]
         stamps = np.array(sorted(pv.keys() & op.keys()), dtype=np.int64)
@@ -130,28 +136,44 @@ class LoopSignals:
 
     def first_stamp(self, namespace: str | None) -> int:
         """Return the stamp of the record's first sample, ns."""
-        signals = self._samples[self._loop(namespace)]
+        signals = self._samples[self.loop(namespace)]
         return min(signals["pv"].keys() & signals["op"].keys())
 
-    def _loop(self, namespace: str | None) -> str:
-        loops = [space for space, found in self._samples.items() if {"pv", "op"} <= found.keys()]
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Namespaces that have both ``pv`` and ``op``, such as ``/unit1``, empty for ``/``."""
+        both = {"pv", "op"}
+        return tuple(space for space, found in self._samples.items() if both <= found.keys())
+
+    def loop(self, namespace: str | None) -> str:
+        """Return the namespace of the loop that is meant.
+
+        Raises:
+            InputError: there is no such loop, or there are several and none was chosen.
+        """
+        loops = list(self.loops)
         if namespace is not None:
             wanted = "/" + namespace.strip("/") if namespace.strip("/") else ""
             loops = [space for space in loops if space == wanted]
         if not loops:
-            where_in = "" if namespace is None else f" in the namespace {namespace}"
-            raise InputError(
-                f"holds no topics pv and op of {JOINT_STATE}{where_in}",
-                where=self._where,
-                fix="record both",
-            )
+            raise self._no_loop(namespace)
         if len(loops) > 1:
             raise InputError(
                 f"holds {len(loops)} loops ({', '.join(space or '/' for space in sorted(loops))})",
                 where=self._where,
-                fix="choose one by its namespace",
+                fix="choose one with --namespace",
             )
         return loops[0]
+
+    def _no_loop(self, namespace: str | None) -> InputError:
+        there = sorted(space or "/" for space, found in self._samples.items() if "pv" in found)
+        fix = "record both"
+        if namespace is not None and there:
+            fix = f"there are {', '.join(there)}"
+        where_in = "" if namespace is None else f" in the namespace {namespace}"
+        return InputError(
+            f"holds no topics pv and op of {JOINT_STATE}{where_in}", where=self._where, fix=fix
+        )
 
     def _at(
         self, stamps: np.ndarray[Any, Any], samples: Samples, tags: tuple[str, ...], signal: str

@@ -2,24 +2,24 @@
 
 While it runs, ``<dir>_0.mcap`` is a journal: every message is one unchunked record, handed
 to the operating system before :meth:`BagWriter.write` returns, so that a killed process
-loses nothing that it had written. :meth:`BagWriter.close` lets :func:`finish_bag` rewrite
-the journal chunked, compressed and indexed and adds ``metadata.yaml``; the same function
+loses nothing that it had written. At the limits that :class:`Splitting` sets the next file,
+``<dir>_1.mcap``, begins. :meth:`BagWriter.close` lets :func:`finish_bag` rewrite the
+journals chunked, compressed and indexed and adds ``metadata.yaml``; the same function
 repairs the bag of a writer that was killed.
 """
 
 from __future__ import annotations
 
-import struct
+import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
 
-from mcap.data_stream import RecordBuilder
-from mcap.records import Channel, Header, Metadata, Schema
+from mcap.records import Channel, Metadata, Schema
 
+from stiction_ros import __version__
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag_finish import finish_bag, storage_path
+from stiction_ros.records.bag_finish import ROSBAG2, Packing, finish_bag, storage_path
 from stiction_ros.records.bag_metadata import (
     BagFile,
     BagTopic,
@@ -28,27 +28,37 @@ from stiction_ros.records.bag_metadata import (
     metadata_record,
     qos_yaml,
 )
-from stiction_ros.records.mcap_scan import MAGIC, MESSAGE
+from stiction_ros.records.mcap_chunked import COMPRESSIONS
+from stiction_ros.records.mcap_format import MESSAGE, MESSAGE_HEAD, MESSAGE_RECORD
+from stiction_ros.records.mcap_journal import Journal
+from stiction_ros.records.run_metadata import RUN, may_tell, news
 
-__all__ = ["BagWriter", "Qos"]
+__all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
 
-_MESSAGE = struct.Struct("<BQHIQQ")
-_HEAD = 22
+
+@dataclasses.dataclass(frozen=True)
+class Splitting:
+    """When a bag goes on in its next file; 0 for never.
+
+    Attributes:
+        size: bytes of messages in one file, before compression.
+        duration: log time in one file, ns.
+    """
+
+    size: int = 0
+    duration: int = 0
 
 
 class _Entry:
     """What :meth:`BagWriter.write` needs of a topic."""
 
-    __slots__ = ("channel", "count", "topic")
+    __slots__ = ("channel", "count", "tells", "topic")
 
     def __init__(self, channel: int, topic: BagTopic) -> None:
         self.channel = channel
         self.topic = topic
         self.count = 0
-
-
-class _Writable(Protocol):
-    def write(self, stream: RecordBuilder, /) -> None: ...
+        self.tells = may_tell(topic.name, topic.type)
 
 
 class BagWriter:
@@ -56,31 +66,40 @@ class BagWriter:
 
     Args:
         directory: the bag; made with its parents, must not hold anything yet.
-        compression: of the finished bag: ``zstd``, ``lz4`` or ``none``.
-        chunk_size: bytes of messages in one chunk of the finished bag.
+        packing: of the finished bag.
+        splitting: when the next file begins.
 
-    One thread writes. Times are integers in nanoseconds.
+    What ``~/config`` and ``loop_model`` say is kept as metadata of the run too, see
+    :mod:`stiction_ros.records.run_metadata`. One thread writes. Times are integers in
+    nanoseconds.
 
     Raises:
-        InputError: the directory holds something already.
+        InputError: the directory holds something already; an unknown compression.
     """
 
     def __init__(
-        self, directory: str | Path, *, compression: str = "zstd", chunk_size: int = 1 << 20
+        self,
+        directory: str | Path,
+        packing: Packing = Packing(),  # noqa: B008 (frozen)
+        splitting: Splitting = Splitting(),
     ) -> None:
+        if packing.compression not in COMPRESSIONS:
+            raise InputError(
+                f"compression {packing.compression!r} is not known",
+                fix=f"use {', '.join(COMPRESSIONS)}",
+            )
         self.directory = Path(directory)
-        self._compression = compression
-        self._chunk_size = chunk_size
+        self._packing = packing
+        self._splitting = splitting
+        self._limited = splitting.size > 0 or splitting.duration > 0
         self._entries: dict[str, _Entry] = {}
         self._schemas: dict[tuple[str, str], int] = {}
+        self._run = {"recorder": f"stiction_ros {__version__}"}
+        self._number = 0
+        self._first: int | None = None
         self._closed = False
         _make_empty(self.directory)
-        path = storage_path(self.directory)
-        self._file = path.open("xb")
-        self._file.write(MAGIC)
-        self._put(Header(profile="ros2", library="stiction_ros"))
-        start = bag_information(BagFile(path.name, {}, None, None), [])
-        self.add_metadata("rosbag2", metadata_record(start))
+        self._begin_file()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -118,14 +137,8 @@ class BagWriter:
                 f"topic {name} is recorded as {known.type} and cannot also be {type}",
                 where=str(self.directory),
             )
-        key = (type, definition_text)
-        if key not in self._schemas:
-            self._schemas[key] = len(self._schemas) + 1
-            data = definition_text.encode()
-            self._put(Schema(self._schemas[key], data, "ros2msg", type))
         entry = _Entry(len(self._entries) + 1, topic)
-        metadata = topic.channel_metadata()
-        self._put(Channel(entry.channel, name, "cdr", metadata, self._schemas[key]))
+        self._announce(entry)
         self._entries[name] = entry
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
@@ -145,30 +158,39 @@ class BagWriter:
             entry = self._entries[topic]
         except KeyError:
             raise InputError(f"topic {topic} was not added", where=str(self.directory)) from None
-        head = _MESSAGE.pack(
+        if self._limited and self._is_full(log_time):
+            self._journal.close()
+            self._number += 1
+            self._begin_file()
+        head = MESSAGE_RECORD.pack(
             MESSAGE,
-            _HEAD + len(data),
+            MESSAGE_HEAD.size + len(data),
             entry.channel,
             entry.count & 0xFFFFFFFF,
             log_time,
             publish_time,
         )
-        self._file.write(head + data)
-        self._file.flush()
+        self._journal.append(head + data)
         entry.count += 1
+        if entry.tells:
+            self._learn(news(topic, entry.topic.type, data))
 
     def add_metadata(self, name: str, mapping: Mapping[str, str]) -> None:
-        """Add a metadata record, such as the run's configuration."""
+        """Add a metadata record; those of the run the writer keeps by itself."""
         self._open()
-        self._put(Metadata(metadata=dict(mapping), name=name))
+        self._journal.put(Metadata(metadata=dict(mapping), name=name))
 
     def close(self) -> None:
-        """Finish the bag; a second call does nothing."""
+        """Finish the bag; a second call does nothing.
+
+        Raises:
+            OSError: the storage refuses; the journals stay, and can be read.
+        """
         if self._closed:
             return
         self._closed = True
-        self._file.close()
-        finish_bag(self.directory, compression=self._compression, chunk_size=self._chunk_size)
+        self._journal.close()
+        finish_bag(self.directory, self._packing)
 
     def __enter__(self) -> BagWriter:
         return self
@@ -185,11 +207,44 @@ class BagWriter:
         if self._closed:
             raise InputError("the bag is closed", where=str(self.directory))
 
-    def _put(self, record: _Writable) -> None:
-        builder = RecordBuilder()
-        record.write(builder)
-        self._file.write(builder.end())  # type: ignore[no-untyped-call]
-        self._file.flush()
+    def _is_full(self, log_time: int) -> bool:
+        """Tell whether a message of ``log_time`` belongs into the next file."""
+        limits = self._splitting
+        if self._first is None or log_time < self._first:  # simulated time follows wall time
+            self._first = log_time
+        elif limits.duration and log_time - self._first >= limits.duration:
+            return True
+        return bool(limits.size) and self._journal.size >= limits.size
+
+    def _begin_file(self) -> None:
+        """Open the journal of the next file and tell it what is known."""
+        path = storage_path(self.directory, self._number)
+        self._journal = Journal(path)
+        self._first = None
+        self._schemas.clear()
+        start = bag_information([BagFile(path.name, {}, None, None)], [])
+        self._journal.put(Metadata(metadata=metadata_record(start), name=ROSBAG2))
+        self._journal.put(Metadata(metadata=self._run, name=RUN))
+        for entry in self._entries.values():
+            self._announce(entry)
+
+    def _announce(self, entry: _Entry) -> None:
+        """Write the channel of a topic, and its schema when the file has not got it yet."""
+        topic = entry.topic
+        key = (topic.type, topic.definition)
+        if key not in self._schemas:
+            number = len(self._schemas) + 1
+            self._journal.put(Schema(number, topic.definition.encode(), "ros2msg", topic.type))
+            self._schemas[key] = number
+        metadata = topic.channel_metadata()
+        schema = self._schemas[key]
+        self._journal.put(Channel(entry.channel, topic.name, "cdr", metadata, schema))
+
+    def _learn(self, told: Mapping[str, str]) -> None:
+        changed = {key: text for key, text in told.items() if self._run.get(key) != text}
+        if changed:
+            self._run.update(changed)
+            self._journal.put(Metadata(metadata=changed, name=RUN))
 
 
 def _make_empty(directory: Path) -> None:

@@ -16,15 +16,22 @@ def is_bag(path: str | Path) -> bool:
     return path.is_dir() or path.suffix.lower() == ".mcap"
 
 
-def open_record(path: str | Path, columns: CsvColumns = CsvColumns()) -> Record:  # noqa: B008
+def open_record(
+    path: str | Path,
+    columns: CsvColumns = CsvColumns(),  # noqa: B008 (frozen)
+    *,
+    namespace: str | None = None,
+) -> Record:
     """Read a record from a CSV file or a bag.
 
     Args:
         path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
         columns: which column is what, for CSV files only.
+        namespace: of the loop's topics, for bags that hold several loops.
 
     Raises:
-        InputError: as :func:`read_csv` and :func:`read_bag`; columns given for a bag.
+        InputError: as :func:`read_csv` and :func:`read_bag`; columns given for a bag,
+            a namespace given for a CSV file.
     """
     if is_bag(path):
         if columns != CsvColumns():
@@ -33,7 +40,13 @@ def open_record(path: str | Path, columns: CsvColumns = CsvColumns()) -> Record:
                 where=str(path),
                 fix="leave --op, --pv, --sp, --stem and --time out",
             )
-        return read_bag(path)
+        return read_bag(path, namespace=namespace)
+    if namespace is not None:
+        raise InputError(
+            "is a CSV file, which has no namespaces",
+            where=str(path),
+            fix="leave --namespace out",
+        )
     return read_csv(
         path,
         op=columns.op,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import types
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -132,9 +133,15 @@ class RunLog:
 
     @property
     def swap(self) -> ModeChange | None:
-        """The first change from ``unaware`` to a mode that knows of the friction."""
+        """The first change from ``unaware`` to a mode that knows of the friction.
+
+        A change whose first sample is not in the record, as it was cut there, is none.
+        """
         before = ""
+        end = self.start + round(len(self.record) * self.record.sample_time * 1e9)
         for change in self.modes:
+            if change.stamp >= end:
+                break
             if before == "unaware" and change.mode in ("embedding", "inversion"):
                 return change
             before = change.mode
@@ -189,8 +196,11 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         else:
             messages.append(message)
     notes.extend(decoder.notes)
+    published = published_counts(messages)
     record = signals.record(Path(path).name, namespace, notes)
     start = signals.first_stamp(namespace)
+    if len(signals.loops) > 1:
+        messages = of_loop(messages, signals.loop(namespace))
     stamps = start + np.rint(record.time * 1e9).astype(np.int64)
     return RunLog(
         record=record,
@@ -201,12 +211,38 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         configs=texts(messages, "config"),
         clock=clock(messages),
         recorded=dict(recorded),
-        published=published_counts(messages),
+        published=published,
         notes=record.notes,
         fits=fits(messages),
         stem_estimate=stem_estimate(messages, stamps.tolist(), record.valves),
         wall_seconds=(max(sent) - min(sent)) / 1e9,
     )
+
+
+def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
+    """Return the messages of the loop in the namespace ``space``, and what is global.
+
+    The diagnostics of all loops share a topic; of these the statuses of the loop's nodes
+    are kept, which begin with its namespace.
+    """
+    kept = []
+    for message in messages:
+        namespace, name = last_part(message.topic)
+        if name == "diagnostics":
+            header, every = message.message.header, message.message.status
+            own = [s for s in every if last_part("/" + node_of(s))[0] == space]
+            only = types.SimpleNamespace(header=header, status=own)
+            kept.append(dataclasses.replace(message, message=only))
+        elif (
+            name == "clock" or (last_part(namespace)[0] if name == "config" else namespace) == space
+        ):
+            kept.append(message)
+    return kept
+
+
+def node_of(status: Any) -> str:
+    """Return the node that gave a diagnostic status: what stands before the colon."""
+    return str(status.name).partition(":")[0].strip()
 
 
 def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
@@ -329,7 +365,7 @@ def published_counts(messages: Iterable[BagMessage]) -> dict[str, int]:
     last: dict[tuple[str, str], int] = {}
     for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
         for status in message.message.status:
-            node = str(status.name).partition(":")[0].strip()
+            node = node_of(status)
             for item in status.values:
                 key = str(item.key)
                 if key.startswith(("published:", "published ")) and item.value.isdecimal():

@@ -38,6 +38,7 @@ def report_run(
     scenario: Scenario | None = None,
     name: str | None = None,
     seconds: float | None = None,
+    namespace: str | None = None,
 ) -> RunReport:
     """Read a bag of a live loop and write ``summary.json``, ``report.html`` and the figures.
 
@@ -47,11 +48,13 @@ def report_run(
         scenario: that was run, for the comparison with a loop without friction.
         name: of the loop in the report; the scenario's or the bag's when not given.
         seconds: wall time of the run, when measured better than by the bag.
+        namespace: of the loop's topics, for a bag that holds several loops.
 
     Raises:
         InputError: as :func:`stiction_ros.records.run_log.read_run`.
     """
-    return write_run(tell(read_run(bag), scenario=scenario, name=name), out, seconds)
+    log = read_run(bag, namespace=namespace)
+    return write_run(tell(log, scenario=scenario, name=name), out, seconds)
 
 
 def write_run(story: Story, out: str | Path, seconds: float | None = None) -> RunReport:

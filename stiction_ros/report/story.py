@@ -94,7 +94,7 @@ def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = No
     sigma = [0.0] * len(record.outputs)
     if truth is not None and truth.outputs == record.outputs:
         sigma = truth.process.noise_std(NoiseEntry.MEASUREMENT).tolist()
-    repeat = round_of(record, scenario)
+    repeat = round_of(log, scenario)
     found = phases(record, log.swap_sample, repeat, sigma)
     free = free_phase = None
     if scenario is not None and found.after is not None:
@@ -117,27 +117,49 @@ def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = No
     )
 
 
-def round_of(record: Record, scenario: Scenario | None) -> int | None:
-    """Return the samples of one round of the set-point schedule."""
-    if scenario is not None and math.isfinite(scenario.set_points.repeat):
-        return round(scenario.set_points.repeat / record.sample_time)
+def round_of(log: RunLog, scenario: Scenario | None) -> int | None:
+    """Return the samples of one round of the set-point schedule.
+
+    It is the scenario's, or else what the node ``plant`` said; only when neither tells it
+    the recorded moves are looked at, which show no repetition in a run that was cut.
+    """
+    record = log.record
+    length = math.inf
+    if scenario is not None:
+        length = scenario.set_points.repeat
+    else:
+        schedule = plant_configuration(log).get("set_points")
+        repeat = schedule.get("repeat") if isinstance(schedule, dict) else None
+        if isinstance(repeat, int | float) and repeat > 0:
+            length = repeat
+    if math.isfinite(length):
+        return round(length / record.sample_time)
     return None if record.sp is None else round_length(record.sp)
 
 
 def simulated_plant(log: RunLog) -> tuple[LoopModel | None, int | None]:
     """Return the loop and the seed that the node ``plant`` published in its configuration."""
+    document = plant_configuration(log)
+    if not document:
+        return None, None
+    seed = document.get("seed")
+    try:
+        model = LoopModel.from_mapping(
+            document.get("model"), f"configuration of {document['node']}"
+        )
+    except InputError:
+        model = None
+    return model, seed if isinstance(seed, int) else None
+
+
+def plant_configuration(log: RunLog) -> Mapping[str, Any]:
+    """Return what the node ``plant`` said on ``~/config``; empty when it was not there."""
     for config in log.configs:
         try:
             document = yaml.safe_load(config.text)
         except yaml.YAMLError:
             continue
         node = document.get("node") if isinstance(document, dict) else None
-        if not isinstance(node, str) or node.rpartition("/")[2] != "plant":
-            continue
-        seed = document.get("seed")
-        try:
-            model = LoopModel.from_mapping(document.get("model"), f"configuration of {node}")
-        except InputError:
-            model = None
-        return model, seed if isinstance(seed, int) else None
-    return None, None
+        if isinstance(node, str) and node.rpartition("/")[2] == "plant":
+            return dict(document)
+    return {}

@@ -69,6 +69,14 @@ def test_unusable_records_are_refused(method: str, case: str) -> None:
         identify(record, options)
 
 
+def test_a_node_that_fits_nothing_compiles_nothing() -> None:
+    code = (
+        "import sys, stiction_ros.control, stiction_ros.loop, stiction_ros.records; "
+        "sys.exit('numba' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_casadi_is_left_alone_by_all_but_the_nonlinear_programme() -> None:
     code = (
         "import sys, stiction_ros.cli.main, stiction_ros.online.live_estimator; "

@@ -109,7 +109,7 @@ def test_no_points_have_no_cells() -> None:
     none = np.empty((0, 2))
     cells = cells_at(smooth_walk(0), beginning_of(smooth_walk(0), 0.0, 1.0), none, KanoStiction)
     assert cells.bounds.shape == (0, 4)
-    assert cells.bases.shape == (0, 300)
+    assert cells.bases.shape == (300, 0)
 
 
 def test_semi_physical_has_no_rectangles() -> None:

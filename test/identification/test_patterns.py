@@ -31,11 +31,10 @@ def test_pattern_gives_the_stem_of_the_law(
 ) -> None:
     u, dynamic = random_walk(seed), share * static
     point = np.array([[static - dynamic, static + dynamic]])
-    many = np.repeat(point, 60, axis=0)  # so many are simulated at once, few one by one
-    for points in (point, many):
-        cells = resting_cells(u, np.full(len(points), level), points)
-        stems = cells.bases - dynamic * cells.signs
-        assert np.abs(stems - simulated(u, static, dynamic, level)).max() < 1e-9
+    cells = resting_cells(u, np.full(3, level), np.repeat(point, 3, axis=0))
+    stems = cells.bases - dynamic * cells.signs
+    assert stems.shape == (len(u), 3)
+    assert np.abs(stems.T - simulated(u, static, dynamic, level)).max() < 1e-9
 
 
 @settings(max_examples=60, deadline=None)

@@ -14,7 +14,7 @@ from stiction_ros.identification.scan import OutputScan
 def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int) -> None:
     generator = np.random.default_rng(seed)
     y = generator.standard_normal(200)
-    stems = generator.standard_normal((3, 200)).cumsum(axis=1)
+    stems = generator.standard_normal((200, 3)).cumsum(axis=0)
     orders = Orders(na, nb, 2, 20)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 200)), (), orders, (0, 4), one, one)
@@ -22,7 +22,7 @@ def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int
     for g in range(3):
         for delay in range(5):
             columns = [y[20 - i : 200 - i] for i in range(1, na + 1)]
-            columns += [stems[g, 20 - delay - i : 200 - delay - i] for i in range(1, nb + 1)]
+            columns += [stems[20 - delay - i : 200 - delay - i, g] for i in range(1, nb + 1)]
             matrix = np.column_stack([*columns, np.ones(180)])
             rest = y[20:] - matrix @ np.linalg.lstsq(matrix, y[20:], rcond=None)[0]
             assert energy[g, delay] == pytest.approx(rest @ rest, rel=1e-6)
@@ -34,21 +34,21 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     generator = np.random.default_rng(seed)
     y = generator.standard_normal(150)
     other = generator.standard_normal((1, 150)).cumsum(axis=1)
-    bases = generator.standard_normal((4, 150)).cumsum(axis=1)
-    signs = generator.choice([-1.0, 0.0, 1.0], (4, 150))
+    bases = generator.standard_normal((150, 4)).cumsum(axis=0)
+    signs = generator.choice([-1.0, 0.0, 1.0], (150, 4))
     levels = generator.random((4, 3))
     a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
     scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
     energy = scan.patterns(bases, signs)(levels)
     for f in range(3):
-        expected = scan.energy(bases - levels[:, f : f + 1] * signs)
+        expected = scan.energy(bases - levels[:, f] * signs)
         assert energy[:, f] == pytest.approx(expected, rel=1e-7)
 
 
 def test_stem_that_the_rest_explains_to_the_last_digit_explains_nothing() -> None:
     generator = np.random.default_rng(0)
     y = 1e3 * generator.standard_normal(300).cumsum()
-    stems = np.stack([np.roll(y, 2), np.full(300, 1e6), np.zeros(300), y[::-1]])
+    stems = np.stack([np.roll(y, 2), np.full(300, 1e6), np.zeros(300), y[::-1]], axis=1)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 300)), (), Orders(4, 2, 0, 20), (0, 3), one, one)
     energy = scan.energy(stems)

@@ -107,3 +107,12 @@ def test_a_wrong_schedule_gets_one_line(case: str) -> None:
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         SetPoints.load(tmp_path / "none.yaml", ("A",))
+
+
+@pytest.mark.parametrize("repeat", [{"repeat": 100.0}, {}])
+def test_a_schedule_comes_back_from_its_mapping(repeat: dict[str, float]) -> None:
+    schedule = read({"moves": TWO["moves"]} | repeat)
+    again = read(schedule.to_mapping())
+    assert again.repeat == schedule.repeat
+    np.testing.assert_array_equal(again.times, schedule.times)
+    np.testing.assert_array_equal(again.values, schedule.values)

@@ -106,7 +106,7 @@ BAD = {
     "plant": {"model": "none.loop.yaml"},
     "controller": {"model": "none.loop.yaml"},
     "estimator": {"delay_low": 5, "delay_high": 4},
-    "recorder": {"topics": "("},
+    "recorder": {"regex": "("},
     "player": {"topics": "("},
 }
 

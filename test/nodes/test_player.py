@@ -276,4 +276,8 @@ def test_an_estimator_that_hears_the_player_finds_what_the_live_one_found(
     found: list[JointState] = []
     stage.probe.create_subscription(JointState, "/stiction", found.append, READER_QOS)
     graph.spin_until(lambda: found, "the first fit")
-    assert rows(found) == rows(recorded["/stiction"][:1])
+    live = recorded["/stiction"][0]
+    assert to_ns(found[0].header.stamp) == to_ns(live.header.stamp)
+    # Not in every bit: the bag is from another processor, or from an older version.
+    for key in ("position", "velocity", "effort"):
+        assert list(getattr(found[0], key)) == pytest.approx(list(getattr(live, key)), rel=1e-6)

@@ -16,12 +16,16 @@ from small_loop import SAMPLES, write_small_scenario
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
+from foreign_readers import differences
+
 from stiction_ros.cli.node_processes import NodeProcesses, ros_environment
 from stiction_ros.online.replay import replay
 from stiction_ros.online.replay_result import Match
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.records.bag_messages import read_messages
 from stiction_ros.records.run_log import read_run
+from stiction_ros.records.run_metadata import run_metadata
 
 PATIENCE = 120.0
 TOPICS = ("clock", "pv", "sp", "op", "stem", "stiction", "loop_model", "mode", "prediction")
@@ -143,6 +147,18 @@ def test_mcap_ros2_support_reads_every_message(bag):
             for _schema, channel, _message, _ros in reader.iter_decoded_messages():
                 found[channel.topic] += 1
     assert found == {t: n for t, n in read_run(bag).recorded.items() if n}
+
+
+def test_other_readers_decode_the_same_values(bag):
+    assert differences(bag) == []
+
+
+def test_the_bag_tells_of_its_run(bag):
+    found = run_metadata(bag)
+    nodes = {"/plant", "/controller", "/estimator", "/recorder"}
+    assert {key.partition(":")[2] for key in found if key.startswith("config:")} == nodes
+    assert found["seed"] == str(Scenario.load(scenario(bag.parent)).seed)
+    assert found["loop_model:/loop_model"] == read_run(bag).loop_models[-1].text
 
 
 def test_log_time_is_simulated_time(bag):

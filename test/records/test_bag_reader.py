@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stiction_ros.errors import InputError
@@ -118,6 +119,20 @@ def test_undecodable_topics_are_noted(bag: Bag) -> None:
     notes: list[str] = []
     assert len(list(read_messages(closed(bag), notes=notes))) == 12
     assert notes == ["topic /odd (odd_msgs/msg/Odd) cannot be decoded, left out"]
+
+
+def test_signals_that_cannot_be_decoded_are_the_reason_given(tmp_path: Path) -> None:
+    path = tmp_path / "idl.mcap"
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros2", "test")
+        schema = writer.register_schema(JOINT_STATE, "ros2idl", b"module m {};")
+        for topic in ("/pv", "/op"):
+            channel = writer.register_channel(topic, "cdr", schema, {})
+            writer.add_message(channel, 0, joint_state(0, ["A"], [1.0]), 0)
+        writer.finish()
+    with pytest.raises(InputError, match=r"no topics pv and op.*/pv .* cannot be decoded"):
+        read_bag(path)
 
 
 def test_a_message_that_does_not_fit_is_an_error(bag: Bag) -> None:

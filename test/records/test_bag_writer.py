@@ -23,7 +23,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag_finish import finish_bag
 from stiction_ros.records.bag_messages import read_messages, read_raw
 from stiction_ros.records.bag_metadata import LATCHED, Qos
-from stiction_ros.records.bag_writer import BagWriter
+from stiction_ros.records.bag_writer import BagWriter, Packing
 
 
 def filled(bag: Bag) -> Path:
@@ -132,7 +132,7 @@ def test_any_bytes_come_back(
 ) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bag"
-        with BagWriter(path, compression=compression, chunk_size=chunk_size) as writer:
+        with BagWriter(path, Packing(compression, chunk_size)) as writer:
             for topic in ("/a", "/b", "/unit/c"):
                 writer.add_topic(topic, "std_msgs/msg/String", "string data\n", "", LATCHED)
             for topic, time, data in messages:
@@ -160,7 +160,7 @@ def test_a_killed_writer_loses_nothing_and_is_repaired(bag: Bag, tmp_path: Path)
 
 KILLED = """
 import sys
-from stiction_ros.records.bag_writer import BagWriter
+from stiction_ros.records.bag_writer import BagWriter, Packing
 writer = BagWriter(sys.argv[1])
 writer.add_topic("/mode", "std_msgs/msg/String", "string data\\n", "")
 k = 0

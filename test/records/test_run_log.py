@@ -4,7 +4,8 @@ import math
 
 from bag_making import JOINT_STATE, SECOND, Bag, clock, joint_state
 
-from stiction_ros.records.run_log import Estimate, Fit, ModeChange, read_run
+from stiction_ros.records.run_log import Estimate, Fit, ModeChange, RunLog, read_run
+from stiction_ros.report.scoring import PhaseStatus, phases
 
 
 def test_a_run(bag: Bag) -> None:
@@ -106,3 +107,22 @@ def test_stem_estimates_come_from_the_first_point_of_the_prediction(bag: Bag) ->
     assert run.stem_estimate[[0, 2, 3]].tolist() == [[10.0, 20.0], [12.0, 22.0], [13.0, 23.0]]
     assert all(math.isnan(value) for value in run.stem_estimate[1])
     assert run.wall_seconds == 3.0
+
+
+def swapped_at(bag: Bag, samples: int, swap: int) -> RunLog:
+    """Return the log of a run whose diagnostics tell of a swap at a sample."""
+    start = 5 * SECOND
+    bag.loop(samples)
+    bag.diagnostics(start, "controller: mode", {"mode": "unaware"})
+    bag.diagnostics(start + swap * SECOND, "controller: mode", {"mode": "embedding"})
+    return read_run(bag.writer.directory)
+
+
+def test_a_swap_whose_first_sample_was_cut_off_is_none(bag: Bag) -> None:
+    run = swapped_at(bag, samples=30, swap=30)
+    assert (run.swap, run.swap_sample, run.fit_at_swap) == (None, None, None)
+    assert phases(run.record, run.swap_sample, None).status is PhaseStatus.NO_SWAP
+
+
+def test_a_swap_at_the_last_sample_is_one(bag: Bag) -> None:
+    assert swapped_at(bag, samples=30, swap=29).swap_sample == 29

@@ -1,0 +1,27 @@
+"""Everything that is compiled, compiled before it is needed."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from stiction_ros.effects import HeStiction
+from stiction_ros.identification.methods import identify
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.records.record import Record
+
+SAMPLES = 240
+
+
+def compile_loops() -> None:
+    """Identify a short made-up record.
+
+    The first call on a machine compiles for many seconds and keeps the result; later ones
+    take a fraction of a second.
+    """
+    generator = np.random.default_rng(0)
+    op = 10.0 * np.sin(0.2 * np.arange(SAMPLES)) + generator.standard_normal(SAMPLES)
+    stem = HeStiction(4.0, 1.0).simulate(op)
+    pv = lfilter([0.0, 0.0, 0.2], [1.0, -0.8], stem) + 0.1 * generator.standard_normal(SAMPLES)
+    record = Record("made up", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
+    identify(record, IdentificationOptions(delay=(0, 2), output_order=1, input_order=1))
