@@ -217,7 +217,7 @@ class Playback:
         self.paused = False
 
     def step(self) -> list[RawMessage]:
-        """Return every message of the next log time, one whole sample in simulated time.
+        """Return every message of the next log time.
 
         Only a paused playback steps; a running one returns nothing.
         """
