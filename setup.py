@@ -19,7 +19,10 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config", sorted(glob("config/*.yaml") + glob("config/*.xml"))),
+        (
+            f"share/{NAME}/config",
+            sorted(glob("config/*.yaml") + glob("config/*.xml") + glob("config/*.json")),
+        ),
         (f"lib/{NAME}", LAUNCHERS),
     ],
 )

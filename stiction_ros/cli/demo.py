@@ -115,10 +115,11 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
     phases = summary["phases"]
     for output in phases.get("before", {}):
         for key in ("amplitude", "offset", "iae_per_hour"):
-            cells = [
-                f"{phases[phase][output][key]:.4g}" if output in phases.get(phase, {}) else "–"
+            values = [
+                phases.get(phase, {}).get(output, {}).get(key)
                 for phase in ("before", "after", "stiction_free")
             ]
+            cells = ["–" if value is None else f"{value:.4g}" for value in values]
             table.add_row(output, key, *cells)
     console.print(table)
     for topic, count in summary["messages"].items():

@@ -14,12 +14,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from stiction_ros import __version__
 from stiction_ros.cli import (
     bench,
+    convert,
     demo,
     example,
     experiment,
     fit_linear,
     identify,
     repair,
+    replay,
     report,
     study,
 )
@@ -27,7 +29,19 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, fit_linear, example, experiment, report, repair, study, bench)
+COMMANDS = (
+    demo,
+    identify,
+    fit_linear,
+    example,
+    experiment,
+    convert,
+    replay,
+    report,
+    repair,
+    study,
+    bench,
+)
 
 
 def parser() -> argparse.ArgumentParser:

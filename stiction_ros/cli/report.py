@@ -9,6 +9,7 @@ from typing import Any
 from stiction_ros.cli.identify import add_columns, opened
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, identify
+from stiction_ros.records.bag_messages import read_raw
 from stiction_ros.records.open_record import is_bag
 
 
@@ -30,6 +31,12 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
+def holds_live_run(path: str) -> bool:
+    """Return whether a bag tells of a controller or an estimator, not of signals alone."""
+    names = {raw.topic.name.rpartition("/")[2] for raw in read_raw(path)}
+    return bool(names & {"mode", "stiction", "loop_model"})
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     from stiction_ros.report.record_report import report_record
@@ -37,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
 
     out = Path(options.out)
     try:
-        if is_bag(options.record):
+        if is_bag(options.record) and holds_live_run(options.record):
             print(report_run(options.record, out, namespace=options.namespace).page)
         else:
             record = opened(options)

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 
-NODES = ("plant", "controller", "estimator", "recorder")
+# As in the command: with another number of threads sums come in another order, and a run
+# could not be replayed bit for bit.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+NODES = ("plant", "controller", "estimator", "recorder", "player")
 
 
 def main() -> int:

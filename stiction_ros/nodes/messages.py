@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 from array import array
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -12,6 +14,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 
 SECOND = 1_000_000_000
 LEVELS = {"ok": b"\x00", "warn": b"\x01", "error": b"\x02"}
@@ -77,3 +80,18 @@ def status(
         message=text,
         values=[KeyValue(key=key, value=str(value)) for key, value in values],
     )
+
+
+def message_class(kind: str) -> Any:
+    """Return the class of a message type such as ``sensor_msgs/msg/JointState``.
+
+    Raises:
+        InputError: its package is not installed.
+    """
+    package, _, name = kind.partition("/msg/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError, ValueError):
+        raise InputError(
+            f"type {kind} is not installed", fix=f"install and source the package {package}"
+        ) from None

@@ -104,3 +104,29 @@ class RecorderNodeSettings(NodeSettings):
         high=1e9,
         fixed=True,
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class PlayerNodeSettings(NodeSettings):
+    """What is played, how fast and from where."""
+
+    bag: str = setting("", "rosbag2 directory or .mcap file", fixed=True)
+    rate: float = setting(1.0, "recorded seconds per second", low=1e-3, high=1e6)
+    start: float = setting(0.0, "seconds of the bag that are passed over", low=0.0, fixed=True)
+    loop: bool = setting(False, "begin again at the end", fixed=True)
+    paused: bool = setting(False, "wait for ~/resume or ~/step at the beginning", fixed=True)
+    topics: str = setting(
+        "(?!/(rosout|parameter_events)$).*",
+        "regular expression of the full names of the topics to play",
+        fixed=True,
+    )
+    clock: str = setting(
+        "auto",
+        "auto: the recorded /clock, or the player's own where there is none; "
+        "own: the player's own; none: no /clock",
+        choices=("auto", "own", "none"),
+        fixed=True,
+    )
+    clock_rate: float = setting(
+        40.0, "messages per second of the player's own /clock", low=0.1, high=1000.0, fixed=True
+    )

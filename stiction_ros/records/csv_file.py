@@ -15,6 +15,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Record
+from stiction_ros.records.regular import Part, regular_part, split_at_gaps
 from stiction_ros.records.sampling import sample_time
 
 DEFAULT_VALVE = "V1"
@@ -66,10 +67,37 @@ def read_csv(
 
     Raises:
         InputError: no such file or column; a cell that is empty, not a number or not
-            finite; time that does not increase or is irregular; fewer than two rows.
+            finite; time that does not increase, is irregular or has gaps; fewer than two
+            rows.
+    """
+    parts = read_csv_parts(path, CsvColumns(op, pv, sp, stem, time))
+    if len(parts) > 1:
+        before, after = parts[0], parts[1]
+        end = before.start + float(before.time[-1])
+        raise InputError(
+            f"has {len(parts) - 1} gap{'s' * (len(parts) > 2)}, the first of "
+            f"{after.start - end:.6g} s behind {end - before.start:.6g} s",
+            where=str(path),
+            fix=f"stiction convert writes its {len(parts)} parts as records of their own",
+        )
+    return parts[0]
+
+
+def read_csv_parts(
+    path: str | Path,
+    columns: CsvColumns = CsvColumns(),
+) -> tuple[Record, ...]:
+    """Read a CSV file as :func:`read_csv` does, split where it has gaps.
+
+    A step of more than 5.5 usual ones is a gap. Slightly irregular samples are brought onto a
+    regular grid, see :func:`stiction_ros.records.regular.regular_part`; the notes of each
+    record say what was done.
+
+    Raises:
+        InputError: as :func:`read_csv` but for gaps.
     """
     table = _Table.read(Path(path))
-    return _record(table, CsvColumns(op, pv, sp, stem, time))
+    return _records(table, columns)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,6 +201,10 @@ class _Table:
             cell = cell.replace(",", ".")
         return _float(cell)
 
+    def place(self, row: int) -> str:
+        """Name a row of data for errors."""
+        return f"line {self.lines[row]}"
+
     def bad(self, index: int, line: int, what: str) -> InputError:
         """Return the error for one cell."""
         return InputError(
@@ -182,7 +214,7 @@ class _Table:
         )
 
 
-def _record(table: _Table, columns: CsvColumns) -> Record:
+def _records(table: _Table, columns: CsvColumns) -> tuple[Record, ...]:
     op = columns.op or {DEFAULT_VALVE: "OP"}
     pv = columns.pv or {DEFAULT_OUTPUT: "PV"}
     sp = columns.sp
@@ -206,19 +238,55 @@ def _record(table: _Table, columns: CsvColumns) -> Record:
             fix="a record needs two at least",
         )
     seconds, start = _time(table, time_column)
-    step, notes = sample_time(seconds, str(table.path), lambda row: f"line {table.lines[row]}")
-    return Record(
-        name=table.path.name,
-        sample_time=step,
-        valves=tuple(op),
-        outputs=tuple(pv),
-        op=_signals(table, op, tuple(op)),
-        pv=_signals(table, pv, tuple(pv)),
-        sp=None if not sp else _signals(table, sp, tuple(pv)),
-        stem=None if not stem else _signals(table, stem, tuple(op)),
-        start=start,
-        notes=notes,
+    if not (np.diff(seconds) > 0).all():
+        sample_time(seconds, str(table.path), table.place)  # tells which line
+    whole = _Whole(
+        tuple(op),
+        tuple(pv),
+        _signals(table, op, tuple(op)),
+        _signals(table, pv, tuple(pv)),
+        None if not sp else _signals(table, sp, tuple(pv)),
+        None if not stem else _signals(table, stem, tuple(op)),
     )
+    stretches = [edge for edge in split_at_gaps(seconds) if edge[1] - edge[0] > 1]
+    lone = len(seconds) - sum(last - first for first, last in stretches)
+    parts = [regular_part(seconds, first, last) for first, last in stretches]
+    notes = [f"{lone} rows alone between two gaps left out"] if lone else []
+    if len(parts) > 1:
+        notes.append(f"split at {len(parts) - 1} gap{'s' * (len(parts) > 2)}")
+    return tuple(whole.part(table, part, start, notes) for part in parts)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Whole:
+    """Tags and signals of all rows of a file, shapes (rows, …)."""
+
+    valves: tuple[str, ...]
+    outputs: tuple[str, ...]
+    op: FloatArray
+    pv: FloatArray
+    sp: FloatArray | None
+    stem: FloatArray | None
+
+    def part(self, table: _Table, part: Part, start: float, notes: Sequence[str]) -> Record:
+        """Return the record of one stretch."""
+
+        def place(row: int) -> str:
+            return table.place(part.first + row)
+
+        step, more = sample_time(part.time, str(table.path), place)
+        return Record(
+            name=table.path.name,
+            sample_time=step,
+            valves=self.valves,
+            outputs=self.outputs,
+            op=part.held(self.op),
+            pv=part.interpolated(self.pv),
+            sp=None if self.sp is None else part.held(self.sp),
+            stem=None if self.stem is None else part.interpolated(self.stem),
+            start=start + float(part.time[0]),
+            notes=(*notes, *([part.note] if part.note else []), *more),
+        )
 
 
 def _signals(table: _Table, mapping: Mapping[str, str], tags: tuple[str, ...]) -> FloatArray:

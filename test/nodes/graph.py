@@ -25,6 +25,7 @@ from stiction_ros.nodes.controller import ControllerNode
 from stiction_ros.nodes.estimator import EstimatorNode
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.plant import PlantNode
+from stiction_ros.nodes.player import PlayerNode
 from stiction_ros.nodes.recorder import RecorderNode
 
 KINDS: dict[str, type[ManagedNode]] = {
@@ -32,6 +33,7 @@ KINDS: dict[str, type[ManagedNode]] = {
     "controller": ControllerNode,
     "estimator": EstimatorNode,
     "recorder": RecorderNode,
+    "player": PlayerNode,
 }
 DOMAINS = itertools.cycle(random.SystemRandom().sample(range(1, 101), 100))
 BUDGET = 30.0  # s; a test that needs this long has failed

@@ -19,6 +19,7 @@ from stiction_ros.nodes.messages import joint_state, to_ns
 from stiction_ros.online.live_controller import LiveController
 from stiction_ros.settings import settings_of
 
+SAMPLES = Path(__file__).parents[2] / "bags"
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -36,6 +37,7 @@ def values(kind: str, tmp_path: Path) -> dict[str, Any]:
         "controller": {"model": "example1_process.loop.yaml", "fit_first": 10**6},
         "estimator": {},
         "recorder": {"directory": str(tmp_path / "bag")},
+        "player": {"bag": str(SAMPLES / "sticky_siso")},
     }[kind]
 
 
@@ -105,6 +107,7 @@ BAD = {
     "controller": {"model": "none.loop.yaml"},
     "estimator": {"delay_low": 5, "delay_high": 4},
     "recorder": {"regex": "("},
+    "player": {"topics": "("},
 }
 
 

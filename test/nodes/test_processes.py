@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_loop import write_small_scenario
+from small_loop import SAMPLES, write_small_scenario
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
@@ -20,6 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from foreign_readers import differences
 
 from stiction_ros.cli.node_processes import NodeProcesses, ros_environment
+from stiction_ros.online.replay import replay
+from stiction_ros.online.replay_result import Match
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.records.bag_messages import read_messages
 from stiction_ros.records.run_log import read_run
@@ -105,6 +107,19 @@ def test_the_swap_comes_at_the_same_sample(bag, core):
     assert core.swap is not None
     assert log.swap is not None
     assert log.seconds(log.swap.stamp) == core.swap.sample
+
+
+def test_the_replay_gives_the_run_again_bit_for_bit(bag):
+    found = replay(bag)
+    assert (found.match, found.first_difference) == (Match.EQUAL, "")
+    assert found.from_first_sample
+    assert found.op is not None
+    assert found.op.equal == SAMPLES
+    assert {fit.match for fit in found.fits} == {Match.EQUAL}
+    recorded, replayed = found.modes.swaps
+    assert recorded is not None
+    assert recorded == replayed
+    assert found.notes == ()
 
 
 def test_a_second_run_gives_identical_pv_and_op(bag, tmp_path):

@@ -116,7 +116,9 @@ def test_only_the_command_is_in_bin(prefix: Path) -> None:
 
 
 def test_config_files_are_installed(prefix: Path) -> None:
-    wanted = {path.name for kind in ("yaml", "xml") for path in ROOT.glob(f"config/*.{kind}")}
+    wanted = {
+        path.name for kind in ("yaml", "xml", "json") for path in ROOT.glob(f"config/*.{kind}")
+    }
     folder = prefix / "share" / "stiction_ros" / "config"
     assert {path.name for path in folder.glob("*")} == wanted
 

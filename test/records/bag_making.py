@@ -26,9 +26,9 @@ def cdr(type_name: str, *fields: object) -> bytes:
     return bytes(STORE.serialize_cdr(message(type_name, *fields), type_name))
 
 
-def header(stamp: int) -> object:
+def header(stamp: int, frame: str = "") -> object:
     time = message("builtin_interfaces/msg/Time", stamp // SECOND, stamp % SECOND)
-    return message("std_msgs/msg/Header", time, "")
+    return message("std_msgs/msg/Header", time, frame)
 
 
 def joint_state(
@@ -37,9 +37,10 @@ def joint_state(
     position: Sequence[float],
     velocity: Sequence[float] = (),
     effort: Sequence[float] = (),
+    frame: str = "",
 ) -> bytes:
     arrays = [np.array(values, dtype=float) for values in (position, velocity, effort)]
-    return cdr(JOINT_STATE, header(stamp), list(names), *arrays)
+    return cdr(JOINT_STATE, header(stamp, frame), list(names), *arrays)
 
 
 def text(data: str) -> bytes:

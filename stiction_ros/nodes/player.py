@@ -1,0 +1,185 @@
+"""The player: a bag back into the graph, at any rate, with pause and steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from stiction_ros.errors import InputError
+from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode, Outlet
+from stiction_ros.nodes.messages import SECOND, message_class, to_stamp
+from stiction_ros.nodes.runner import run
+from stiction_ros.online.node_settings import PlayerNodeSettings
+from stiction_ros.records.bag_metadata import BagTopic, Qos
+from stiction_ros.records.mcap_scan import RawMessage
+from stiction_ros.records.playback import Playback, PlaybackOptions, bag_content, offered_qos
+
+PERIOD = 0.002  # s between two looks at what is due
+BURST = 80  # messages at one look, less than any reader's history
+PATIENCE = 0.5  # s for the readers to take in a whole burst
+CLOCK = "/clock"
+
+
+class PlayerNode(ManagedNode):
+    """Thin shell around :class:`stiction_ros.records.playback.Playback`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Build the node ``player``; ``kwargs`` go to the ROS node."""
+        super().__init__("player", PlayerNodeSettings, **kwargs)
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        self._pacer: Any = None
+        self._offered: list[Any] = []
+
+    def configure(self) -> None:
+        settings = self.settings
+        if not settings.bag:
+            raise InputError("no bag", where="player: bag", fix="set it to a bag")
+        content = bag_content(settings.bag, settings.topics)
+        options = PlaybackOptions(settings.rate, settings.start, settings.loop)
+        self.playback = Playback(settings.bag, content, self._now, options, wanted=settings.topics)
+        self._skipped: dict[str, str] = {}
+        self._topics: dict[str, Outlet] = {}
+        recorded = settings.clock == "auto" and CLOCK in content.topics
+        self._own = settings.clock != "none" and not recorded
+        self._told = 0
+        for name, topic in content.topics.items():
+            if name != CLOCK or recorded:
+                self._offer(topic)
+        if self._own:
+            self._clock_out = self.outlet(Clock, CLOCK, SIGNAL_QOS)
+        self._resumes = not settings.paused
+        for note in content.notes:
+            self.get_logger().warning(note)
+        self._offered = [
+            self.create_service(Trigger, f"~/{name}", call)
+            for name, call in (
+                ("pause", self._on_pause),
+                ("resume", self._on_resume),
+                ("step", self._on_step),
+            )
+        ]
+        self._pacer = self.create_timer(PERIOD, self._tick, clock=self._steady)
+
+    def linked(self) -> None:
+        if self._resumes:
+            self.playback.resume()
+
+    def deactivate(self) -> None:
+        self._resumes = not self.playback.paused
+        self.playback.pause()
+
+    def retune(self, settings: Any) -> None:
+        self.playback.rate = settings.rate
+
+    def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        playback = self.playback
+        text = "paused" if playback.paused else "playing"
+        keys: list[tuple[str, object]] = [
+            ("bag", self.settings.bag),
+            ("played", playback.played),
+            ("rounds", playback.rounds),
+        ]
+        keys += [(f"skipped:{name}", why) for name, why in self._skipped.items()]
+        level = "warn" if self._skipped else "ok"
+        return level, "finished" if playback.finished else text, keys
+
+    def on_cleanup(self, state: Any) -> Any:
+        self.destroy_timer(self._pacer)
+        for service in self._offered:
+            self.destroy_service(service)
+        self._offered = []
+        return super().on_cleanup(state)
+
+    # ---- topics ----------------------------------------------------------------------------
+
+    def _offer(self, topic: BagTopic) -> None:
+        """Create the publisher of one topic, or say why it is not played."""
+        try:
+            if topic.encoding != "cdr":
+                raise InputError(f"messages are encoded as {topic.encoding or 'nothing'}")
+            kind, qos = message_class(topic.type), _profile(offered_qos(topic))
+        except InputError as error:
+            self._skipped[topic.name] = str(error)
+            self.get_logger().warning(f"{topic.name} is not played: {error}")
+            return
+        # Diagnostics of the player itself go out there already.
+        known = self.outlets.get(topic.name)
+        self._topics[topic.name] = known or self.outlet(kind, topic.name, qos)
+
+    def _now(self) -> int:
+        return int(self._steady.now().nanoseconds)
+
+    def _tick(self) -> None:
+        if not self.running:
+            return
+        found = self.playback.due(BURST)
+        self._send(found)
+        if len(found) == BURST:
+            for name in {message.topic.name for message in found} & self._topics.keys():
+                self._topics[name].publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+        if self.playback.finished:
+            self.get_logger().info(f"played {self.playback.played} messages")
+            self.finished, self.running = True, False
+
+    def _send(self, messages: list[RawMessage]) -> None:
+        """Publish; the player's own clock goes before the messages of its time."""
+        self.stamp = self.playback.time
+        if self._own and (messages or self._now() - self._told > SECOND / self.settings.clock_rate):
+            self._told = self._now()
+            self._clock_out.publish(Clock(clock=to_stamp(self.stamp)))
+        for message in messages:
+            outlet = self._topics.get(message.topic.name)
+            if outlet is not None:
+                outlet.publish(message.data)
+
+    # ---- services --------------------------------------------------------------------------
+
+    def _on_pause(self, _request: Any, response: Any) -> Any:
+        if self.running:
+            self.playback.pause()
+        return self._answer(response)
+
+    def _on_resume(self, _request: Any, response: Any) -> Any:
+        if self.running:
+            self.playback.resume()
+        return self._answer(response)
+
+    def _on_step(self, _request: Any, response: Any) -> Any:
+        if self.running and not self.playback.paused:
+            response.success, response.message = False, "it is playing, pause it first"
+            return response
+        if self.running:
+            self._send(self.playback.step())
+        return self._answer(response)
+
+    def _answer(self, response: Any) -> Any:
+        """Fill the answer in: the time that is being played."""
+        response.success = bool(self.running)
+        time = f"at {self.playback.time / SECOND:.9f} s"
+        response.message = time if self.running else "not active"
+        self.report()
+        return response
+
+
+def _profile(qos: Qos) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy[qos.history.upper()],
+        depth=qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+    )
+
+
+def main() -> int:
+    """Run the node."""
+    return run("player", "Plays a bag back into the graph.", PlayerNode)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiction_ros.errors import InputError
+from stiction_ros.records.csv_file import read_csv, read_csv_parts
+from stiction_ros.records.record import Record
+from stiction_ros.records.regular import regular_part, split_at_gaps
+
+
+def parts_of(tmp_path: Path, times: np.ndarray, **columns: np.ndarray) -> tuple[Record, ...]:
+    """Write PV = 2 t + 1, OP = number of the row, and read it."""
+    path = tmp_path / "loop.csv"
+    signals = {"OP": np.arange(len(times)), "PV": 2.0 * times + 1.0} | columns
+    rows = np.column_stack([times, *signals.values()])
+    lines = [",".join(repr(float(v)) for v in row) for row in rows]
+    path.write_text("\n".join([",".join(["t", *signals]), *lines]))
+    return read_csv_parts(path)
+
+
+def test_a_regular_record_is_left_alone(tmp_path: Path) -> None:
+    (record,) = parts_of(tmp_path, np.arange(10.0))
+    assert record.notes == ()
+    assert record.op[:, 0].tolist() == list(range(10))
+
+
+def test_jitter_is_resampled_and_told(tmp_path: Path) -> None:
+    times = np.arange(200.0) + np.random.default_rng(3).uniform(-0.3, 0.3, 200)
+    (record,) = parts_of(tmp_path, times)
+    assert record.sample_time == pytest.approx(1.0, abs=0.01)
+    assert len(record) == 200
+    # PV is a line over time, so linear interpolation is exact inside.
+    expected = 2.0 * (record.start + record.time) + 1.0
+    np.testing.assert_allclose(record.pv[1:-1, 0], expected[1:-1], atol=1e-3)
+    assert record.notes[0].startswith("resampled to one sample each ")
+    assert "pv and stem are interpolated, op and sp held" in record.notes[0]
+
+
+def test_op_takes_no_value_that_was_not_given(tmp_path: Path) -> None:
+    times = np.arange(100.0) + np.random.default_rng(4).uniform(-0.3, 0.3, 100)
+    (record,) = parts_of(tmp_path, times)
+    assert set(record.op[:, 0].tolist()) <= set(range(100))
+    assert (np.diff(record.op[:, 0]) >= 0).all()
+
+
+def test_single_missing_rows_are_filled_and_counted(tmp_path: Path) -> None:
+    times = np.delete(np.arange(100.0), [20, 50, 51])
+    (record,) = parts_of(tmp_path, times)
+    assert len(record) == 100
+    np.testing.assert_allclose(record.pv[:, 0], 2.0 * np.arange(100.0) + 1.0, rtol=1e-12)
+    assert record.op[20, 0] == record.op[19, 0]
+    assert "3 of 100 were off by more than 10% of a step, 3 of them missing" in record.notes[0]
+
+
+def test_a_gap_splits(tmp_path: Path) -> None:
+    times = np.concatenate([np.arange(50.0), 80.0 + np.arange(30.0), 200.0 + np.arange(20.0)])
+    parts = parts_of(tmp_path, times)
+    assert [(len(p), p.start) for p in parts] == [(50, 0.0), (30, 80.0), (20, 200.0)]
+    assert parts[1].op[0, 0] == 50.0
+    assert all("split at 2 gaps" in p.notes for p in parts)
+
+
+def test_a_row_alone_between_two_gaps_is_left_out_and_told(tmp_path: Path) -> None:
+    times = np.concatenate([np.arange(50.0), [75.0], 100.0 + np.arange(30.0)])
+    parts = parts_of(tmp_path, times)
+    assert [len(p) for p in parts] == [50, 30]
+    assert "1 rows alone between two gaps left out" in parts[0].notes
+
+
+def test_one_record_is_never_made_over_a_gap(tmp_path: Path) -> None:
+    parts_of(tmp_path, np.concatenate([np.arange(50.0), 80.0 + np.arange(30.0)]))
+    with pytest.raises(InputError, match=r"has 1 gap, the first of 31 s behind 49 s; stiction con"):
+        read_csv(tmp_path / "loop.csv")
+
+
+def test_what_is_more_than_slightly_irregular_is_refused(tmp_path: Path) -> None:
+    steps = np.random.default_rng(0).choice([1.0, 2.0, 5.0], 300)
+    with pytest.raises(InputError, match="time is irregular at line"):
+        parts_of(tmp_path, steps.cumsum())
+
+
+times = st.lists(st.floats(0.01, 20.0), min_size=1, max_size=60).map(
+    lambda steps: np.concatenate([[0.0], np.cumsum(steps)])
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(times)
+def test_stretches_cover_every_row_once(times: np.ndarray) -> None:
+    edges = split_at_gaps(times)
+    assert [row for first, last in edges for row in range(first, last)] == list(range(len(times)))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(5, 80), st.floats(0.0, 0.45), st.integers(0, 2**31))
+def test_interpolation_stays_between_the_rows_given(count: int, jitter: float, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    given_times = np.arange(float(count)) + random.uniform(-jitter, jitter, count)
+    values = random.standard_normal((count, 2))
+    part = regular_part(given_times, 0, count)
+    found = part.interpolated(values)
+    assert len(found) == len(part.time)
+    low, high = values.min(axis=0), values.max(axis=0)
+    assert ((found >= low - 1e-12) & (found <= high + 1e-12)).all()
+    assert {tuple(row) for row in part.held(values)} <= {tuple(row) for row in values}
