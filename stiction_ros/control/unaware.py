@@ -26,11 +26,15 @@ class UnawareMpc:
         picks = (np.arange(weights.horizon)[:, None] * m + limited).reshape(-1)
         self._limited, self._width = limited, m
         rows = (np.eye(size) - np.eye(size, k=-m))[picks]
-        self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output)
+        self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output, limits.iterations)
         self._offset = np.zeros(size)
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None."""
+        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None.
+
+        Out of iterations, the plan without bounds is cut to them, and returned if it is
+        cheaper than leaving the stems where they are.
+        """
         horizon = self.cost.horizon
         deviation = last - target.stem
         low = np.tile(self.limits.stem[:, 0] - target.stem, horizon)
@@ -45,13 +49,64 @@ class UnawareMpc:
             np.concatenate([low, first - moves]),
             np.concatenate([high, first + moves]),
             target.pv,
+            target.path,
         )
-        if solution is None:
-            return None
-        stem = solution.plan + target.stem
+        if solution is not None:
+            return self._plan(state, target, last, solution.plan, solution.slack)
+        if self._qp.limit_reached:
+            return self._cut_plan(state, target, last)
+        return None
+
+    def _plan(
+        self,
+        state: FloatArray,
+        target: Target,
+        last: FloatArray,
+        moved: FloatArray,
+        slack: FloatArray,
+        converged: bool = True,
+    ) -> Plan:
+        stem = moved + target.stem
         op = np.clip(stem[0], self.limits.stem[:, 0], self.limits.stem[:, 1])
-        pv = predicted_outputs(self.cost, state, target, solution.plan)
-        return Plan(op, stem, pv, solution.slack)
+        pv = predicted_outputs(self.cost, state, target, moved)
+        cost = self._cost(state, target, last, moved, slack)
+        return Plan(op, stem, pv, slack, converged=converged, cost=cost)
+
+    def _cost(
+        self,
+        state: FloatArray,
+        target: Target,
+        last: FloatArray,
+        moved: FloatArray,
+        slack: FloatArray,
+    ) -> float:
+        z, before, v = state - target.state, last - target.stem, moved.reshape(-1)
+        linear = self.cost.linear(z, before, target.path)
+        total = float(v @ (0.5 * self.cost.hessian @ v + linear))
+        return total + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
+
+    def _cut_plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
+        before = last - target.stem
+        linear = self.cost.linear(state - target.state, before, target.path)
+        free = np.linalg.solve(self.cost.hessian, -linear).reshape(self.cost.horizon, -1)
+        low, high = (self.limits.stem - target.stem[:, None]).T
+        cut = np.empty_like(free)
+        stem = np.clip(before, low, high)
+        for i, wanted in enumerate(free):
+            stem = np.clip(
+                np.clip(wanted, stem - self.limits.move, stem + self.limits.move), low, high
+            )
+            cut[i] = stem
+        stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
+        both = [
+            self._plan(
+                state, target, last, v, self._qp.slack(state - target.state, v, target.pv), False
+            )
+            for v in (cut, stay)
+        ]
+        if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
+            return None
+        return both[0]
 
 
 def predicted_outputs(
