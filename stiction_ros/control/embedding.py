@@ -26,12 +26,16 @@ from stiction_ros.processes import LinearModel
 # Samples between two opposite jumps, by the number of sticky valves: patterns multiply.
 SECOND_JUMPS = {1: (1, 2, 3, 5, 8), 2: (1, 2, 5), 3: (2,)}
 # Samples that a single valve may wait before its first jump, and what may follow then.
-WAITS: tuple[int, ...] = ()
-WAITING_SECONDS: tuple[int, ...] = (0, 1, 3)
+WAITS = (1,)
+WAITING_SECONDS = (0, 1)
 
 
 def patterns(sticky: int) -> tuple[JumpPattern, ...]:
-    """Return the patterns of each of ``sticky`` valves: stay, ± one jump, ± two jumps."""
+    """Return the patterns of each of ``sticky`` valves: stay, ± one jump, ± two jumps.
+
+    A single valve may also wait a sample first: without that a jump that is better later
+    would be made now, since staying for good is the only other choice.
+    """
     found = [JumpPattern(0)]
     for direction in (1, -1):
         found.append(JumpPattern(direction))
