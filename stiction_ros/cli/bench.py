@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli import bench_graph, bench_identification
+from stiction_ros.cli import bench_control, bench_graph, bench_identification
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "name", nargs="?", default="graph", choices=tuple(BENCHMARKS), help="default: graph"
     )
-    group = parser.add_argument_group("identification")
+    group = parser.add_argument_group("identification; --seed and --quick also for control")
     group.add_argument(
         "--repeat",
         type=int,
@@ -79,14 +79,19 @@ def machine() -> str:
 
 
 def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
-    for key in ("repeat", "seed", "longest", "quick"):
+    _refuse(options, ("repeat", "seed", "longest", "quick"))
+    return bench_graph.graph(show)
+
+
+def _refuse(options: argparse.Namespace, keys: Sequence[str]) -> None:
+    """Raise InputError when one of ``keys`` was given."""
+    for key in keys:
         if getattr(options, key) is not None:
             raise InputError(
-                "benchmark graph has no such option",
+                f"benchmark {options.name} has no such option",
                 where=f"--{key}",
                 fix="leave it out, or measure identification",
             )
-    return bench_graph.graph(show)
 
 
 def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
@@ -97,6 +102,14 @@ def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
         if (value := getattr(options, key)) is not None
     }
     return bench_identification.identification(dataclasses.replace(plan, **chosen), show)
+
+
+def _control(options: argparse.Namespace, show: Bar) -> list[Row]:
+    _refuse(options, ("repeat", "longest"))
+    plan = bench_control.QUICK if options.quick else bench_control.FULL
+    if options.seed is not None:
+        plan = dataclasses.replace(plan, seed=options.seed)
+    return bench_control.control(plan, show)
 
 
 def _print(rows: Sequence[Row]) -> None:
@@ -126,4 +139,5 @@ def _number(value: float) -> str:
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
+    "control": _control,
 }

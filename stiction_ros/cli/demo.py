@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from stiction_ros.cli import compare
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.cli.scenarios import SCENARIOS, find, node_parameters
@@ -40,11 +41,15 @@ def add(commands: Any) -> None:
         metavar="max|N",
         help="lockstep as fast as possible, or N simulated seconds per second (default: max)",
     )
+    compare.add_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    if options.compare:
+        return compare.run(options)
+    compare.refuse_options(options)
     scenarios = [Scenario.load(find(name)) for name in options.scenario or SCENARIOS]
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)

@@ -14,7 +14,10 @@ from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.inversion import InversionMpc
 from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
 from stiction_ros.control.observer import Observer, ObserverTuning
-from stiction_ros.control.result import ControlMode, StepResult, StepStatus
+from stiction_ros.control.paper_weights import PaperTuning
+from stiction_ros.control.printed_embedding import PrintedEmbeddingMpc
+from stiction_ros.control.printed_inversion import InvertedPlan, PrintedInversionMpc
+from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
 from stiction_ros.control.slip_check import SlipCheck
 from stiction_ros.control.strategies import (
     FallbackRule,
@@ -46,6 +49,7 @@ class ControlDesign:
         slip_check: whether jumps are watched by a second observer.
         gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
         valve_names, output_names: for messages; numbers stand in where empty.
+        paper: the paper's own embedding and inversion; None for those of this package.
     """
 
     model: LinearModel
@@ -61,6 +65,7 @@ class ControlDesign:
     gap_samples: int = 0
     valve_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
+    paper: PaperTuning | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,8 +131,13 @@ class MpcController:
         if self.mode is ControlMode.HOLD:
             return None
         if self.mode is ControlMode.EMBEDDING:
+            if design.paper is not None:
+                return PrintedEmbeddingMpc(design.model, design.paper, design.limits, known)
             return EmbeddingMpc(design.model, design.embedding, design.limits, known, design.jumps)
-        return InversionMpc(unaware, known) if self.mode is ControlMode.INVERSION else unaware
+        if self.mode is ControlMode.INVERSION:
+            inversion = InversionMpc if design.paper is None else PrintedInversionMpc
+            return inversion(unaware, known)
+        return unaware
 
     @property
     def frictions(self) -> tuple[Behaviour | None, ...]:
@@ -240,7 +250,7 @@ class MpcController:
         proposal, strategy = self._choose(situation)
         op = self._valid(proposal.op, applied)
         if self._started:
-            self._move(op)
+            self._move(op, proposal.plan)
         seconds = time.perf_counter() - begin
         miss = np.zeros(len(sp)) if target is None else target.miss
         return StepResult(
@@ -310,13 +320,15 @@ class MpcController:
         usable = np.where(np.isfinite(op), op, otherwise)
         return np.asarray(np.clip(usable, limits[:, 0], limits[:, 1]))
 
-    def _move(self, op: FloatArray) -> None:
+    def _move(self, op: FloatArray, plan: Plan | None) -> None:
         stem = op.copy()
         for j, belief in enumerate(self.valves):
             if belief is not None:
                 if self._check is not None:
                     self._check.begin(j, self.observer, belief, float(op[j]))
                 stem[j] = belief.step(float(op[j]))
+        if isinstance(plan, InvertedPlan):
+            stem = plan.process_input
         self.stem = stem
         self.observer.predict(stem, self._dv)
         if self._check is not None:

@@ -84,6 +84,7 @@ class HorizonCost:
         self.from_last = np.zeros((horizon * m, m))
         self.from_last[:m] = -2.0 * weights.move
         self._weights, self._free, self._penalties = weights, free, penalties
+        self._constant_state = weights.state + np.einsum("ija,ijk,ikb->ab", free, penalties, free)
         self.free_output = model.c @ free  # (N, p, n)
         self.forced_output = model.c @ forced  # (N, p, N m)
 
@@ -104,15 +105,20 @@ class HorizonCost:
         self, state: FloatArray, last: FloatArray, path: FloatArray | None = None
     ) -> float:
         """Return the part of the cost that no plan changes."""
-        free = self._free @ state - (0.0 if path is None else path[: self.horizon])
-        ahead = np.einsum("ia,iab,ib->", free, self._penalties, free)
-        now = state - (0.0 if path is None else path[0])
         weights = self._weights
-        return float(ahead + now @ weights.state @ now + last @ weights.move @ last)
+        moves = last @ weights.move @ last
+        if path is None:
+            return float(state @ self._constant_state @ state + moves)
+        free = self._free @ state - path[: self.horizon]
+        ahead = np.einsum("ia,iab,ib->", free, self._penalties, free)
+        now = state - path[0]
+        return float(ahead + now @ weights.state @ now + moves)
 
     def outputs(self, state: FloatArray, plan: FloatArray) -> FloatArray:
         """Return output deviations from the target, shape (N, p), for samples 1 … N."""
-        return np.asarray(self.free_output @ state + self.forced_output @ plan.reshape(-1))
+        free = self.free_output.reshape(-1, len(state)) @ state  # one product, not one a sample
+        free += self.forced_output.reshape(len(free), -1) @ plan.reshape(-1)
+        return np.asarray(free.reshape(self.horizon, -1))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import math
 
 import numpy as np
@@ -11,11 +12,25 @@ from stiction_ros.control.controller import ControlDesign
 from stiction_ros.control.embedding import EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.observer import ObserverKind, ObserverTuning
+from stiction_ros.control.paper_weights import (
+    PaperTuning,
+    WarmStart,
+    WeightPreset,
+    augmented_weights,
+    unaware_weights,
+)
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.settings import setting
+
+
+class Formulations(enum.StrEnum):
+    """Whose embedding and inversion are used."""
+
+    EXACT = "exact"
+    PRINTED = "printed"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,6 +103,22 @@ class ControlSettings:
     hand_over_samples: int = setting(
         200, "past samples replayed into a new observer", low=1, high=100_000
     )
+    formulation: str = setting(
+        Formulations.EXACT.value,
+        "embedding and inversion of this package, or as the paper prints them",
+        choices=tuple(kind.value for kind in Formulations),
+    )
+    preset: str = setting(
+        WeightPreset.OWN.value,
+        "weights of these settings, or those of the paper",
+        choices=tuple(kind.value for kind in WeightPreset),
+    )
+    warm_start: str = setting(
+        WarmStart.COMPENSATION.value,
+        "start of the paper's embedding: its sequence (21), or a small search",
+        choices=tuple(kind.value for kind in WarmStart),
+    )
+    first_move: float = setting(2.1, "a of (21), in multiples of f_S", low=1.0, high=10.0)
 
     def design(self, model: LoopModel) -> ControlDesign:
         """Return the controller design for ``model``.
@@ -110,7 +141,7 @@ class ControlSettings:
         output = np.column_stack([self._list("pv_low", p), self._list("pv_high", p)])
         if np.any(output[:, 0] >= output[:, 1]):
             raise InputError("pv_low is not below pv_high", where="pv_low")
-        return ControlDesign(
+        design = ControlDesign(
             model=linear,
             limits=HorizonLimits(
                 self._op_limits(model),
@@ -138,6 +169,33 @@ class ControlSettings:
             valve_names=model.valve_names,
             output_names=model.outputs,
         )
+        return self._as_printed(self._with_preset(design))
+
+    def _with_preset(self, design: ControlDesign) -> ControlDesign:
+        """Return ``design`` with the paper's Q, S, V_F and Q_ss, and its observer as printed."""
+        preset = WeightPreset(self.preset)
+        if preset is WeightPreset.OWN:
+            return design
+        observer = design.observer
+        if preset is WeightPreset.PRINTED:
+            observer = dataclasses.replace(observer, kind=ObserverKind.LUENBERGER)
+        return dataclasses.replace(
+            design,
+            unaware=unaware_weights(preset, design.model, self.horizon),
+            target_weights=np.ones_like(design.target_weights),
+            observer=observer,
+        )
+
+    def _as_printed(self, design: ControlDesign) -> ControlDesign:
+        """Return ``design`` with the paper's own embedding where the settings ask for it."""
+        if Formulations(self.formulation) is Formulations.EXACT:
+            return design
+        printed = self.preset == WeightPreset.PRINTED
+        weights = augmented_weights(
+            WeightPreset.PRINTED if printed else WeightPreset.CORRECTED, design.model, self.horizon
+        )
+        tuning = PaperTuning(weights, WarmStart(self.warm_start), self.first_move)
+        return dataclasses.replace(design, paper=tuning)
 
     def _op_limits(self, model: LoopModel) -> FloatArray:
         m = len(model.valves)

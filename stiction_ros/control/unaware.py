@@ -28,6 +28,8 @@ class UnawareMpc:
         rows = (np.eye(size) - np.eye(size, k=-m))[picks]
         self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output, limits.iterations)
         self._offset = np.zeros(size)
+        self._lower, self._upper = np.empty(size + len(picks)), np.empty(size + len(picks))
+        self._moves = np.tile(limits.move[limited], weights.horizon)
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
         """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None.
@@ -35,24 +37,22 @@ class UnawareMpc:
         Out of iterations, the plan without bounds is cut to them, and returned if it is
         cheaper than leaving the stems where they are.
         """
-        horizon = self.cost.horizon
+        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         deviation = last - target.stem
-        low = np.tile(self.limits.stem[:, 0] - target.stem, horizon)
-        high = np.tile(self.limits.stem[:, 1] - target.stem, horizon)
-        moves = np.tile(self.limits.move[self._limited], horizon)
-        first = np.zeros_like(moves)
-        first[: len(self._limited)] = deviation[self._limited]
+        self._fill_bounds(low - target.stem, high - target.stem, deviation)
         solution = self._qp.solve(
             state - target.state,
             deviation,
             self._offset,
-            np.concatenate([low, first - moves]),
-            np.concatenate([high, first + moves]),
+            self._lower,
+            self._upper,
             target.pv,
             target.path,
         )
         if solution is not None:
-            return self._plan(state, target, last, solution.plan, solution.slack)
+            constant = self.cost.constant(state - target.state, deviation, target.path)
+            cost = solution.cost + constant
+            return self._plan(state, target, solution.plan, solution.slack, cost)
         if self._qp.limit_reached:
             return self._cut_plan(state, target, last)
         return None
@@ -61,15 +61,15 @@ class UnawareMpc:
         self,
         state: FloatArray,
         target: Target,
-        last: FloatArray,
         moved: FloatArray,
         slack: FloatArray,
+        cost: float,
         converged: bool = True,
     ) -> Plan:
         stem = moved + target.stem
-        op = np.clip(stem[0], self.limits.stem[:, 0], self.limits.stem[:, 1])
+        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
+        op = np.minimum(np.maximum(stem[0], low), high)
         pv = predicted_outputs(self.cost, state, target, moved)
-        cost = self._cost(state, target, last, moved, slack)
         return Plan(op, stem, pv, slack, converged=converged, cost=cost)
 
     def _cost(
@@ -98,15 +98,24 @@ class UnawareMpc:
             )
             cut[i] = stem
         stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
-        both = [
-            self._plan(
-                state, target, last, v, self._qp.slack(state - target.state, v, target.pv), False
-            )
-            for v in (cut, stay)
-        ]
+        both = []
+        for v in (cut, stay):
+            slack = self._qp.slack(state - target.state, v, target.pv)
+            cost = self._cost(state, target, last, v, slack)
+            both.append(self._plan(state, target, v, slack, cost, converged=False))
         if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
             return None
         return both[0]
+
+    def _fill_bounds(self, low: FloatArray, high: FloatArray, deviation: FloatArray) -> None:
+        """Write bounds on all stems off the target, then on their limited moves."""
+        size, count = len(self._offset), len(self._limited)
+        self._lower[:size].reshape(-1, self._width)[:] = low
+        self._upper[:size].reshape(-1, self._width)[:] = high
+        if count:
+            self._lower[size:], self._upper[size:] = -self._moves, self._moves
+            self._lower[size : size + count] += deviation[self._limited]
+            self._upper[size : size + count] += deviation[self._limited]
 
 
 def predicted_outputs(
@@ -114,5 +123,7 @@ def predicted_outputs(
 ) -> FloatArray:
     """Return outputs at samples 0 … N, shape (N + 1, p), for stems ``plan`` off the target."""
     deviation = state - target.state
-    now = cost.model.c @ deviation
-    return np.vstack([now, cost.outputs(deviation, plan)]) + target.pv
+    pv = np.empty((cost.horizon + 1, len(target.pv)))
+    pv[0] = cost.model.c @ deviation
+    pv[1:] = cost.outputs(deviation, plan)
+    return np.asarray(pv + target.pv)

@@ -1,0 +1,153 @@
+"""Stiction-embedding MPC as the paper prints it, safeguarded by the hard model."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.control.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.control.horizon import HorizonLimits
+from stiction_ros.control.paper_weights import PaperTuning, WarmStart
+from stiction_ros.control.printed_inversion import he_frictions
+from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.control.searched_start import SearchedStart
+from stiction_ros.control.smoothed_programme import ProgrammeStatus, SmoothedProgramme
+from stiction_ros.control.target import Target
+from stiction_ros.control.warm_start import compensation
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+
+class Choice(enum.StrEnum):
+    """Which of the two sequences is applied."""
+
+    PROGRAMME = "programme"
+    WARM_START = "warm_start"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PrintedPlan(Plan):
+    """A plan, and what it was chosen from.
+
+    Attributes:
+        choice: the sequence with the lower cost (22) under the hard model (4).
+        programme: how IPOPT ended.
+        iterations: of IPOPT.
+        programme_cost, warm_start_cost: (22) under the hard model; inf where there is none.
+    """
+
+    choice: Choice
+    programme: ProgrammeStatus
+    iterations: int
+    programme_cost: float
+    warm_start_cost: float
+
+
+class PrintedEmbeddingMpc:
+    """(19) with the augmented model and cost (22): IPOPT from a warm start, then the better.
+
+    At τ = 10⁴ the smoothed model has no slope towards another pattern of slips, so IPOPT
+    keeps or loses the pattern it starts with. Its answer and its warm start are therefore
+    both simulated with the hard model, and the cheaper is applied.
+    """
+
+    mode = ControlMode.EMBEDDING
+
+    def __init__(
+        self,
+        model: LinearModel,
+        tuning: PaperTuning,
+        limits: HorizonLimits,
+        frictions: Sequence[Behaviour | None],
+    ) -> None:
+        """Build the programme once.
+
+        Raises:
+            InputError: no sticky valve, a law other than He's, or bounds that this formulation
+                does not know.
+        """
+        known = he_frictions(frictions)
+        _check(limits, known)
+        self.tuning, self.frictions = tuning, known
+        self._limits = limits.stem
+        self.cost = AugmentedCost(model, tuning.weights, known)
+        self._programme = SmoothedProgramme(model, tuning, known, limits.stem)
+        searches = tuning.warm_start is WarmStart.SEARCH
+        self._search = SearchedStart(self.cost, limits.stem) if searches else None
+        self._before: FloatArray | None = None  # u_{k−1}
+
+    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> PrintedPlan | None:
+        """Return the better plan from ξ̂ (n,) and the stem estimates ``last`` (m,), or None."""
+        situation = PlanProblem(state, last, target)
+        start = self.warm_start(situation)
+        stems = self.cost.stems(start, last)
+        start_cost = self.cost.of_stems(situation, start, stems)
+        found = self._programme.solve(situation, start, stems)
+        cost = float("inf") if found.op is None else self.cost(situation, found.op)
+        if not np.isfinite(min(cost, start_cost)):
+            return None
+        if found.op is not None and cost <= start_cost:
+            choice, op = Choice.PROGRAMME, found.op
+        else:
+            choice, op = Choice.WARM_START, start
+        self._before = op[0].copy()
+        stems = self.cost.stems(op, last)
+        return PrintedPlan(
+            op[0].copy(),
+            stems,
+            self._outputs(situation, stems),
+            np.zeros(len(target.pv)),
+            self._jumps(stems, last),
+            choice=choice,
+            programme=found.status,
+            iterations=found.iterations,
+            programme_cost=cost,
+            warm_start_cost=start_cost,
+        )
+
+    def warm_start(self, situation: PlanProblem) -> FloatArray:
+        """Return the sequence that the programme starts from, shape (N, m), %."""
+        if self._search is not None:
+            found = self._search.find(situation)
+            if found is not None:
+                return found
+        goal, stem = situation.target.stem, situation.stem
+        before = stem if self._before is None else self._before
+        op = np.tile(goal, (self.cost.horizon, 1))
+        for j, friction in enumerate(self.frictions):
+            if friction is not None:
+                ends = float(stem[j]), float(goal[j])
+                a, horizon = self.tuning.first_move, self.cost.horizon
+                op[:, j] = compensation(friction, float(before[j]), ends, horizon, a)
+        return np.clip(op, self._limits[:, 0], self._limits[:, 1])
+
+    def _outputs(self, situation: PlanProblem, stems: FloatArray) -> FloatArray:
+        target, part = situation.target, self.cost.part
+        state = situation.state - target.state
+        now = part.model.c @ state
+        return np.vstack([now, part.outputs(state, stems - target.stem)]) + target.pv
+
+    def _jumps(self, stems: FloatArray, last: FloatArray) -> int:
+        moves = np.diff(np.vstack([last, stems]), axis=0) != 0.0
+        sticky = [j for j, friction in enumerate(self.frictions) if friction is not None]
+        return int(moves[:, sticky].sum())
+
+
+def _check(limits: HorizonLimits, frictions: tuple[HeStiction | None, ...]) -> None:
+    if all(friction is None for friction in frictions):
+        raise InputError("0 sticky valves", fix="embedding takes at least one")
+    for values, where, what in (
+        (limits.output, "pv_low, pv_high", "output bounds"),
+        (limits.move, "op_rate_limits", "rate limits"),
+    ):
+        if np.isfinite(values).any():
+            raise InputError(
+                f"the paper's embedding knows no {what}",
+                where=where,
+                fix="leave them out, or use formulation: exact",
+            )

@@ -1,0 +1,85 @@
+"""Stiction inversion as the paper prints it: a purely linear MPC ahead of φ⁻¹."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.control.target import Target
+from stiction_ros.control.unaware import UnawareMpc
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.errors import InputError
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class InvertedPlan(Plan):
+    """A plan whose observer is fed with ũ.
+
+    Attributes:
+        process_input: ũ at the first sample, shape (m,), %, taken for the stem (ũ ≡ χ).
+    """
+
+    process_input: FloatArray
+
+
+class PrintedInversionMpc:
+    r"""(19) in ũ, followed by the inverse of the two branches of (4) that move the stem.
+
+    .. math::
+        u_k = \tilde u_k + f_D \text{sign}(\tilde u_k - \tilde u_{k-1})
+
+    It is exact while every move of ũ exceeds J = f_S − f_D. In closed loop most do not; then
+    the stem stays, ũ is not χ, and the difference ends up in the disturbance estimate.
+    """
+
+    mode = ControlMode.INVERSION
+
+    def __init__(self, linear: UnawareMpc, frictions: Sequence[Behaviour | None]) -> None:
+        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one.
+
+        Raises:
+            InputError: a law other than He's.
+        """
+        self.linear, self.frictions = linear, he_frictions(frictions)
+        self._before: FloatArray | None = None  # u_{k−1}
+
+    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> InvertedPlan | None:
+        """Return the linear plan from ξ̂ (n,) and ũ_{k−1} ``last`` (m,), inverted, or None."""
+        plan = self.linear.plan(state, target, last)
+        if plan is None:
+            return None
+        wanted = plan.stem[0]
+        op = plan.op.copy()
+        for j, friction in enumerate(self.frictions):
+            if friction is not None:
+                if wanted[j] == last[j] and self._before is not None:
+                    op[j] = self._before[j]
+                else:
+                    op[j] = wanted[j] + friction.dynamic_friction * np.sign(wanted[j] - last[j])
+        limits = self.linear.limits.stem
+        op = np.clip(op, limits[:, 0], limits[:, 1])
+        self._before = op.copy()
+        values = {f.name: getattr(plan, f.name) for f in dataclasses.fields(plan)}
+        return InvertedPlan(**values | {"op": op}, process_input=wanted.copy())
+
+
+def he_frictions(frictions: Sequence[Behaviour | None]) -> tuple[HeStiction | None, ...]:
+    """Return ``frictions`` when all of them follow He's law, which is the paper's.
+
+    Raises:
+        InputError: another law.
+    """
+    known: list[HeStiction | None] = []
+    for friction in frictions:
+        if friction is not None and not isinstance(friction, HeStiction):
+            raise InputError(
+                f"the paper's controllers know He's law, not {friction.title()}",
+                where="formulation",
+                fix="use formulation: exact",
+            )
+        known.append(friction)
+    return tuple(known)
