@@ -1,37 +1,36 @@
-"""One controller: observer, target, formulation, and the valve models it believes in."""
+"""One controller: observer, target, formulation, and the valves that it believes in."""
 
 from __future__ import annotations
 
 import dataclasses
 import time
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
+from stiction_ros.control.certificate import CertificateStatus, certify
 from stiction_ros.control.embedding import EmbeddingMpc, EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.inversion import InversionMpc
+from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
 from stiction_ros.control.observer import Observer, ObserverTuning
 from stiction_ros.control.paper_weights import PaperTuning
 from stiction_ros.control.printed_embedding import PrintedEmbeddingMpc
 from stiction_ros.control.printed_inversion import InvertedPlan, PrintedInversionMpc
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
+from stiction_ros.control.slip_check import SlipCheck
+from stiction_ros.control.strategies import (
+    FallbackRule,
+    Formulation,
+    Proposal,
+    Situation,
+    strategies,
+)
 from stiction_ros.control.target import Target, TargetSelector
 from stiction_ros.control.unaware import UnawareMpc
-from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.control.valve_belief import ValveBelief
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.processes import LinearModel
-
-
-class Formulation(Protocol):
-    """One way to turn an estimate and a target into a plan."""
-
-    mode: ControlMode
-
-    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        """Return a plan, or None when there is none."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +45,10 @@ class ControlDesign:
         observer: observer tuning.
         jumps: how sticky valves are moved.
         hand_over_samples: past samples replayed into the observer of a new controller.
+        fallback: how long a strategy other than the first may stand in.
+        slip_check: whether jumps are watched by a second observer.
+        gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
+        valve_names, output_names: for messages; numbers stand in where empty.
         paper: the paper's own embedding and inversion; None for those of this package.
     """
 
@@ -57,6 +60,11 @@ class ControlDesign:
     observer: ObserverTuning
     jumps: EmbeddingTuning = EmbeddingTuning()
     hand_over_samples: int = 200
+    fallback: FallbackRule = FallbackRule()
+    slip_check: bool = True
+    gap_samples: int = 0
+    valve_names: tuple[str, ...] = ()
+    output_names: tuple[str, ...] = ()
     paper: PaperTuning | None = None
 
 
@@ -70,17 +78,27 @@ class History:
 
 
 class MpcController:
-    """Offset-free MPC in one mode; step it once per sample."""
+    """Offset-free MPC in one mode; step it once per sample.
+
+    Attributes:
+        design, mode: as given.
+        observer: state and disturbance estimate.
+        valves: belief in each sticky valve, None for those taken to be healthy.
+        stem: stem estimates χ̂, shape (m,), %.
+        raised: what the slip check found at the last step, empty for nothing.
+    """
 
     def __init__(
         self,
         design: ControlDesign,
         mode: ControlMode,
-        frictions: Sequence[HeStiction | None] | None = None,
+        frictions: Sequence[Behaviour | None] | None = None,
+        spreads: Sequence[FrictionSpread | None] | None = None,
     ) -> None:
         """Build for ``frictions``, one entry per valve, None for a healthy one.
 
-        The modes that do not know of friction take no notice of it.
+        ``spreads`` are the half-widths of the intervals of their parameters, where known. The
+        modes that do not know of friction take no notice of either.
 
         Raises:
             InputError: the model is not detectable, or embedding cannot be set up.
@@ -88,108 +106,272 @@ class MpcController:
         m = len(design.model.stem0)
         self.design, self.mode = design, mode
         aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION) and frictions is not None
-        self.frictions = tuple(frictions or ()) if aware else (None,) * m
+        known = tuple(frictions or ()) if aware else (None,) * m
+        widths = tuple(spreads or (None,) * m)
+        self.valves = tuple(
+            None if law is None else ValveBelief(jump_form(law), width)
+            for law, width in zip(known, widths, strict=True)
+        )
         self.observer = Observer(design.model, design.observer)
-        self.stem = np.array(design.model.stem0)
+        self.stem: FloatArray = np.array(design.model.stem0)
+        self.raised = ""
         self._target = TargetSelector(design.model, design.target_weights, design.limits.stem)
-        self._formulation = self._build_formulation()
+        unaware = UnawareMpc(design.model, design.unaware, design.limits)
+        self._formulation = self._build_formulation(unaware, known)
+        stand_in = None if self._formulation is unaware else unaware
+        self._strategies = strategies(self._formulation, stand_in, design.fallback)
+        self._check = SlipCheck(m) if design.slip_check else None
+        self._dv: FloatArray = np.zeros(design.model.e.shape[1])
         self._started = False
 
-    def _build_formulation(self) -> Formulation | None:
+    def _build_formulation(
+        self, unaware: UnawareMpc, known: tuple[Behaviour | None, ...]
+    ) -> Formulation | None:
         design = self.design
         if self.mode is ControlMode.HOLD:
             return None
         if self.mode is ControlMode.EMBEDDING:
             if design.paper is not None:
-                return PrintedEmbeddingMpc(
-                    design.model, design.paper, design.limits, self.frictions
-                )
-            return EmbeddingMpc(
-                design.model, design.embedding, design.limits, self.frictions, design.jumps
-            )
-        unaware = UnawareMpc(design.model, design.unaware, design.limits)
+                return PrintedEmbeddingMpc(design.model, design.paper, design.limits, known)
+            return EmbeddingMpc(design.model, design.embedding, design.limits, known, design.jumps)
         if self.mode is ControlMode.INVERSION:
             inversion = InversionMpc if design.paper is None else PrintedInversionMpc
-            return inversion(unaware, self.frictions)
+            return inversion(unaware, known)
         return unaware
 
+    @property
+    def frictions(self) -> tuple[Behaviour | None, ...]:
+        """Friction believed in now, per valve; None for those taken to be healthy."""
+        return tuple(None if belief is None else belief.form.law for belief in self.valves)
+
+    @property
+    def spreads(self) -> tuple[FrictionSpread | None, ...]:
+        """Half-widths of the intervals of the frictions, per valve, None where unknown."""
+        return tuple(None if belief is None else belief.spread for belief in self.valves)
+
+    @property
+    def forms(self) -> tuple[JumpForm | None, ...]:
+        """Jump forms of the valves, None for those taken to be healthy."""
+        return tuple(None if belief is None else belief.form for belief in self.valves)
+
+    @property
+    def stem_interval(self) -> FloatArray:
+        """Lowest and highest stem position that the past OP allows, shape (m, 2), %."""
+        interval = np.column_stack([self.stem, self.stem])
+        for j, belief in enumerate(self.valves):
+            if belief is not None:
+                interval[j] = belief.interval
+        return interval
+
     def start(self, op: FloatArray, pv: FloatArray) -> None:
-        """Start from rest at the applied ``op`` (m,) and the outputs ``pv`` (p,)."""
+        """Start from rest at the applied ``op`` (m,) and the outputs ``pv`` (p,).
+
+        The stem of a sticky valve may then be anywhere within f_S of OP.
+        """
         self.stem = np.array(op, dtype=float)
+        for j, belief in enumerate(self.valves):
+            if belief is not None:
+                belief.start(float(op[j]), *self.design.limits.stem[j].tolist())
         self.observer.rest(self.stem, pv)
         self._started = True
 
-    def take_over(self, history: History) -> None:
+    def take_over(self, history: History) -> float:
         """Take over from another controller of the same loop without a stop.
 
         The valve models are replayed over the whole past OP, which finds the stem exactly
         after one move that slips wherever the stem was before; the observer is restarted on
-        the last ``hand_over_samples`` samples with these stems as input.
+        the last ``hand_over_samples`` with these stems as its input.
+
+        Returns:
+            How badly valves and process explain these samples: the mean square of the
+            innovations, each in standard deviations of the measurement noise.
         """
-        stems = np.array(history.op, dtype=float)
-        for j, friction in enumerate(self.frictions):
-            if friction is not None:
-                stems[:, j] = friction.simulate(stems[:, j])
-        first = max(len(stems) - self.design.hand_over_samples, 0)
-        self.start(stems[first], history.pv[first])
+        first = max(len(history.op) - self.design.hand_over_samples, 0)
+        stems = self._replay(history.op)
+        self.observer.rest(stems[first], history.pv[first])
+        total = 0.0
         for k in range(first, len(stems)):
             self.observer.correct(history.pv[k])
+            scaled = self.observer.innovation**2 / self.design.observer.measurement_noise
+            total += float(scaled.mean())
             self.observer.predict(stems[k], history.dv[k])
-        self.stem = stems[-1].copy()
+        self.stem, self._started = stems[-1].copy(), True
+        return total / (len(stems) - first)
+
+    def _replay(self, op: FloatArray) -> FloatArray:
+        stems = np.array(op, dtype=float)
+        for j, belief in enumerate(self.valves):
+            if belief is not None:
+                belief.start(float(op[0, j]), *self.design.limits.stem[j].tolist())
+                stems[:, j] = [belief.step(value) for value in op[:, j].tolist()]
+        return stems
 
     def step(
-        self, pv: FloatArray, sp: FloatArray, dv: FloatArray, applied: FloatArray
+        self,
+        pv: FloatArray,
+        sp: FloatArray,
+        dv: FloatArray,
+        applied: FloatArray,
+        preview: FloatArray | None = None,
     ) -> StepResult:
         """Return what to apply now.
 
         Args:
             pv, sp: measurement and set-points, shape (p,).
-            dv: measured disturbances in deviations from nominal, shape (d,).
+            dv: measured disturbances in deviations from nominal, shape (d,); taken to stay.
             applied: the OP applied last, shape (m,), held when nothing better is found.
+            preview: set-points of the samples 1, 2, … ahead, shape (K, p), the last of which
+                holds on; None when ``sp`` holds on.
         """
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._step(pv, sp, dv, applied, preview)
+
+    def _step(
+        self,
+        pv: FloatArray,
+        sp: FloatArray,
+        dv: FloatArray,
+        applied: FloatArray,
+        preview: FloatArray | None,
+    ) -> StepResult:
         begin = time.perf_counter()
-        if not self._started and np.isfinite(pv).all():
-            self.start(applied, pv)
-        zero = np.zeros(len(sp))
-        plan: Plan | None = None
-        status, reason, miss = StepStatus.HELD, "", zero
-        if not (np.isfinite(pv).all() and np.isfinite(sp).all() and np.isfinite(dv).all()):
-            reason = "a measurement or set-point is not finite"
-            dv = np.zeros(len(dv))
-        else:
-            self.observer.correct(pv)
-            plan, status, reason, miss = self._plan(sp, dv)
-        op = applied if plan is None else plan.op
-        limits = self.design.limits.stem
-        op = np.clip(op, limits[:, 0], limits[:, 1])
+        self.raised = ""
+        applied = self._valid(applied, self.stem)
+        trouble = _unusable(pv=pv, sp=sp, dv=dv)
+        if np.isfinite(dv).all():
+            self._dv = dv
+        if np.isfinite(pv).all():
+            self._measure(pv, applied)
+        target: Target | None = None
+        if not trouble and self._formulation is not None:
+            target = self._select(sp, preview)
+            trouble = "" if target is not None else "no steady state within the limits"
+        situation = Situation(self.observer.state, target, self.stem, applied, self.forms, trouble)
+        proposal, strategy = self._choose(situation)
+        op = self._valid(proposal.op, applied)
         if self._started:
-            self._move_stems(op)
-            if isinstance(plan, InvertedPlan):
-                self.stem = plan.process_input
-            self.observer.predict(self.stem, dv)
+            self._move(op, proposal.plan)
         seconds = time.perf_counter() - begin
-        return StepResult(status, reason, self.mode, op, plan, miss, seconds)
+        miss = np.zeros(len(sp)) if target is None else target.miss
+        return StepResult(
+            proposal.status,
+            "; ".join([text for text in (proposal.reason, *self._remarks()) if text]),
+            proposal.mode or self.mode,
+            op,
+            proposal.plan,
+            miss,
+            seconds,
+            strategy,
+            proposal.age,
+            self._gap(situation, proposal),
+        )
 
-    def _plan(
-        self, sp: FloatArray, dv: FloatArray
-    ) -> tuple[Plan | None, StepStatus, str, FloatArray]:
-        zero = np.zeros(len(sp))
-        if self._formulation is None:
-            return None, StepStatus.HELD, "mode hold", zero
-        target = self._target.select(sp, self.observer.disturbance, dv)
-        if target is None:
-            return None, StepStatus.HELD, "no steady state within the limits", zero
-        plan = self._formulation.plan(self.observer.state, target, self.stem)
-        if plan is None or not np.isfinite(plan.op).all():
-            return None, StepStatus.HELD, "no plan found", target.miss
-        if not target.reachable:
-            reason = "set-point out of reach, the nearest reachable one is held"
-            return plan, StepStatus.UNREACHABLE, reason, target.miss
-        return plan, StepStatus.SOLVED, "", target.miss
+    def _measure(self, pv: FloatArray, applied: FloatArray) -> None:
+        if not self._started:
+            self.start(applied, pv)
+        self.observer.correct(pv)
+        stayed = None if self._check is None else self._check.correct(self.observer, pv)
+        if stayed is not None:
+            belief = self.valves[stayed.valve]
+            assert belief is not None
+            belief.raise_static(stayed.static_friction, stayed.stem)
+            self.stem = self.stem.copy()
+            self.stem[stayed.valve] = stayed.stem
+            self.observer = stayed.observer
+            name = _name(self.design.valve_names, stayed.valve, "valve")
+            self.raised = f"{name} stayed where it should have moved: f_S is at least "
+            self.raised += f"{stayed.static_friction:.3g} %"
+        if not np.isfinite(self.observer.state).all():
+            self.observer = Observer(self.design.model, self.design.observer)
+            self.observer.rest(self.stem, pv)
 
-    def _move_stems(self, op: FloatArray) -> None:
+    def _select(self, sp: FloatArray, preview: FloatArray | None) -> Target | None:
+        formulation = self._formulation
+        if isinstance(formulation, InversionMpc):
+            formulation.forms = self.forms
+        if isinstance(formulation, EmbeddingMpc):
+            formulation.know(self.forms, self.spreads, self.stem_interval)
+            limits = self.design.limits.stem.copy()
+            for j in formulation.immobile:
+                limits[j] = self.stem[j]
+            self._target.limits = limits
+        disturbance = self.observer.disturbance
+        if preview is None or not len(preview) or not np.isfinite(preview).all():
+            return self._target.select(sp, disturbance, self._dv)
+        horizon = max(self.design.embedding.horizon, self.design.unaware.horizon)
+        rows = np.vstack([sp, preview[:horizon]])
+        rows = np.vstack([rows, np.repeat(rows[-1:], max(horizon + 1 - len(rows), 0), axis=0)])
+        return self._target.follow(rows, disturbance, self._dv)
+
+    def _choose(self, situation: Situation) -> tuple[Proposal, str]:
+        for chosen in self._strategies:
+            proposal = chosen.propose(situation)
+            if proposal is not None:
+                break
+        else:
+            raise AssertionError("the last strategy always proposes")
+        for strategy in self._strategies:
+            strategy.applied(proposal, strategy is chosen)
+        return proposal, chosen.name
+
+    def _valid(self, op: FloatArray, otherwise: FloatArray) -> FloatArray:
+        """Return ``op`` within the limits, with ``otherwise`` where it is no number."""
+        limits = self.design.limits.stem
+        usable = np.where(np.isfinite(op), op, otherwise)
+        return np.asarray(np.clip(usable, limits[:, 0], limits[:, 1]))
+
+    def _move(self, op: FloatArray, plan: Plan | None) -> None:
         stem = op.copy()
-        for j, friction in enumerate(self.frictions):
-            if friction is not None:
-                stem[j] = friction.step(float(self.stem[j]), float(op[j]))[1]
+        for j, belief in enumerate(self.valves):
+            if belief is not None:
+                if self._check is not None:
+                    self._check.begin(j, self.observer, belief, float(op[j]))
+                stem[j] = belief.step(float(op[j]))
+        if isinstance(plan, InvertedPlan):
+            stem = plan.process_input
         self.stem = stem
+        self.observer.predict(stem, self._dv)
+        if self._check is not None:
+            self._check.predict(op, stem, self._dv)
+
+    def _remarks(self) -> list[str]:
+        remarks = [self.raised]
+        held_back = np.flatnonzero(self.observer.held_back).tolist()
+        if held_back:
+            names = ", ".join(_name(self.design.output_names, i, "output") for i in held_back)
+            remarks.append(f"the measurement of {names} is held back as an outlier")
+        if isinstance(self._formulation, EmbeddingMpc):
+            for j in self._formulation.immobile:
+                name = _name(self.design.valve_names, j, "valve")
+                remarks.append(f"{name} cannot be moved: its smallest jump exceeds its travel")
+        return remarks
+
+    def _gap(self, situation: Situation, proposal: Proposal) -> float | None:
+        formulation, plan = self._formulation, proposal.plan
+        wanted = self.design.gap_samples and isinstance(formulation, EmbeddingMpc)
+        if not wanted or plan is None or situation.target is None or proposal.age:
+            return None
+        if proposal.status not in (StepStatus.SOLVED, StepStatus.UNREACHABLE, StepStatus.LIMIT):
+            return None
+        assert isinstance(formulation, EmbeddingMpc)
+        found = certify(
+            formulation,
+            situation.state,
+            situation.target,
+            situation.last,
+            plan,
+            self.design.gap_samples,
+        )
+        return found.gap if found.status is CertificateStatus.CERTIFIED else None
+
+
+def _unusable(**values: FloatArray) -> str:
+    words = {"pv": "a measurement", "sp": "a set-point", "dv": "a measured disturbance"}
+    for key, value in values.items():
+        if not np.isfinite(value).all():
+            return f"{words[key]} is not finite"
+    return ""
+
+
+def _name(names: tuple[str, ...], number: int, kind: str) -> str:
+    return names[number] if names else f"{kind} {number + 1}"

@@ -12,6 +12,7 @@ from stiction_ros.processes import LinearModel
 
 SLACK_WEIGHT = 1e4  # of slack², relative to what the whole horizon gains per squared PV
 ITERATION_LIMIT = 2000
+OUT_OF_ITERATIONS = -4  # exit flag of daqp
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,11 +34,15 @@ class HorizonWeights:
 
 @dataclasses.dataclass(frozen=True)
 class HorizonLimits:
-    """Bounds of (19e): stems (m, 2) in %, moves (m,) in % per sample, soft outputs (p, 2)."""
+    """Bounds of (19e): stems (m, 2) in %, moves (m,) in % per sample, soft outputs (p, 2).
+
+    ``iterations`` is how many the solver may take for one problem.
+    """
 
     stem: FloatArray
     move: FloatArray
     output: FloatArray
+    iterations: int = ITERATION_LIMIT
 
 
 class HorizonCost:
@@ -47,7 +52,9 @@ class HorizonCost:
 
     .. math:: J(v) = v^T H v / 2 + v^T (F_z z_0 + F_v v_{-1}) + \text{const}.
 
-    The constant is kept (:meth:`constant`), so that costs of different plans compare.
+    With a preview of the set-points z_i is measured from the path of the steady states,
+    z_i − r_i, which adds a linear term. The constant is kept (:meth:`constant`), so that
+    costs of different plans compare.
     """
 
     def __init__(self, model: LinearModel, weights: HorizonWeights) -> None:
@@ -69,24 +76,43 @@ class HorizonCost:
         weighted = penalties @ forced
         hessian = np.tensordot(forced, weighted, axes=([0, 1], [0, 1]))
         self.from_state = np.tensordot(weighted, free, axes=([0, 1], [0, 1])) * 2.0
+        self._from_path = -2.0 * weighted  # (N, n, N m)
         difference = np.eye(horizon * m) - np.eye(horizon * m, k=-m)
         moves = np.kron(np.eye(horizon), weights.move)
         hessian = 2.0 * (hessian + difference.T @ moves @ difference)
         self.hessian = 0.5 * (hessian + hessian.T)
         self.from_last = np.zeros((horizon * m, m))
         self.from_last[:m] = -2.0 * weights.move
+        self._weights, self._free, self._penalties = weights, free, penalties
         self._constant_state = weights.state + np.einsum("ija,ijk,ikb->ab", free, penalties, free)
-        self._constant_last = weights.move
         self.free_output = model.c @ free  # (N, p, n)
         self.forced_output = model.c @ forced  # (N, p, N m)
 
-    def linear(self, state: FloatArray, last: FloatArray) -> FloatArray:
-        """Return F_z z₀ + F_v v₋₁ for deviations ``state`` (n,) and ``last`` (m,)."""
-        return np.asarray(self.from_state @ state + self.from_last @ last)
+    def linear(
+        self, state: FloatArray, last: FloatArray, path: FloatArray | None = None
+    ) -> FloatArray:
+        """Return F_z z₀ + F_v v₋₁ for deviations ``state`` (n,) and ``last`` (m,).
 
-    def constant(self, state: FloatArray, last: FloatArray) -> float:
+        ``path`` is r₁ … r_N (or more), shape (N, n), where the steady state moves.
+        """
+        linear = self.from_state @ state + self.from_last @ last
+        if path is not None:
+            ahead = path[: self.horizon]
+            linear = linear + np.tensordot(self._from_path, ahead, axes=([0, 1], [0, 1]))
+        return np.asarray(linear)
+
+    def constant(
+        self, state: FloatArray, last: FloatArray, path: FloatArray | None = None
+    ) -> float:
         """Return the part of the cost that no plan changes."""
-        return float(state @ self._constant_state @ state + last @ self._constant_last @ last)
+        weights = self._weights
+        moves = last @ weights.move @ last
+        if path is None:
+            return float(state @ self._constant_state @ state + moves)
+        free = self._free @ state - path[: self.horizon]
+        ahead = np.einsum("ia,iab,ib->", free, self._penalties, free)
+        now = state - path[0]
+        return float(ahead + now @ weights.state @ now + moves)
 
     def outputs(self, state: FloatArray, plan: FloatArray) -> FloatArray:
         """Return output deviations from the target, shape (N, p), for samples 1 … N."""
@@ -105,6 +131,17 @@ class HorizonSolution:
     variables: FloatArray
 
 
+@dataclasses.dataclass(frozen=True)
+class QpData:
+    """min x'Hx/2 + f'x with bounds on x and then on the rows A x, as daqp takes it."""
+
+    hessian: FloatArray
+    linear: FloatArray
+    matrix: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
 class HorizonQp:
     """(19) over plans v = T r + v₀ with r the decision variables of one pattern of moves.
 
@@ -117,6 +154,7 @@ class HorizonQp:
         shape: FloatArray,
         rows: FloatArray,
         output_bounds: FloatArray,
+        iterations: int = ITERATION_LIMIT,
     ) -> None:
         """Set up.
 
@@ -125,8 +163,11 @@ class HorizonQp:
             shape: T, shape (N m, r).
             rows: further constraint rows on r, shape (c, r).
             output_bounds: soft bounds (p, 2); rows are added only where one is finite.
+            iterations: most iterations of one solve.
         """
         self.cost, self.shape = cost, shape
+        self._iterations = iterations
+        self.limit_reached = False  # whether the last solve ended for want of iterations
         self.size = shape.shape[1]
         self._bounded = np.flatnonzero(np.isfinite(output_bounds).any(axis=1))
         self._output_bounds = output_bounds[self._bounded]
@@ -164,8 +205,11 @@ class HorizonQp:
         lower: FloatArray,
         upper: FloatArray,
         target_pv: FloatArray,
+        path: FloatArray | None = None,
     ) -> HorizonSolution | None:
         """Return the best plan, or None when there is none.
+
+        After a failure the factorisation and the active set are dropped.
 
         Args:
             state: ξ̂ − ξ_ss, shape (n,).
@@ -173,17 +217,17 @@ class HorizonQp:
             offset: v₀, shape (N m,).
             lower, upper: bounds on r and then on the further rows, shape (r + c,).
             target_pv: outputs at the target, shape (p,), about which soft bounds are written.
+            path: as in :meth:`HorizonCost.linear`.
         """
-        gradient = self.cost.linear(state, last)
+        self.limit_reached = False
+        gradient = self.cost.linear(state, last, path)
+        linear = np.zeros(self.size + self._slacks)
+        base = 0.0
         if offset.any():
             curved = self.cost.hessian @ offset
-            linear = np.zeros(self.size + self._slacks)
-            linear[: self.size] = self.shape.T @ (gradient + curved)
             base = float(offset @ (0.5 * curved + gradient))
-        else:
-            linear = np.zeros(self.size + self._slacks)
-            linear[: self.size] = self.shape.T @ gradient
-            base = 0.0
+            gradient = gradient + curved
+        linear[: self.size] = self.shape.T @ gradient
         if np.any(lower > upper):
             return None
         self._fill_bounds(state, offset, lower, upper, target_pv)
@@ -191,10 +235,11 @@ class HorizonQp:
             return self._only_plan(state, offset, base, target_pv)
         flag = self._load(linear)
         if flag < 0:
+            self._ready = False
             return None
         solution, value, flag, _ = self._model.solve()
         if flag < 1 or not np.isfinite(value):
-            self._ready = False
+            self._ready, self.limit_reached = False, flag == OUT_OF_ITERATIONS
             return None
         variables = solution[: self.size]
         slack = np.zeros(len(target_pv))
@@ -202,17 +247,40 @@ class HorizonQp:
         plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
         return HorizonSolution(plan, float(value) + base, slack, variables)
 
+    def problem(
+        self,
+        state: FloatArray,
+        last: FloatArray,
+        lower: FloatArray,
+        upper: FloatArray,
+        target_pv: FloatArray,
+        path: FloatArray | None = None,
+    ) -> QpData:
+        """Return the problem that :meth:`solve` would solve, without an offset."""
+        linear = np.zeros(self.size + self._slacks)
+        linear[: self.size] = self.shape.T @ self.cost.linear(state, last, path)
+        self._fill_bounds(state, np.zeros(len(self.shape)), lower, upper, target_pv)
+        return QpData(self._hessian, linear, self._matrix, self._lower, self._upper)
+
     def _only_plan(
         self, state: FloatArray, offset: FloatArray, cost: float, target_pv: FloatArray
     ) -> HorizonSolution:
         """Return the plan of a pattern that leaves nothing to decide."""
-        pv = (self.cost.outputs(state, offset) + target_pv)[:, self._bounded]
+        plan = offset.reshape(self.cost.horizon, -1)
+        slack = self.slack(state, plan, target_pv)
+        return HorizonSolution(plan, cost + self.slack_cost(slack), slack, np.zeros(0))
+
+    def slack(self, state: FloatArray, plan: FloatArray, target_pv: FloatArray) -> FloatArray:
+        """Return by how much ``plan`` (N, m) breaks the soft bounds, shape (p,)."""
+        pv = (self.cost.outputs(state, plan) + target_pv)[:, self._bounded]
         beyond = np.maximum(pv - self._output_bounds[:, 1], self._output_bounds[:, 0] - pv)
         slack = np.zeros(len(target_pv))
         slack[self._bounded] = np.maximum(beyond, 0.0).max(axis=0, initial=0.0)
-        cost += 0.5 * float(self._slack_weight @ slack[self._bounded] ** 2)
-        plan = offset.reshape(self.cost.horizon, -1)
-        return HorizonSolution(plan, cost, slack, np.zeros(0))
+        return slack
+
+    def slack_cost(self, slack: FloatArray) -> float:
+        """Return what ``slack`` (p,) adds to the cost."""
+        return 0.5 * float(self._slack_weight @ slack[self._bounded] ** 2)
 
     def _fill_bounds(
         self,
@@ -244,6 +312,6 @@ class HorizonQp:
         flag, _ = self._model.setup(
             self._hessian, linear, self._matrix, self._upper, self._lower, sense
         )
-        self._model.settings = {"iter_limit": ITERATION_LIMIT}
+        self._model.settings = {"iter_limit": self._iterations}
         self._ready = flag >= 0
         return int(flag)

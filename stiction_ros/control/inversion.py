@@ -1,27 +1,38 @@
-"""Stiction inversion: a linear MPC plans the stem, He's inverse turns it into OP."""
+"""Stiction inversion: a linear MPC plans the stem, the inverse of the law turns it into OP."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.control.jump_form import JumpForm, jump_form
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.control.target import Target
 from stiction_ros.control.unaware import UnawareMpc
-from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 
 
 class InversionMpc:
-    """The unaware controller followed by φ⁻¹ of each sticky valve, as proposed in [34]."""
+    """The unaware controller followed by φ⁻¹ of each sticky valve, as proposed in [34].
+
+    Attributes:
+        forms: jump form of each valve, None for a healthy one.
+    """
 
     mode = ControlMode.INVERSION
 
-    def __init__(self, linear: UnawareMpc, frictions: tuple[HeStiction | None, ...]) -> None:
-        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one."""
+    def __init__(self, linear: UnawareMpc, frictions: Sequence[Behaviour | None]) -> None:
+        """Wrap ``linear``; ``frictions`` has one entry per valve, None for a healthy one.
+
+        Raises:
+            InputError: a law without a jump form.
+        """
         self.linear = linear
-        self.frictions = frictions
+        self.forms: tuple[JumpForm | None, ...] = tuple(
+            None if friction is None else jump_form(friction) for friction in frictions
+        )
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
         """Return the linear plan with its first stems inverted into OP, or None."""
@@ -29,8 +40,8 @@ class InversionMpc:
         if plan is None:
             return None
         op = plan.op.copy()
-        for j, friction in enumerate(self.frictions):
-            if friction is not None:
-                op[j] = friction.inverse(float(last[j]), float(plan.stem[0, j]))
+        for j, form in enumerate(self.forms):
+            if form is not None:
+                op[j] = form.inverse(float(last[j]), float(plan.stem[0, j]))
         limits = self.linear.limits.stem
         return dataclasses.replace(plan, op=np.clip(op, limits[:, 0], limits[:, 1]))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import enum
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from stiction_ros.control.innovation_gate import InnovationGate
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
@@ -30,6 +33,8 @@ class ObserverTuning:
         disturbance_noise: variance of the random walk of d, per output, in (units of PV)².
         measurement_noise: variance of the measurement noise, per output, in (units of PV)².
         gain: K_d of the Luenberger observer, 0 < gain ≤ 1; 1 is deadbeat and jitters.
+        gate: innovations beyond this many standard deviations are outliers; inf takes all.
+        gate_samples: successive outliers of one output after which they are taken for true.
     """
 
     kind: ObserverKind
@@ -37,6 +42,8 @@ class ObserverTuning:
     disturbance_noise: FloatArray
     measurement_noise: FloatArray
     gain: float = 0.2
+    gate: float = 20.0
+    gate_samples: int = 3
 
 
 class Observer:
@@ -47,7 +54,8 @@ class Observer:
         \hat\xi_k^+ &= \hat\xi_k + K_x \hat e_k, \quad \hat d_k^+ = \hat d_k + K_d \hat e_k \\
         \hat\xi_{k+1} &= A \hat\xi_k^+ + B (\hat\chi_k - \chi_0) + E w_k + g
 
-    Feed it the stem positions that the controller believes in, not OP.
+    Feed it the stem positions that the controller believes in, not OP. An innovation that
+    the :class:`~stiction_ros.control.innovation_gate.InnovationGate` holds back counts as 0.
     """
 
     def __init__(self, model: LinearModel, tuning: ObserverTuning) -> None:
@@ -59,9 +67,13 @@ class Observer:
         _check_detectable(model)
         self.model = model
         n, p = model.order, len(model.pv0)
-        self.gain = (
-            _luenberger(model, tuning) if tuning.kind == "luenberger" else _kalman(model, tuning)
-        )
+        if tuning.kind is ObserverKind.LUENBERGER:
+            self.gain = _luenberger(model, tuning)
+            covariance = np.diag(tuning.measurement_noise)
+        else:
+            self.gain, covariance = _kalman(model, tuning)
+        self._weight = np.linalg.inv(covariance)
+        self._gate = InnovationGate(np.sqrt(np.diag(covariance)), tuning.gate, tuning.gate_samples)
         self._gain_x, self._gain_d = self.gain[:n], self.gain[n:]
         self.state: FloatArray = np.zeros(n)
         self.disturbance = np.zeros(p)
@@ -75,6 +87,22 @@ class Observer:
         self.state = np.asarray(steady, dtype=float)
         self.disturbance = pv - model.pv0 - model.c @ self.state
 
+    def copy(self) -> Observer:
+        """Return an observer of its own with the same estimates."""
+        other = copy.copy(self)  # every array is replaced, never changed
+        other._gate = copy.copy(self._gate)
+        return other
+
+    @property
+    def misfit(self) -> float:
+        """The last innovation squared and weighed by its expected covariance."""
+        return float(self.innovation @ self._weight @ self.innovation)
+
+    @property
+    def held_back(self) -> NDArray[np.bool_]:
+        """Which outputs of the last measurement were taken for outliers, shape (p,)."""
+        return self._gate.closed
+
     @property
     def output(self) -> FloatArray:
         """Estimated outputs, shape (p,)."""
@@ -83,7 +111,8 @@ class Observer:
     def correct(self, pv: FloatArray) -> None:
         """Take in the measurement ``pv``, shape (p,)."""
         model = self.model
-        self.innovation = pv - model.pv0 - model.c @ self.state - self.disturbance
+        seen = pv - model.pv0 - model.c @ self.state - self.disturbance
+        self.innovation = self._gate.pass_on(seen)
         self.state = self.state + self._gain_x @ self.innovation
         self.disturbance = self.disturbance + self._gain_d @ self.innovation
 
@@ -117,8 +146,8 @@ def _check_detectable(model: LinearModel) -> None:
             )
 
 
-def _kalman(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
-    """Return the stationary gain, shape (n + p, p), for the corrected estimate."""
+def _kalman(model: LinearModel, tuning: ObserverTuning) -> tuple[FloatArray, FloatArray]:
+    """Return the stationary gain (n + p, p), and the covariance (p, p) of the innovations."""
     a, c = _augmented(model)
     n = model.order
     noise = np.zeros_like(a)
@@ -129,8 +158,8 @@ def _kalman(model: LinearModel, tuning: ObserverTuning) -> FloatArray:
         covariance = solve_discrete_are(a.T, c.T, noise, measurement)
         innovation = c @ covariance @ c.T + measurement
         gain = np.asarray(np.linalg.solve(innovation, c @ covariance).T)
-        if np.isfinite(gain).all():
-            return gain
+        if np.isfinite(gain).all() and np.all(np.diag(innovation) > 0.0):
+            return gain, np.asarray(innovation)
     except ValueError:  # LinAlgError is one
         pass
     raise InputError(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import enum
 
+import numpy as np
+
 from stiction_ros.effects.behaviour import FloatArray
 
 
@@ -22,7 +24,15 @@ class StepStatus(enum.StrEnum):
 
     SOLVED = "solved"
     UNREACHABLE = "unreachable"  # solved for the nearest reachable set-point
-    HELD = "held"  # nothing usable: the last applied OP is held
+    LIMIT = "limit"  # out of iterations; a checked plan is applied
+    SHIFTED = "shifted"  # the rest of an earlier plan is applied
+    SUBSTITUTED = "substituted"  # the unaware controller stands in
+    HELD = "held"  # the last applied OP is held
+
+    @property
+    def failed(self) -> bool:
+        """Whether the formulation that is in force gave nothing usable."""
+        return self in (StepStatus.SHIFTED, StepStatus.SUBSTITUTED, StepStatus.HELD)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,6 +45,8 @@ class Plan:
         pv: outputs at samples 0 … N, shape (N + 1, p).
         slack: violation of the soft output bounds, shape (p,).
         jumps: number of valve jumps planned over the horizon.
+        converged: whether the solver finished; otherwise the plan was checked instead.
+        cost: value of (19a) with the prices of jumps and slacks, NaN when not known.
     """
 
     op: FloatArray
@@ -42,6 +54,8 @@ class Plan:
     pv: FloatArray
     slack: FloatArray
     jumps: int = 0
+    converged: bool = True
+    cost: float = float("nan")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,12 +63,16 @@ class StepResult:
     """One control step.
 
     Attributes:
-        status, reason: how it ended, and why in words (empty when simply solved).
-        mode: the formulation used.
+        status, reason: how it ended, and why in words (empty when there is nothing to say).
+        mode: the formulation used; ``hold`` when it was given up for the time being.
         op: controller outputs to apply, shape (m,), %, within the limits.
         plan: the plan behind it, or None when held.
         miss: SP minus the steady output aimed at, shape (p,).
         solve_time: seconds, wall clock.
+        strategy: name of the strategy that gave ``op``, see :mod:`.strategies`.
+        age: samples since ``plan`` was made; 0 for a plan of this step.
+        optimality_gap: cost above the mixed-integer optimum as a share of it; None where it
+            was not asked for or not found, see :mod:`.certificate`.
     """
 
     status: StepStatus
@@ -64,3 +82,11 @@ class StepResult:
     plan: Plan | None
     miss: FloatArray
     solve_time: float
+    strategy: str = ""
+    age: int = 0
+    optimality_gap: float | None = None
+
+    @property
+    def slack(self) -> FloatArray:
+        """Violation of the soft output bounds that the plan accepts, shape (p,)."""
+        return np.zeros(len(self.miss)) if self.plan is None else self.plan.slack

@@ -19,6 +19,7 @@ from stiction_ros.control.paper_weights import (
     augmented_weights,
     unaware_weights,
 )
+from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -57,6 +58,12 @@ class ControlSettings:
     op_rate_limits: tuple[float, ...] = setting(
         (math.inf,), "largest OP move, % per sample; jumps of sticky valves excepted", low=1e-6
     )
+    op_low: tuple[float, ...] = setting(
+        (-math.inf,), "lower bound of each OP, %, where it is above that of the valve"
+    )
+    op_high: tuple[float, ...] = setting(
+        (math.inf,), "upper bound of each OP, %, where it is below that of the valve"
+    )
     pv_low: tuple[float, ...] = setting((-math.inf,), "soft lower bound of each output")
     pv_high: tuple[float, ...] = setting((math.inf,), "soft upper bound of each output")
     observer: str = setting(
@@ -69,11 +76,30 @@ class ControlSettings:
     measurement_noise: tuple[float, ...] = setting(
         (1e-4,), "variance of the noise of each measurement", low=1e-15
     )
+    outlier_gate: float = setting(
+        20.0, "innovations beyond this many standard deviations are held back", low=3.0
+    )
+    outlier_samples: int = setting(
+        3, "successive outliers of an output after which they are believed", low=1, high=1000
+    )
     luenberger_gain: float = setting(0.2, "K_d of the Luenberger observer", low=1e-6, high=1.0)
     jump_price: float = setting(0.0, "cost added per jump of a sticky valve", low=0.0)
     jump_margin: float = setting(
-        0.3, "how far a jump exceeds the smallest one, as a share of f_S", low=0.0, high=2.0
+        0.3,
+        "how far a jump exceeds the smallest one, as a share of f_S, without intervals",
+        low=0.0,
+        high=2.0,
     )
+    least_jump_margin: float = setting(
+        0.1, "the same where the intervals of the frictions are known, at least", low=0.0, high=2.0
+    )
+    slip_check: bool = setting(True, "watch every jump by an observer that assumes it failed")
+    gap_samples: int = setting(
+        0, "samples free to jump in the optimality gap of each step; 0: none", low=0, high=16
+    )
+    iteration_limit: int = setting(2000, "most iterations of one quadratic programme", low=1)
+    shift_limit: int = setting(5, "oldest age of a plan that is followed on, samples", low=0)
+    hold_limit: int = setting(30, "samples held before the mode becomes hold", low=0)
     hand_over_samples: int = setting(
         200, "past samples replayed into a new observer", low=1, high=100_000
     )
@@ -117,7 +143,12 @@ class ControlSettings:
             raise InputError("pv_low is not below pv_high", where="pv_low")
         design = ControlDesign(
             model=linear,
-            limits=HorizonLimits(model.limits, self._list("op_rate_limits", m), output),
+            limits=HorizonLimits(
+                self._op_limits(model),
+                self._list("op_rate_limits", m),
+                output,
+                self.iteration_limit,
+            ),
             unaware=weights["move_weights"],
             embedding=weights["embedding_move_weights"],
             target_weights=self._list("target_weights", p),
@@ -127,9 +158,16 @@ class ControlSettings:
                 self._list("disturbance_noise", p),
                 self._list("measurement_noise", p),
                 self.luenberger_gain,
+                self.outlier_gate,
+                self.outlier_samples,
             ),
-            jumps=EmbeddingTuning(self.jump_price, self.jump_margin),
+            jumps=EmbeddingTuning(self.jump_price, self.jump_margin, self.least_jump_margin),
             hand_over_samples=self.hand_over_samples,
+            fallback=FallbackRule(self.shift_limit, self.hold_limit),
+            slip_check=self.slip_check,
+            gap_samples=self.gap_samples,
+            valve_names=model.valve_names,
+            output_names=model.outputs,
         )
         return self._as_printed(self._with_preset(design))
 
@@ -158,6 +196,18 @@ class ControlSettings:
         )
         tuning = PaperTuning(weights, WarmStart(self.warm_start), self.first_move)
         return dataclasses.replace(design, paper=tuning)
+
+    def _op_limits(self, model: LoopModel) -> FloatArray:
+        m = len(model.valves)
+        low = np.maximum(model.limits[:, 0], self._list("op_low", m))
+        high = np.minimum(model.limits[:, 1], self._list("op_high", m))
+        if np.any(low >= high):
+            raise InputError(
+                "the bounds of OP leave nothing between them",
+                where="op_low",
+                fix="keep op_low below op_high and the limits of the valve",
+            )
+        return np.column_stack([low, high])
 
     def _list(self, name: str, count: int) -> FloatArray:
         values = getattr(self, name)

@@ -27,6 +27,8 @@ class Target:
         pv: the outputs there, shape (p,).
         reachable: whether ``pv`` meets the set-points.
         miss: SP − pv, shape (p,), zero when reachable.
+        path: with a preview of the set-points, the steady states of the samples 1 … N of the
+            horizon less ``state``, shape (N, n); None when they are all the same.
     """
 
     state: FloatArray
@@ -34,6 +36,7 @@ class Target:
     pv: FloatArray
     reachable: bool
     miss: FloatArray
+    path: FloatArray | None = None
 
 
 class TargetSelector:
@@ -45,6 +48,8 @@ class TargetSelector:
 
     def __init__(self, model: LinearModel, weights: FloatArray, limits: FloatArray) -> None:
         """Prepare for ``weights`` (p,) on the outputs and ``limits`` (m, 2) on the stems.
+
+        The attribute ``limits`` may be replaced later, as by a valve that cannot move.
 
         Raises:
             InputError: the model has no steady state that its valves can move.
@@ -65,6 +70,26 @@ class TargetSelector:
         self._curvature += 1e-12 * scale * np.eye(basis.shape[1])
         self._inverse = np.linalg.pinv(balance, rcond=1e-10)
 
+    def follow(self, preview: FloatArray, disturbance: FloatArray, dv: FloatArray) -> Target | None:
+        """Return the target at the end of ``preview`` with the path that leads there.
+
+        ``preview`` are the set-points now and at the samples 1 … N, shape (N + 1, p).
+        ``reachable`` and ``miss`` are those of now. None when a state on the way is not
+        feasible.
+        """
+        changes = np.flatnonzero(np.any(np.diff(preview, axis=0) != 0.0, axis=1)) + 1
+        starts = [0, *changes.tolist()]
+        targets = [self.select(preview[i], disturbance, dv) for i in starts]
+        found = [target for target in targets if target is not None]
+        if len(found) < len(targets):
+            return None
+        first, last = found[0], found[-1]
+        lengths = np.diff([*starts, len(preview)])
+        path = np.repeat([target.state - last.state for target in found], lengths, axis=0)
+        if len(found) == 1:
+            return first
+        return dataclasses.replace(last, reachable=first.reachable, miss=first.miss, path=path[1:])
+
     def select(self, sp: FloatArray, disturbance: FloatArray, dv: FloatArray) -> Target | None:
         """Return the target for set-points ``sp`` (p,), or None when no state is feasible."""
         model = self.model
@@ -78,6 +103,8 @@ class TargetSelector:
         linear = -self._map.T @ (self._weights * wanted)
         free = np.linalg.solve(self._curvature, -linear)
         stem = self._basis_stem @ free
+        if not np.isfinite(stem).all():
+            return None
         if np.any(stem < low) or np.any(stem > high):
             scale = np.sqrt(np.diag(self._curvature).mean())
             free, _, flag, _ = daqp.solve(

@@ -26,25 +26,86 @@ class UnawareMpc:
         picks = (np.arange(weights.horizon)[:, None] * m + limited).reshape(-1)
         self._limited, self._width = limited, m
         rows = (np.eye(size) - np.eye(size, k=-m))[picks]
-        self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output)
+        self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output, limits.iterations)
         self._offset = np.zeros(size)
         self._lower, self._upper = np.empty(size + len(picks)), np.empty(size + len(picks))
         self._moves = np.tile(limits.move[limited], weights.horizon)
 
     def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None."""
+        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None.
+
+        Out of iterations, the plan without bounds is cut to them, and returned if it is
+        cheaper than leaving the stems where they are.
+        """
         low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         deviation = last - target.stem
         self._fill_bounds(low - target.stem, high - target.stem, deviation)
         solution = self._qp.solve(
-            state - target.state, deviation, self._offset, self._lower, self._upper, target.pv
+            state - target.state,
+            deviation,
+            self._offset,
+            self._lower,
+            self._upper,
+            target.pv,
+            target.path,
         )
-        if solution is None:
-            return None
-        stem = solution.plan + target.stem
+        if solution is not None:
+            constant = self.cost.constant(state - target.state, deviation, target.path)
+            cost = solution.cost + constant
+            return self._plan(state, target, solution.plan, solution.slack, cost)
+        if self._qp.limit_reached:
+            return self._cut_plan(state, target, last)
+        return None
+
+    def _plan(
+        self,
+        state: FloatArray,
+        target: Target,
+        moved: FloatArray,
+        slack: FloatArray,
+        cost: float,
+        converged: bool = True,
+    ) -> Plan:
+        stem = moved + target.stem
+        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         op = np.minimum(np.maximum(stem[0], low), high)
-        pv = predicted_outputs(self.cost, state, target, solution.plan)
-        return Plan(op, stem, pv, solution.slack)
+        pv = predicted_outputs(self.cost, state, target, moved)
+        return Plan(op, stem, pv, slack, converged=converged, cost=cost)
+
+    def _cost(
+        self,
+        state: FloatArray,
+        target: Target,
+        last: FloatArray,
+        moved: FloatArray,
+        slack: FloatArray,
+    ) -> float:
+        z, before, v = state - target.state, last - target.stem, moved.reshape(-1)
+        linear = self.cost.linear(z, before, target.path)
+        total = float(v @ (0.5 * self.cost.hessian @ v + linear))
+        return total + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
+
+    def _cut_plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
+        before = last - target.stem
+        linear = self.cost.linear(state - target.state, before, target.path)
+        free = np.linalg.solve(self.cost.hessian, -linear).reshape(self.cost.horizon, -1)
+        low, high = (self.limits.stem - target.stem[:, None]).T
+        cut = np.empty_like(free)
+        stem = np.clip(before, low, high)
+        for i, wanted in enumerate(free):
+            stem = np.clip(
+                np.clip(wanted, stem - self.limits.move, stem + self.limits.move), low, high
+            )
+            cut[i] = stem
+        stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
+        both = []
+        for v in (cut, stay):
+            slack = self._qp.slack(state - target.state, v, target.pv)
+            cost = self._cost(state, target, last, v, slack)
+            both.append(self._plan(state, target, v, slack, cost, converged=False))
+        if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
+            return None
+        return both[0]
 
     def _fill_bounds(self, low: FloatArray, high: FloatArray, deviation: FloatArray) -> None:
         """Write bounds on all stems off the target, then on their limited moves."""

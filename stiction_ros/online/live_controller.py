@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,12 +14,11 @@ from stiction_ros.control import (
     History,
     MpcController,
     StepResult,
-    StepStatus,
 )
-from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.online.known_friction import frictions_of, spreads_of
 from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.online.watch import Watch, WatchRule
 from stiction_ros.settings import setting
@@ -39,6 +37,11 @@ class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule):
         choices=(AUTO, *(mode.value for mode in ControlMode)),
     )
     adopt_process: bool = setting(False, "also take the process from the estimator's loop model")
+    offer_ratio: float = setting(
+        1.3,
+        "an offered model may explain the past PV worse than the one in force by this factor",
+        low=1.0,
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +104,7 @@ class LiveController:
         return self._controller.mode
 
     @property
-    def frictions(self) -> tuple[HeStiction | None, ...]:
+    def frictions(self) -> tuple[Behaviour | None, ...]:
         """Friction that the controller in force believes in, per valve."""
         return self._controller.frictions
 
@@ -126,10 +129,35 @@ class LiveController:
             Why nothing was prepared, or an empty text.
         """
         try:
-            self._offered = self._prepare_offer(model, at, self.settings, self._design)
+            offered = self._prepare_offer(model, at, self.settings, self._design)
         except InputError as error:
             return str(error)
+        worse = self._explains_worse(offered)
+        if worse:
+            return worse
+        self._offered = offered
         return ""
+
+    def _explains_worse(self, offered: _Prepared) -> str:
+        """Return why what is offered contradicts the past, or an empty text.
+
+        A window in which the loop was compensated hardly excites the friction band, and a fit
+        to it may be far off. The controller's own process with the stems of either friction
+        tells: the wrong one leaves larger innovations.
+        """
+        if len(self._op) < self.settings.hand_over_samples:
+            return ""
+        now, new = self._controller, offered.controller
+        history = self._history()
+        before = MpcController(now.design, now.mode, now.frictions, now.spreads).take_over(history)
+        after = MpcController(new.design, new.mode, new.frictions, new.spreads).take_over(history)
+        if after <= self.settings.offer_ratio * before:
+            return ""
+        return (
+            f"{offered.model.name}: explains the last {self.settings.hand_over_samples} samples "
+            f"worse than the model in force (mean square innovation {after:.3g} against "
+            f"{before:.3g})"
+        )
 
     def _prepare_offer(
         self, model: LoopModel, at: int, settings: LiveControllerSettings, design: ControlDesign
@@ -162,17 +190,28 @@ class LiveController:
         self._watch.rule = settings
         self._retuned = _Prepared(self._sample, controller, "settings changed", self._known)
 
-    def step(self, pv: FloatArray, sp: FloatArray, dv: FloatArray | None = None) -> StepResult:
-        """Return what to apply at the present sample; PV and set-points of shape (p,)."""
+    def step(
+        self,
+        pv: FloatArray,
+        sp: FloatArray,
+        dv: FloatArray | None = None,
+        preview: FloatArray | None = None,
+    ) -> StepResult:
+        """Return what to apply at the present sample; arguments as for the controller's step."""
         upset = np.zeros(self._design.model.e.shape[1]) if dv is None else dv
         self._commit_what_is_due()
         applied = self._op[-1] if self._op else np.array(self.model.stem_start)
-        result = self._controller.step(pv, sp, upset, applied)
+        result = self._controller.step(pv, sp, upset, applied, preview)
+        if self._unknown:
+            text = "; ".join(t for t in (result.reason, self._unknown) if t)
+            result = dataclasses.replace(result, reason=text)
         self._op.append(result.op)
         self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else 0.0))
         self._dv.append(np.where(np.isfinite(upset), upset, 0.0))
         self._sample += 1
-        self._watch.add(pv, sp, result.status is StepStatus.HELD)
+        if self._controller.raised:
+            self._note(self._controller.raised, self._sample - 1)
+        self._watch.add(pv, sp, result.status.failed)
         reason = self._watch.verdict()
         if reason:
             self._roll_back(reason)
@@ -189,9 +228,8 @@ class LiveController:
             prepared, self._offered = self._offered, None
             before_offer = self._controller, self._known
             self._commit(prepared)
-            if self._controller.mode is not before_offer[0].mode:
-                self._fallback = before_offer
-                self._watch.begin()
+            self._fallback = before_offer
+            self._watch.begin()
 
     def prediction(self, result: StepResult, points: int) -> tuple[FloatArray, FloatArray]:
         """Return the plan of the last step, thinned for a message.
@@ -214,13 +252,16 @@ class LiveController:
         if self._op:
             controller.take_over(self._history())
         self._controller, self._known = controller, prepared.model
-        change = ModeChange(self._sample, controller.mode, prepared.reason, prepared.model.name)
-        self.changes.append(change)
+        self._note(prepared.reason, self._sample)
+
+    def _note(self, reason: str, sample: int) -> None:
+        mode = self._controller.mode
+        self.changes.append(ModeChange(sample, mode, reason, self._known.name))
 
     def _roll_back(self, reason: str) -> None:
         """Return to the mode before, on the friction known then, from the next sample on."""
         before, known = self._fallback
-        controller = MpcController(self._design, before.mode, before.frictions)
+        controller = MpcController(self._design, before.mode, before.frictions, before.spreads)
         self._commit(_Prepared(self._sample, controller, f"rolled back: {reason}", known))
         self._watch.stop()
 
@@ -229,20 +270,19 @@ class LiveController:
 
     def _build(self, design: ControlDesign, model: LoopModel, mode: str) -> MpcController:
         frictions = frictions_of(model, self.model.valve_names)
+        sticky = any(friction is not None for friction in frictions)
         if mode == AUTO:
-            sticky = any(friction is not None for friction in frictions)
             chosen = ControlMode.EMBEDDING if sticky else ControlMode.UNAWARE
         else:
             chosen = ControlMode(mode)
-        if chosen is ControlMode.EMBEDDING and not any(frictions):
+        if chosen is ControlMode.EMBEDDING and not sticky:
             chosen = ControlMode.UNAWARE  # without friction the two are the same problem
-        return MpcController(design, chosen, frictions)
+        return MpcController(design, chosen, frictions, spreads_of(model, self.model.valve_names))
 
-
-def frictions_of(model: LoopModel, valves: tuple[str, ...]) -> tuple[HeStiction | None, ...]:
-    """Return the friction of each of ``valves`` that ``model`` knows, None for the others."""
-    found: Mapping[str, HeStiction | None] = {
-        valve.name: next((e for e in valve.effects if isinstance(e, HeStiction)), None)
-        for valve in model.valves
-    }
-    return tuple(found.get(name) for name in valves)
+    @property
+    def _unknown(self) -> str:
+        """Why another mode than the one asked for is in force, or an empty text."""
+        asked = self.settings.mode
+        if asked != ControlMode.EMBEDDING or self._controller.mode is not ControlMode.UNAWARE:
+            return ""
+        return "embedding is asked for, but no friction is known: unaware until it is"

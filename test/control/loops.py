@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
+from stiction_ros.control import ControlDesign
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.observer import ObserverKind, ObserverTuning
 from stiction_ros.control.target import Target
@@ -122,3 +123,9 @@ def kalman(p: int) -> ObserverTuning:
 
 def luenberger(p: int, gain: float = 0.2) -> ObserverTuning:
     return ObserverTuning(ObserverKind.LUENBERGER, 1.0, np.ones(p), np.ones(p), gain)
+
+
+def design_of(
+    model: LinearModel, limits: HorizonLimits, weights: HorizonWeights, observer: ObserverTuning
+) -> ControlDesign:
+    return ControlDesign(model, limits, weights, weights, np.ones(len(model.pv0)), observer)

@@ -21,8 +21,15 @@ from scipy.optimize import minimize
 
 from stiction_ros.control.embedding import SECOND_JUMPS, EmbeddingMpc, EmbeddingTuning, patterns
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.jump_form import FrictionSpread, jump_form
 from stiction_ros.control.target import Target
-from stiction_ros.effects import HeStiction
+from stiction_ros.effects import (
+    Behaviour,
+    HeStiction,
+    KanoStiction,
+    SemiPhysicalStiction,
+    XchStiction,
+)
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
 
@@ -324,5 +331,90 @@ def test_too_few_or_too_many_sticky_valves_are_refused(count: int) -> None:
     assert caught.value.fix
 
 
-def test_there_are_13_patterns_of_one_valve_and_81_of_two() -> None:
-    assert [len(patterns(n)) ** n for n in (1, 2, 3)] == [13, 81, 125]
+def test_there_are_17_patterns_of_one_valve_and_81_of_two() -> None:
+    assert [len(patterns(n)) ** n for n in (1, 2, 3)] == [17, 81, 125]
+
+
+def test_a_jump_that_is_better_later_waits() -> None:
+    """Patterns that wait a sample are never dearer, and now and then gain a lot."""
+    model, friction = first_order(), HeStiction(8.0, 1.0)
+    random, gains = np.random.default_rng(2), []
+    mpc = EmbeddingMpc(model, weights_for(model, 30), limits_for(model), (friction,), TUNING)
+    hasty = EmbeddingMpc(model, weights_for(model, 30), limits_for(model), (friction,), TUNING)
+    hasty._problems = tuple(
+        p for p in hasty._problems if p.combination[0] is not None and not p.combination[0].wait
+    )
+    for _ in range(30):
+        target = target_at(model, random.uniform(40.0, 60.0, 1))
+        state, last = target.state + random.normal(size=1), random.uniform(40.0, 60.0, 1)
+        plans = [m.plan(state, target, last) for m in (mpc, hasty)]
+        costs = [plan.cost for plan in plans if plan is not None]
+        gains.append(costs[1] / costs[0])
+    assert min(gains) >= 1.0 - 1e-9
+    assert max(gains) > 1.05
+
+
+@pytest.mark.parametrize(("known", "least"), [(None, 2.4), ((0.5, 0.25), 0.8), ((2.0, 0.5), 2.5)])
+def test_the_margin_follows_the_intervals_of_the_frictions(
+    known: tuple[float, float] | None, least: float
+) -> None:
+    """A share of f_S without intervals; else their half-widths, but a tenth of f_S at least."""
+    model, friction = first_order(), HeStiction(8.0, 1.0)
+    mpc = EmbeddingMpc(model, weights_for(model), limits_for(model), (friction,), TUNING)
+    mpc.know([jump_form(friction)], [None if known is None else FrictionSpread(*known)])
+    assert mpc.valves(np.array([50.0])).least[0] == pytest.approx(friction.jump + least)
+
+
+def test_a_jump_is_sure_from_wherever_the_stem_may_be() -> None:
+    model, friction = first_order(), HeStiction(8.0, 1.0)
+    mpc = EmbeddingMpc(model, weights_for(model, 20), limits_for(model), (friction,), TUNING)
+    mpc.know([jump_form(friction)], None, np.array([[45.0, 56.0]]))
+    for goal, start, sign in ((90.0, 56.0, 1.0), (10.0, 45.0, -1.0)):
+        target = target_at(model, np.array([goal]))
+        plan = mpc.plan(np.zeros(1), target, np.array([50.0]))
+        assert plan is not None
+        assert sign * (plan.op[0] - start) > friction.static_friction
+        assert {friction.step(stem, plan.op[0])[1] for stem in (45.0, 50.0, 56.0)} == {
+            plan.op[0] - sign * friction.dynamic_friction
+        }
+
+
+def test_a_valve_without_room_for_a_jump_is_known_as_immobile() -> None:
+    model = first_order()
+    for static, immobile in ((40.0, ()), (120.0, (0,))):
+        known = (HeStiction(static, 1.0),)
+        mpc = EmbeddingMpc(model, weights_for(model), limits_for(model), known, TUNING)
+        assert mpc.immobile == immobile
+
+
+@pytest.mark.parametrize(
+    "law", [KanoStiction(9.0, 7.0), XchStiction(8.0, 1.0), SemiPhysicalStiction(8.0, 5.0, 1.5)]
+)
+@given(last=st.floats(20.0, 80.0), goal=st.floats(20.0, 80.0), seed=st.integers(0, 99))
+@settings(max_examples=20, deadline=None)
+def test_a_valve_by_another_law_follows_the_first_move(
+    law: Behaviour, last: float, goal: float, seed: int
+) -> None:
+    model = first_order()
+    target = target_at(model, np.array([goal]))
+    state = target.state + 5.0 * np.random.default_rng(seed).normal(size=1)
+    plan = EmbeddingMpc(model, weights_for(model, 9), limits_for(model), (law,), TUNING).plan(
+        state, target, np.array([last])
+    )
+    assert plan is not None
+    assert law.step(law.rest(last), float(plan.op[0]), 0.0)[1] == pytest.approx(
+        plan.stem[0, 0], abs=1e-6
+    )
+
+
+def test_the_cost_of_a_plan_is_that_of_19a() -> None:
+    model, friction = stable_model(5, 3, 1, 2), HeStiction(8.0, 1.0)
+    weights = weights_for(model, 12)
+    target = target_at(model, np.array([61.0]))
+    last, state = np.array([50.0]), target.state + 2.0
+    tuning = EmbeddingTuning(jump_price=0.7)
+    mpc = EmbeddingMpc(model, weights, limits_for(model), (friction,), tuning)
+    plan = mpc.plan(state, target, last)
+    assert plan is not None
+    literal = equation_19a(model, weights, state, last, target, plan.stem) + 0.7 * plan.jumps
+    assert plan.cost == pytest.approx(literal, rel=1e-9)

@@ -1,0 +1,50 @@
+"""What a loop model says of the friction of its valves, and how surely."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from stiction_ros.control import FrictionSpread
+from stiction_ros.effects.behaviour import Behaviour
+from stiction_ros.loop import LoopModel
+
+
+def frictions_of(model: LoopModel, valves: tuple[str, ...]) -> tuple[Behaviour | None, ...]:
+    """Return the stiction of each of ``valves`` that ``model`` knows, None for the others."""
+    found: Mapping[str, Behaviour | None] = {
+        valve.name: next((e for e in valve.effects if e.effect == "stiction"), None)
+        for valve in model.valves
+    }
+    return tuple(found.get(name) for name in valves)
+
+
+def spreads_of(model: LoopModel, valves: tuple[str, ...]) -> tuple[FrictionSpread | None, ...]:
+    """Return how far f_S and f_D of each of ``valves`` may be off, None where not known.
+
+    The intervals stand in the model's provenance, as the estimator writes it:
+    ``{valve: V1, effect: stiction, f_s_interval: [low, high], f_d_interval: [low, high]}``. The
+    last entry of a valve counts, and only if the value in force lies within its intervals.
+    """
+    frictions = dict(zip(valves, frictions_of(model, valves), strict=True))
+    found: dict[str, FrictionSpread | None] = {}
+    for entry in model.provenance:
+        friction = frictions.get(str(entry.get("valve")))
+        if friction is not None and entry.get("effect") == "stiction":
+            found[str(entry["valve"])] = _spread(friction, entry)
+    return tuple(found.get(name) for name in valves)
+
+
+def _spread(friction: Behaviour, entry: Mapping[str, Any]) -> FrictionSpread | None:
+    widths = []
+    for attribute, key in (("static_friction", "f_s"), ("dynamic_friction", "f_d")):
+        value, interval = getattr(friction, attribute), entry.get(f"{key}_interval")
+        if not isinstance(interval, list | tuple) or len(interval) != 2:
+            return None
+        low, high = interval
+        if not (isinstance(low, int | float) and isinstance(high, int | float)):
+            return None
+        if not low <= value <= high:
+            return None
+        widths.append(max(value - low, high - value))
+    return FrictionSpread(*widths)
