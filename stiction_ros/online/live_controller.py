@@ -19,6 +19,7 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.known_friction import frictions_of, spreads_of
+from stiction_ros.online.offers import OfferRule, doubt
 from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.online.watch import Watch, WatchRule
 from stiction_ros.settings import setting
@@ -28,7 +29,7 @@ HISTORY_SAMPLES = 20_000
 
 
 @dataclasses.dataclass(frozen=True)
-class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule):
+class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule):
     """Everything that can be set on the controller of a running loop."""
 
     mode: str = setting(
@@ -37,11 +38,6 @@ class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule):
         choices=(AUTO, *(mode.value for mode in ControlMode)),
     )
     adopt_process: bool = setting(False, "also take the process from the estimator's loop model")
-    offer_ratio: float = setting(
-        1.3,
-        "an offered model may explain the past PV worse than the one in force by this factor",
-        low=1.0,
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,8 +64,10 @@ class LiveController:
     """One controller at a time, and a prepared one that takes over between two samples.
 
     A loop model offered by the estimator is *prepared* at once (a new controller is built,
-    which may refuse), *committed* before the sample at which it takes effect (it takes over
-    the history), then *watched*, and *rolled back* when it does worse than the one before.
+    which may refuse), held against the past (:mod:`.offers`; a doubted one is looked at again
+    with every ``fit_every`` samples), *committed* before the sample at which it takes effect
+    (it takes over the history), then *watched*, and *rolled back* when it does worse than the
+    one before.
     """
 
     def __init__(self, settings: LiveControllerSettings, model: LoopModel) -> None:
@@ -93,6 +91,7 @@ class LiveController:
         self._dv: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
         self._retuned: _Prepared | None = None
         self._offered: _Prepared | None = None
+        self._doubted: _Prepared | None = None
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
         self._fallback = self._controller, model
@@ -132,32 +131,16 @@ class LiveController:
             offered = self._prepare_offer(model, at, self.settings, self._design)
         except InputError as error:
             return str(error)
-        worse = self._explains_worse(offered)
-        if worse:
-            return worse
-        self._offered = offered
-        return ""
+        doubt = self._doubt(offered)
+        self._doubted, self._offered = (offered, None) if doubt else (None, offered)
+        return doubt
 
-    def _explains_worse(self, offered: _Prepared) -> str:
-        """Return why what is offered contradicts the past, or an empty text.
-
-        A window in which the loop was compensated hardly excites the friction band, and a fit
-        to it may be far off. The controller's own process with the stems of either friction
-        tells: the wrong one leaves larger innovations.
-        """
-        if len(self._op) < self.settings.hand_over_samples:
-            return ""
+    def _doubt(self, offered: _Prepared) -> str:
+        """Return why the past speaks against what is offered, or an empty text."""
         now, new = self._controller, offered.controller
-        history = self._history()
-        before = MpcController(now.design, now.mode, now.frictions, now.spreads).take_over(history)
-        after = MpcController(new.design, new.mode, new.frictions, new.spreads).take_over(history)
-        if after <= self.settings.offer_ratio * before:
+        if now.frictions == new.frictions and now.design.model is new.design.model:
             return ""
-        return (
-            f"{offered.model.name}: explains the last {self.settings.hand_over_samples} samples "
-            f"worse than the model in force (mean square innovation {after:.3g} against "
-            f"{before:.3g})"
-        )
+        return doubt(self.settings, (now, new), self._history())
 
     def _prepare_offer(
         self, model: LoopModel, at: int, settings: LiveControllerSettings, design: ControlDesign
@@ -186,6 +169,7 @@ class LiveController:
         waiting = self._offered
         if waiting is not None:
             self._offered = self._prepare_offer(waiting.model, waiting.at, settings, design)
+        self._doubted = None
         self.settings, self._design = settings, design
         self._watch.rule = settings
         self._retuned = _Prepared(self._sample, controller, "settings changed", self._known)
@@ -206,7 +190,7 @@ class LiveController:
             text = "; ".join(t for t in (result.reason, self._unknown) if t)
             result = dataclasses.replace(result, reason=text)
         self._op.append(result.op)
-        self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else 0.0))
+        self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else self.model.pv0))
         self._dv.append(np.where(np.isfinite(upset), upset, 0.0))
         self._sample += 1
         if self._controller.raised:
@@ -218,6 +202,9 @@ class LiveController:
         return result
 
     def _commit_what_is_due(self) -> None:
+        doubted, again = self._doubted, self._sample % self.settings.fit_every == 0
+        if doubted is not None and again and not self._doubt(doubted):
+            self._doubted, self._offered = None, doubted
         if self._retuned is not None:
             prepared, self._retuned = self._retuned, None
             before = self._controller.mode
