@@ -21,12 +21,13 @@ from stiction_ros.cli import (
     identify,
     report,
     study,
+    study_control,
 )
 from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, fit_linear, example, experiment, report, study, bench)
+COMMANDS = (demo, identify, fit_linear, example, experiment, report, study, study_control, bench)
 
 
 def parser() -> argparse.ArgumentParser:
