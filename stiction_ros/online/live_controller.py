@@ -64,8 +64,8 @@ class LiveController:
     """One controller at a time, and a prepared one that takes over between two samples.
 
     A loop model offered by the estimator is *prepared* at once (a new controller is built,
-    which may refuse), held against the past (:mod:`.offers`; a doubted one is looked at again
-    with every ``fit_every`` samples), *committed* before the sample at which it takes effect
+    which may refuse), held against the past before the sample at which it takes effect
+    (:mod:`.offers`; a doubted one is looked at again every ``fit_every`` samples), *committed*
     (it takes over the history), then *watched*, and *rolled back* when it does worse than the
     one before.
     """
@@ -95,6 +95,7 @@ class LiveController:
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
         self._fallback = self._controller, model
+        self.doubts: list[tuple[int, str]] = []  # samples at which an offer was not taken, and why
         self.changes: list[ModeChange] = [ModeChange(0, self._controller.mode, "start", model.name)]
 
     @property
@@ -128,12 +129,11 @@ class LiveController:
             Why nothing was prepared, or an empty text.
         """
         try:
-            offered = self._prepare_offer(model, at, self.settings, self._design)
+            self._offered = self._prepare_offer(model, at, self.settings, self._design)
         except InputError as error:
             return str(error)
-        doubt = self._doubt(offered)
-        self._doubted, self._offered = (offered, None) if doubt else (None, offered)
-        return doubt
+        self._doubted = None
+        return ""
 
     def _doubt(self, offered: _Prepared) -> str:
         """Return why the past speaks against what is offered, or an empty text."""
@@ -202,9 +202,8 @@ class LiveController:
         return result
 
     def _commit_what_is_due(self) -> None:
-        doubted, again = self._doubted, self._sample % self.settings.fit_every == 0
-        if doubted is not None and again and not self._doubt(doubted):
-            self._doubted, self._offered = None, doubted
+        if self._doubted is not None and self._sample % self.settings.fit_every == 0:
+            self._offered, self._doubted = self._doubted, None
         if self._retuned is not None:
             prepared, self._retuned = self._retuned, None
             before = self._controller.mode
@@ -213,6 +212,11 @@ class LiveController:
                 self._watch.stop()  # a mode that the user has chosen is not judged
         if self._offered is not None and self._offered.at <= self._sample:
             prepared, self._offered = self._offered, None
+            speaks_against = self._doubt(prepared)
+            if speaks_against:
+                self._doubted = prepared
+                self.doubts.append((self._sample, speaks_against))
+                return
             before_offer = self._controller, self._known
             self._commit(prepared)
             self._fallback = before_offer

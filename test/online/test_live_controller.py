@@ -256,9 +256,12 @@ def test_friction_that_contradicts_the_past_is_doubted() -> None:
     assert run.live.offer(KNOWN, 900) == ""
     run.go(300)
     far_off = PROCESS.with_valve_effects({"V1": [HeStiction(3.0, 0.5)]})
-    assert "explains" in run.live.offer(far_off, 1200)
+    assert run.live.offer(far_off, 1205) == ""
     run.go(10)
     assert run.live.frictions == (HeStiction(5.0, 2.0),)
+    ((sample, reason),) = run.live.doubts
+    assert sample == 1205
+    assert "explains" in reason
 
 
 def test_friction_that_really_changed_is_taken() -> None:
@@ -269,8 +272,9 @@ def test_friction_that_really_changed_is_taken() -> None:
     changed = PLANT.with_valve_effects({"V1": [HeStiction(10.0, 2.0)]})
     run.plant = _with_new_valve(run.plant, changed)
     run.go(500)
-    assert run.live.offer(changed, 1500) == ""
+    run.live.offer(changed, 1500)
     run.go(1)
+    assert run.live.doubts == []
     assert run.live.frictions == (HeStiction(10.0, 2.0),)
 
 
@@ -286,7 +290,9 @@ def _with_new_valve(plant: Plant, model: LoopModel) -> Plant:
 def test_a_short_past_doubts_nothing() -> None:
     run = Run(LiveController(settings(hand_over_samples=200), PROCESS))
     run.go(100)
-    assert run.live.offer(PROCESS.with_valve_effects({"V1": [HeStiction(30.0, 0.5)]}), 0) == ""
+    run.live.offer(PROCESS.with_valve_effects({"V1": [HeStiction(30.0, 0.5)]}), 0)
+    run.go(1)
+    assert run.live.doubts == []
 
 
 # ---- what is said ------------------------------------------------------------------------------
