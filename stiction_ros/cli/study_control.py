@@ -23,6 +23,7 @@ from stiction_ros.examples.control_cases import (
 )
 
 OFFSET_LIMITS = (0.006, 0.02)  # kg/m³, °C
+WIDTH = 100  # characters that the table needs
 CYCLE_LIMIT = 0.15  # of the amplitude that the unaware controller leaves
 
 
@@ -163,4 +164,6 @@ def _print(found: list[CaseScores], seeds: tuple[int, int]) -> None:
             f"{s.travel:.0f}",
             "yes" if s.met else "no",
         )
-    Console().print(table)
+    console = Console()
+    console.width = max(console.width, WIDTH)
+    console.print(table)

@@ -92,6 +92,8 @@ class LiveController:
         self._retuned: _Prepared | None = None
         self._offered: _Prepared | None = None
         self._doubted: _Prepared | None = None
+        self._raised: tuple[Behaviour | None, ...] | None = None  # by the slip check
+        self._given_up = False
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
         self._fallback = self._controller, model
@@ -165,7 +167,7 @@ class LiveController:
             InputError: settings that do not fit; the old ones stay in force.
         """
         design = settings.design(self.model)
-        controller = self._build(design, self._known, settings.mode)
+        controller = self._build(design, self._known, settings.mode, self._raised)
         waiting = self._offered
         if waiting is not None:
             self._offered = self._prepare_offer(waiting.model, waiting.at, settings, design)
@@ -193,13 +195,26 @@ class LiveController:
         self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else self.model.pv0))
         self._dv.append(np.where(np.isfinite(upset), upset, 0.0))
         self._sample += 1
-        if self._controller.raised:
-            self._note(self._controller.raised, self._sample - 1)
+        self._tell(result)
         self._watch.add(pv, sp, result.status.failed)
         reason = self._watch.verdict()
         if reason:
             self._roll_back(reason)
         return result
+
+    def _tell(self, result: StepResult) -> None:
+        """Note what the step at the sample just passed changed by itself."""
+        controller, sample = self._controller, self._sample - 1
+        if controller.raised:
+            self._raised = controller.frictions
+            self._note(controller.raised, sample)
+        given_up = result.mode is ControlMode.HOLD and controller.mode is not ControlMode.HOLD
+        if given_up and not self._given_up:
+            change = ModeChange(sample, ControlMode.HOLD, result.reason, self._known.name)
+            self.changes.append(change)
+        elif self._given_up and not given_up:
+            self._note("a plan is found again", sample)
+        self._given_up = given_up
 
     def _commit_what_is_due(self) -> None:
         if self._doubted is not None and self._sample % self.settings.fit_every == 0:
@@ -218,6 +233,7 @@ class LiveController:
                 self.doubts.append((self._sample, speaks_against))
                 return
             before_offer = self._controller, self._known
+            self._raised = None
             self._commit(prepared)
             self._fallback = before_offer
             self._watch.begin()
@@ -232,10 +248,11 @@ class LiveController:
         stem, plan = self._controller.stem, result.plan
         if plan is None:
             return np.concatenate([self._controller.observer.output, stem])[None], np.zeros(1)
-        last = len(plan.stem)
+        pv, stems = plan.pv[result.age :], plan.stem[result.age :]
+        last = len(stems)
         picks = np.unique(np.linspace(0, last, min(points, last + 1)).round().astype(int))
-        rows = np.hstack([plan.pv[picks], plan.stem[np.minimum(picks, last - 1)]])
-        rows[0, plan.pv.shape[1] :] = stem
+        rows = np.hstack([pv[picks], stems[np.minimum(picks, last - 1)]])
+        rows[0, pv.shape[1] :] = stem
         return rows, picks
 
     def _commit(self, prepared: _Prepared) -> None:
@@ -253,14 +270,22 @@ class LiveController:
         """Return to the mode before, on the friction known then, from the next sample on."""
         before, known = self._fallback
         controller = MpcController(self._design, before.mode, before.frictions, before.spreads)
+        self._raised = None
         self._commit(_Prepared(self._sample, controller, f"rolled back: {reason}", known))
         self._watch.stop()
 
     def _history(self) -> History:
         return History(np.array(self._op), np.array(self._pv), np.array(self._dv))
 
-    def _build(self, design: ControlDesign, model: LoopModel, mode: str) -> MpcController:
-        frictions = frictions_of(model, self.model.valve_names)
+    def _build(
+        self,
+        design: ControlDesign,
+        model: LoopModel,
+        mode: str,
+        raised: tuple[Behaviour | None, ...] | None = None,
+    ) -> MpcController:
+        frictions = raised or frictions_of(model, self.model.valve_names)
+        spreads = None if raised else spreads_of(model, self.model.valve_names)
         sticky = any(friction is not None for friction in frictions)
         if mode == AUTO:
             chosen = ControlMode.EMBEDDING if sticky else ControlMode.UNAWARE
@@ -268,7 +293,7 @@ class LiveController:
             chosen = ControlMode(mode)
         if chosen is ControlMode.EMBEDDING and not sticky:
             chosen = ControlMode.UNAWARE  # without friction the two are the same problem
-        return MpcController(design, chosen, frictions, spreads_of(model, self.model.valve_names))
+        return MpcController(design, chosen, frictions, spreads)
 
     @property
     def _unknown(self) -> str:

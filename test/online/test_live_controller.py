@@ -332,6 +332,31 @@ def test_a_change_found_by_the_slip_check_is_told() -> None:
     friction = run.live.frictions[0]
     assert isinstance(friction, HeStiction)
     assert 5.0 < friction.static_friction <= 9.0
+    run.live.retune(settings(horizon=40))
+    run.go(1)
+    assert run.live.frictions == (friction,), "new settings have lost it"
+
+
+def test_a_loop_without_measurements_ends_in_mode_hold_and_comes_back() -> None:
+    run = Run(LiveController(settings(shift_limit=2, hold_limit=3), PROCESS))
+    run.go(20)
+    for _ in range(10):
+        run.live.step(np.array([np.nan]), np.array([50.0]))
+    run.live.step(np.array([50.0]), np.array([50.0]))
+    assert modes(run.live) == [(0, "unaware"), (25, "hold"), (30, "unaware")]
+    assert run.live.changes[-1].reason == "a plan is found again"
+
+
+def test_the_prediction_of_an_older_plan_begins_now() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(60)
+    solved = run.live.step(np.array([50.0]), np.array([53.0]))
+    before, _ = run.live.prediction(solved, 200)
+    shifted = run.live.step(np.array([np.nan]), np.array([53.0]))
+    rows, picks = run.live.prediction(shifted, 200)
+    assert shifted.age == 1
+    assert picks[-1] == len(before) - 2
+    assert rows[1:, 0] == pytest.approx(before[2:, 0])
 
 
 # ---- preview -----------------------------------------------------------------------------------
