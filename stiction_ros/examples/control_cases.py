@@ -64,9 +64,13 @@ CASES: Mapping[str, ControlCase] = {
         ControlCase("C_B", None, TRUE, TRUE, ("C_B", 12000.0, 0.15)),
         ControlCase("T_A", None, TRUE, TRUE, ("T_A", 12000.0, 2.0)),
         ControlCase("F_B", None, TRUE, TRUE, ("F_B", 12000.0, 0.03)),
-        # A kick of a valve is two moves: with the scenario's weight valve 2 would never make one.
+        # A kick is two moves and two prices: with the scenario's valve 2 would never make one.
         ControlCase(
-            "two_valves", None, SECOND, SECOND, settings={"embedding_move_weights": (0.003, 0.003)}
+            "two_valves",
+            None,
+            SECOND,
+            SECOND,
+            settings={"embedding_move_weights": (0.003, 0.001), "jump_price": 0.02},
         ),
     )
 }
