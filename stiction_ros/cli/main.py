@@ -24,6 +24,7 @@ from stiction_ros.cli import (
     replay,
     report,
     study,
+    study_control,
 )
 from stiction_ros.errors import InputError
 
@@ -40,6 +41,7 @@ COMMANDS = (
     report,
     repair,
     study,
+    study_control,
     bench,
 )
 

@@ -64,9 +64,13 @@ CASES: Mapping[str, ControlCase] = {
         ControlCase("C_B", None, TRUE, TRUE, ("C_B", 12000.0, 0.15)),
         ControlCase("T_A", None, TRUE, TRUE, ("T_A", 12000.0, 2.0)),
         ControlCase("F_B", None, TRUE, TRUE, ("F_B", 12000.0, 0.03)),
-        # A kick of a valve is two moves: with the scenario's weight valve 2 would never make one.
+        # A kick is two moves and two prices: with the scenario's valve 2 would never make one.
         ControlCase(
-            "two_valves", None, SECOND, SECOND, settings={"embedding_move_weights": (0.003, 0.003)}
+            "two_valves",
+            None,
+            SECOND,
+            SECOND,
+            settings={"embedding_move_weights": (0.003, 0.001), "jump_price": 0.02},
         ),
     )
 }
@@ -83,6 +87,8 @@ class ControlOutcome:
             that goes on has several.
         moves: moves of the sticky stems.
         travel: of the stem of valve 1, %.
+        error: noise-free PV − SP, shape (N, p).
+        sp: set-points, shape (N, p).
     """
 
     iae: FloatArray
@@ -90,9 +96,20 @@ class ControlOutcome:
     late_turns: int
     moves: int
     travel: float
+    error: FloatArray
+    sp: FloatArray
 
 
-def run_case(case: ControlCase, seed: int, settings: Mapping[str, object]) -> ControlOutcome:
+def run_unaware(case: ControlCase, seed: int) -> ControlOutcome:
+    """Run the controller that does not know of the friction on the plant of ``case``."""
+    scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    true = {k: [v] for k, v in case.true.items()}
+    return _run(case, scenario, scenario.process, true, seed, {"mode": "unaware"})
+
+
+def run_case(
+    case: ControlCase, seed: int, settings: Mapping[str, object] | None = None
+) -> ControlOutcome:
     """Run the exact embedding on the plant of ``case``.
 
     Args:
@@ -103,15 +120,16 @@ def run_case(case: ControlCase, seed: int, settings: Mapping[str, object]) -> Co
     scenario = Scenario.load(find_config("tank.scenario.yaml"))
     model = scenario.process.with_valve_effects({k: [v] for k, v in case.known.items()})
     true = {k: [v] for k, v in case.true.items()}
-    return _run(case, scenario, model, true, seed, {**case.settings, **settings})
+    return _run(case, scenario, model, true, seed, {**case.settings, **(settings or {})})
 
 
-def run_reference(case: ControlCase, seed: int, settings: Mapping[str, object]) -> ControlOutcome:
+def run_reference(case: ControlCase, seed: int) -> ControlOutcome:
     """Run the unaware controller on the plant of ``case`` with ideal valves."""
     scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    settings: dict[str, object] = {"mode": "unaware"}
     if case.own_weights:
-        settings = {**settings, "move_weights": scenario.controller.embedding_move_weights}
-    return _run(case, scenario, scenario.process, {}, seed, {**settings, "mode": "unaware"})
+        settings["move_weights"] = scenario.controller.embedding_move_weights
+    return _run(case, scenario, scenario.process, {}, seed, settings)
 
 
 def _run(
@@ -161,6 +179,8 @@ def _scores(error: FloatArray, sp: FloatArray, stem: FloatArray, sticky: int) ->
         max(turns, default=0),
         int(np.count_nonzero(np.abs(changes) > 1e-9)),
         float(np.abs(np.diff(stem[:, 0])).sum()),
+        error,
+        sp,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 from array import array
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -13,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from stiction_ros.control import StepResult
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
@@ -67,6 +69,36 @@ def trajectory(
             )
         )
     return message
+
+
+def rows_of(message: JointTrajectory, names: Sequence[str]) -> tuple[list[int], FloatArray] | None:
+    """Return stamps in ns and rows (K, names) of a trajectory, or None when it does not fit."""
+    stamp, columns = to_ns(message.header.stamp), list(message.joint_names)
+    if any(name not in columns for name in names):
+        return None
+    picks = [columns.index(name) for name in names]
+    points = message.points
+    if not points or any(len(point.positions) != len(columns) for point in points):
+        return None
+    stamps = [
+        stamp + int(p.time_from_start.sec) * SECOND + int(p.time_from_start.nanosec) for p in points
+    ]
+    if any(b <= a for a, b in itertools.pairwise(stamps)):
+        return None
+    return stamps, np.array([[point.positions[i] for i in picks] for point in points], dtype=float)
+
+
+def diagnosis(result: StepResult) -> list[tuple[str, object]]:
+    """Return what diagnostics say of the last control step."""
+    gap = result.optimality_gap
+    return [
+        ("step_status", result.status.value),
+        ("strategy", result.strategy),
+        ("plan_age", result.age),
+        ("slack", " ".join(f"{value:g}" for value in result.slack)),
+        ("miss", " ".join(f"{value:g}" for value in result.miss)),
+        ("optimality_gap", "" if gap is None else f"{gap:g}"),
+    ]
 
 
 def status(

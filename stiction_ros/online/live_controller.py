@@ -19,6 +19,7 @@ from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.known_friction import frictions_of, spreads_of
+from stiction_ros.online.offers import OfferRule, doubt
 from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.online.watch import Watch, WatchRule
 from stiction_ros.settings import setting
@@ -28,7 +29,7 @@ HISTORY_SAMPLES = 20_000
 
 
 @dataclasses.dataclass(frozen=True)
-class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule):
+class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule):
     """Everything that can be set on the controller of a running loop."""
 
     mode: str = setting(
@@ -37,11 +38,6 @@ class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule):
         choices=(AUTO, *(mode.value for mode in ControlMode)),
     )
     adopt_process: bool = setting(False, "also take the process from the estimator's loop model")
-    offer_ratio: float = setting(
-        1.3,
-        "an offered model may explain the past PV worse than the one in force by this factor",
-        low=1.0,
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,8 +64,10 @@ class LiveController:
     """One controller at a time, and a prepared one that takes over between two samples.
 
     A loop model offered by the estimator is *prepared* at once (a new controller is built,
-    which may refuse), *committed* before the sample at which it takes effect (it takes over
-    the history), then *watched*, and *rolled back* when it does worse than the one before.
+    which may refuse), held against the past before the sample at which it takes effect
+    (:mod:`.offers`; a doubted one is looked at again every ``fit_every`` samples), *committed*
+    (it takes over the history), then *watched*, and *rolled back* when it does worse than the
+    one before.
     """
 
     def __init__(self, settings: LiveControllerSettings, model: LoopModel) -> None:
@@ -93,9 +91,13 @@ class LiveController:
         self._dv: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
         self._retuned: _Prepared | None = None
         self._offered: _Prepared | None = None
+        self._doubted: _Prepared | None = None
+        self._raised: tuple[Behaviour | None, ...] | None = None  # by the slip check
+        self._given_up = False
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
         self._fallback = self._controller, model
+        self.doubts: list[tuple[int, str]] = []  # samples at which an offer was not taken, and why
         self.changes: list[ModeChange] = [ModeChange(0, self._controller.mode, "start", model.name)]
 
     @property
@@ -129,35 +131,18 @@ class LiveController:
             Why nothing was prepared, or an empty text.
         """
         try:
-            offered = self._prepare_offer(model, at, self.settings, self._design)
+            self._offered = self._prepare_offer(model, at, self.settings, self._design)
         except InputError as error:
             return str(error)
-        worse = self._explains_worse(offered)
-        if worse:
-            return worse
-        self._offered = offered
+        self._doubted = None
         return ""
 
-    def _explains_worse(self, offered: _Prepared) -> str:
-        """Return why what is offered contradicts the past, or an empty text.
-
-        A window in which the loop was compensated hardly excites the friction band, and a fit
-        to it may be far off. The controller's own process with the stems of either friction
-        tells: the wrong one leaves larger innovations.
-        """
-        if len(self._op) < self.settings.hand_over_samples:
-            return ""
+    def _doubt(self, offered: _Prepared) -> str:
+        """Return why the past speaks against what is offered, or an empty text."""
         now, new = self._controller, offered.controller
-        history = self._history()
-        before = MpcController(now.design, now.mode, now.frictions, now.spreads).take_over(history)
-        after = MpcController(new.design, new.mode, new.frictions, new.spreads).take_over(history)
-        if after <= self.settings.offer_ratio * before:
+        if now.frictions == new.frictions and now.design.model is new.design.model:
             return ""
-        return (
-            f"{offered.model.name}: explains the last {self.settings.hand_over_samples} samples "
-            f"worse than the model in force (mean square innovation {after:.3g} against "
-            f"{before:.3g})"
-        )
+        return doubt(self.settings, (now, new), self._history())
 
     def _prepare_offer(
         self, model: LoopModel, at: int, settings: LiveControllerSettings, design: ControlDesign
@@ -182,10 +167,11 @@ class LiveController:
             InputError: settings that do not fit; the old ones stay in force.
         """
         design = settings.design(self.model)
-        controller = self._build(design, self._known, settings.mode)
+        controller = self._build(design, self._known, settings.mode, self._raised)
         waiting = self._offered
         if waiting is not None:
             self._offered = self._prepare_offer(waiting.model, waiting.at, settings, design)
+        self._doubted = None
         self.settings, self._design = settings, design
         self._watch.rule = settings
         self._retuned = _Prepared(self._sample, controller, "settings changed", self._known)
@@ -206,18 +192,33 @@ class LiveController:
             text = "; ".join(t for t in (result.reason, self._unknown) if t)
             result = dataclasses.replace(result, reason=text)
         self._op.append(result.op)
-        self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else 0.0))
+        self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else self.model.pv0))
         self._dv.append(np.where(np.isfinite(upset), upset, 0.0))
         self._sample += 1
-        if self._controller.raised:
-            self._note(self._controller.raised, self._sample - 1)
+        self._tell(result)
         self._watch.add(pv, sp, result.status.failed)
         reason = self._watch.verdict()
         if reason:
             self._roll_back(reason)
         return result
 
+    def _tell(self, result: StepResult) -> None:
+        """Note what the step at the sample just passed changed by itself."""
+        controller, sample = self._controller, self._sample - 1
+        if controller.raised:
+            self._raised = controller.frictions
+            self._note(controller.raised, sample)
+        given_up = result.mode is ControlMode.HOLD and controller.mode is not ControlMode.HOLD
+        if given_up and not self._given_up:
+            change = ModeChange(sample, ControlMode.HOLD, result.reason, self._known.name)
+            self.changes.append(change)
+        elif self._given_up and not given_up:
+            self._note("a plan is found again", sample)
+        self._given_up = given_up
+
     def _commit_what_is_due(self) -> None:
+        if self._doubted is not None and self._sample % self.settings.fit_every == 0:
+            self._offered, self._doubted = self._doubted, None
         if self._retuned is not None:
             prepared, self._retuned = self._retuned, None
             before = self._controller.mode
@@ -226,7 +227,13 @@ class LiveController:
                 self._watch.stop()  # a mode that the user has chosen is not judged
         if self._offered is not None and self._offered.at <= self._sample:
             prepared, self._offered = self._offered, None
+            speaks_against = self._doubt(prepared)
+            if speaks_against:
+                self._doubted = prepared
+                self.doubts.append((self._sample, speaks_against))
+                return
             before_offer = self._controller, self._known
+            self._raised = None
             self._commit(prepared)
             self._fallback = before_offer
             self._watch.begin()
@@ -241,10 +248,11 @@ class LiveController:
         stem, plan = self._controller.stem, result.plan
         if plan is None:
             return np.concatenate([self._controller.observer.output, stem])[None], np.zeros(1)
-        last = len(plan.stem)
+        pv, stems = plan.pv[result.age :], plan.stem[result.age :]
+        last = len(stems)
         picks = np.unique(np.linspace(0, last, min(points, last + 1)).round().astype(int))
-        rows = np.hstack([plan.pv[picks], plan.stem[np.minimum(picks, last - 1)]])
-        rows[0, plan.pv.shape[1] :] = stem
+        rows = np.hstack([pv[picks], stems[np.minimum(picks, last - 1)]])
+        rows[0, pv.shape[1] :] = stem
         return rows, picks
 
     def _commit(self, prepared: _Prepared) -> None:
@@ -262,14 +270,22 @@ class LiveController:
         """Return to the mode before, on the friction known then, from the next sample on."""
         before, known = self._fallback
         controller = MpcController(self._design, before.mode, before.frictions, before.spreads)
+        self._raised = None
         self._commit(_Prepared(self._sample, controller, f"rolled back: {reason}", known))
         self._watch.stop()
 
     def _history(self) -> History:
         return History(np.array(self._op), np.array(self._pv), np.array(self._dv))
 
-    def _build(self, design: ControlDesign, model: LoopModel, mode: str) -> MpcController:
-        frictions = frictions_of(model, self.model.valve_names)
+    def _build(
+        self,
+        design: ControlDesign,
+        model: LoopModel,
+        mode: str,
+        raised: tuple[Behaviour | None, ...] | None = None,
+    ) -> MpcController:
+        frictions = raised or frictions_of(model, self.model.valve_names)
+        spreads = None if raised else spreads_of(model, self.model.valve_names)
         sticky = any(friction is not None for friction in frictions)
         if mode == AUTO:
             chosen = ControlMode.EMBEDDING if sticky else ControlMode.UNAWARE
@@ -277,7 +293,7 @@ class LiveController:
             chosen = ControlMode(mode)
         if chosen is ControlMode.EMBEDDING and not sticky:
             chosen = ControlMode.UNAWARE  # without friction the two are the same problem
-        return MpcController(design, chosen, frictions, spreads_of(model, self.model.valve_names))
+        return MpcController(design, chosen, frictions, spreads)
 
     @property
     def _unknown(self) -> str:

@@ -205,3 +205,134 @@ def test_rate_limits_hold_from_sample_to_sample() -> None:
     loop.run(30, np.array([40.0]))
     op = np.array(loop.op)[:, 0]
     assert np.abs(np.diff(op, prepend=50.0)).max() <= 1.5 + 1e-9
+
+
+def test_one_wild_measurement_does_not_drive_the_loop_away() -> None:
+    model = first_order()
+    controller = MpcController(design_for(model), ControlMode.UNAWARE)
+    loop = Loop(model, controller)
+    loop.run(100, np.array([24.0]))
+    quiet = loop.applied.copy()
+    wild = controller.step(np.array([1e6]), np.array([24.0]), NO_DV, loop.applied)
+    assert wild.op == pytest.approx(quiet, abs=0.5)
+    assert "held back" in wild.reason
+    after = controller.step(np.array([24.0]), np.array([24.0]), NO_DV, wild.op)
+    assert after.op == pytest.approx(quiet, abs=0.5)
+    assert after.reason == ""
+
+
+def test_a_lasting_change_of_the_measurement_passes_after_a_few_samples() -> None:
+    model = first_order()
+    loop = Loop(model, MpcController(design_for(model), ControlMode.UNAWARE))
+    loop.run(100, np.array([24.0]))
+    loop.disturbance = 8.0  # sixty standard deviations of the noise
+    loop.run(200, np.array([24.0]))
+    assert loop.pv[-1] == pytest.approx([24.0], abs=1e-3)
+
+
+def test_op_at_its_limit_leaves_it_at_once_when_the_set_point_comes_back() -> None:
+    model = first_order()
+    loop = Loop(model, MpcController(design_for(model), ControlMode.UNAWARE))
+    loop.run(300, np.array([90.0]))  # far out of reach
+    assert loop.op[-1] == pytest.approx([100.0])
+    loop.run(3, np.array([30.0]))
+    assert loop.op[-3][0] < 99.0
+    assert loop.op[-1][0] < 80.0
+
+
+def test_a_measured_disturbance_is_met_before_it_shows() -> None:
+    model = dataclasses.replace(first_order(), e=np.array([[0.3]]))
+    ops = []
+    for upset in (0.0, 2.0):
+        controller = MpcController(design_for(model), ControlMode.UNAWARE)
+        pv = model.pv0
+        result = controller.step(pv, pv, np.array([upset]), np.array([50.0]))
+        ops.append(float(result.op[0]))
+    assert ops[0] == pytest.approx(50.0)
+    assert ops[1] < 49.0
+
+
+def test_a_lost_disturbance_measurement_keeps_the_last_one() -> None:
+    model = dataclasses.replace(first_order(), e=np.array([[0.3]]))
+    controller = MpcController(design_for(model), ControlMode.UNAWARE)
+    controller.step(model.pv0, model.pv0, np.array([2.0]), np.array([50.0]))
+    state = controller.observer.state.copy()
+    result = controller.step(model.pv0, model.pv0, np.array([np.nan]), np.array([50.0]))
+    assert "disturbance" in result.reason
+    held = model.a @ state + model.b @ (result.op - 50.0) + 0.6
+    gained = controller.observer.state - held
+    assert np.abs(gained).max() < 0.6  # the correction by pv, not the loss of the disturbance
+
+
+@pytest.mark.parametrize("mode", [ControlMode.UNAWARE, ControlMode.EMBEDDING])
+def test_a_preview_of_what_holds_anyway_changes_nothing(mode: ControlMode) -> None:
+    model, sp = first_order(), np.array([24.0])
+    ops = []
+    for preview in (None, np.tile(sp, (3, 1)), np.zeros((0, 1))):
+        controller = MpcController(design_for(model), mode, (FRICTION,))
+        ops.append(controller.step(model.pv0, sp, NO_DV, model.stem0, preview).op[0])
+    assert len(set(ops)) == 1
+
+
+def test_with_a_preview_the_loop_is_nearer_to_its_set_points() -> None:
+    model = first_order()
+    schedule = np.repeat([[20.0], [24.0], [19.0]], 40, axis=0)
+    errors = []
+    for known in (False, True):
+        controller = MpcController(design_for(model), ControlMode.UNAWARE)
+        x, applied, error = np.zeros(1), np.array([50.0]), 0.0
+        for k, sp in enumerate(schedule):
+            pv = model.c @ x + model.pv0
+            preview = schedule[k + 1 :] if known else None
+            applied = controller.step(pv, sp, NO_DV, applied, preview).op
+            x = model.a @ x + model.b @ (applied - 50.0)
+            error += abs(float(pv[0] - sp[0]))
+        errors.append(error)
+    assert errors[1] < 0.6 * errors[0]
+
+
+def test_a_valve_that_cannot_move_leaves_the_target_to_the_others() -> None:
+    model = stable_model(3, 3, 2, 1)
+    known = (HeStiction(150.0, 1.0), None)
+    controller = MpcController(design_for(model), ControlMode.EMBEDDING, known)
+    result = controller.step(model.pv0, model.pv0 + 0.5, NO_DV, np.array([50.0, 50.0]))
+    assert "valve 1 cannot be moved" in result.reason
+    assert result.op[0] == 50.0
+    assert result.op[1] != 50.0
+    assert result.status is StepStatus.SOLVED
+
+
+def test_slack_of_soft_outputs_is_told() -> None:
+    model = first_order()
+    design = design_for(model, low=50.0, output=(-np.inf, 22.0))
+    controller = MpcController(design, ControlMode.UNAWARE)
+    result = controller.step(np.array([24.0]), np.array([21.0]), NO_DV, np.array([58.0]))
+    assert result.slack[0] > 0.5
+    inside = MpcController(design, ControlMode.UNAWARE).step(
+        np.array([20.0]), np.array([20.0]), NO_DV, np.array([50.0])
+    )
+    assert inside.slack == pytest.approx([0.0], abs=1e-6)
+
+
+def test_the_optimality_gap_is_told_when_it_is_asked_for() -> None:
+    model = first_order()
+    gaps = []
+    for samples in (0, 7):
+        design = dataclasses.replace(design_for(model), gap_samples=samples)
+        controller = MpcController(design, ControlMode.EMBEDDING, (FRICTION,))
+        controller.step(np.array([20.0]), np.array([21.0]), NO_DV, np.array([50.0]))
+        result = controller.step(np.array([20.1]), np.array([24.0]), NO_DV, np.array([50.0]))
+        gaps.append(result.optimality_gap)
+    assert gaps[0] is None
+    assert gaps[1] is not None
+    assert 0.0 <= gaps[1] < 0.2
+
+
+def test_an_unknown_start_is_found_by_the_first_far_jump() -> None:
+    model = first_order()
+    controller = MpcController(design_for(model), ControlMode.EMBEDDING, (FRICTION,))
+    loop = Loop(model, controller, FRICTION)
+    loop.stem = np.array([44.0])
+    loop.run(1, np.array([25.0]))
+    assert np.diff(controller.stem_interval[0])[0] == pytest.approx(0.0, abs=1e-9)
+    assert controller.stem == pytest.approx(loop.stem, abs=1e-9)

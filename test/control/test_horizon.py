@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loops import equation_19a, models, outputs_of, target_at, weights_for
+from loops import equation_19a, models, outputs_of, stable_model, target_at, weights_for
 
 from stiction_ros.control.horizon import HorizonCost
 from stiction_ros.processes import LinearModel
@@ -47,3 +47,24 @@ def test_the_hessian_is_symmetric_and_positive() -> None:
     hessian = HorizonCost(model := stable_model(2, 4, 2, 2), weights_for(model, 20)).hessian
     assert np.array_equal(hessian, hessian.T)
     assert np.linalg.eigvalsh(hessian).min() > 0.0
+
+
+def test_a_path_of_steady_states_is_what_19a_is_measured_from() -> None:
+    model = stable_model(8, 3, 2, 2)
+    weights = weights_for(model, 7)
+    cost = HorizonCost(model, weights)
+    random = np.random.default_rng(1)
+    state, last = random.normal(size=3), random.normal(size=2)
+    path, moved = random.normal(size=(9, 3)), random.normal(size=(7, 2))
+    v = moved.reshape(-1)
+    found = v @ (0.5 * cost.hessian @ v + cost.linear(state, last, path))
+    found += cost.constant(state, last, path)
+    z, before, literal = state, last, 0.0
+    for i, stem in enumerate(moved):
+        off = z - path[max(i - 1, 0)]
+        literal += off @ weights.state @ off
+        literal += (stem - before) @ weights.move @ (stem - before)
+        z, before = model.a @ z + model.b @ stem, stem
+    off = z - path[6]
+    literal += off @ weights.terminal @ off
+    assert found == pytest.approx(literal, rel=1e-9)

@@ -66,3 +66,14 @@ def test_a_horizon_within_the_dead_time_is_refused() -> None:
     with pytest.raises(InputError, match="V1 moves no output within 5 samples"):
         ControlSettings(horizon=5).design(example1)
     ControlSettings(horizon=6).design(example1)
+
+
+def test_bounds_of_op_narrow_those_of_the_valves() -> None:
+    design = ControlSettings(op_low=(20.0, -5.0), op_high=(70.0,)).design(TANK)
+    assert design.limits.stem.tolist() == [[20.0, 70.0], [0.0, 70.0]]
+
+
+def test_bounds_of_op_that_leave_nothing_are_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        ControlSettings(op_low=(60.0,), op_high=(50.0,)).design(TANK)
+    assert caught.value.where == "op_low"

@@ -111,5 +111,5 @@ def test_nothing_is_checked_before_the_first_sure_slip() -> None:
     for _ in range(3):
         assert controller._check is not None
         controller._check.begin(0, controller.observer, belief, 65.0)
-        assert controller._check._rivals == [None]
+        assert controller._check._rivals == [[]]
         run.run(1, 20.0)

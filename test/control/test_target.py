@@ -135,3 +135,27 @@ def test_a_process_that_no_valve_moves_is_refused() -> None:
     dead = dataclasses.replace(first_order(), b=np.zeros((1, 1)))
     with pytest.raises(InputError, match="no valve moves"):
         TargetSelector(dead, np.ones(1), bounds(dead))
+
+
+def test_a_preview_ends_at_its_last_set_point_and_tells_the_way() -> None:
+    model = stable_model(2, 3, 2, 2)
+    selector = TargetSelector(model, np.ones(2), np.tile([-1e4, 1e4], (2, 1)))
+    now, then, zero = model.pv0, model.pv0 + 1.0, np.zeros(2)
+    preview = np.vstack([now, now, now, then, then])
+    found = selector.follow(preview, zero, np.zeros(0))
+    first, last = (selector.select(sp, zero, np.zeros(0)) for sp in (now, then))
+    assert found is not None
+    assert first is not None
+    assert last is not None
+    assert found.path is not None
+    assert found.state == pytest.approx(last.state)
+    expected = [first.state - last.state] * 2 + [np.zeros(3)] * 2
+    assert found.path == pytest.approx(np.array(expected))
+
+
+def test_a_preview_without_a_move_has_no_path() -> None:
+    model = stable_model(2, 3, 2, 2)
+    selector = TargetSelector(model, np.ones(2), np.tile([-1e4, 1e4], (2, 1)))
+    found = selector.follow(np.tile(model.pv0, (4, 1)), np.zeros(2), np.zeros(0))
+    assert found is not None
+    assert found.path is None

@@ -4,18 +4,21 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from graph import KINDS, Graph
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
 
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel, simulate_closed_loop
 from stiction_ros.nodes import managed
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
-from stiction_ros.nodes.messages import joint_state, to_ns
+from stiction_ros.nodes.messages import joint_state, to_ns, trajectory
 from stiction_ros.online.live_controller import LiveController
 from stiction_ros.settings import settings_of
 
@@ -331,12 +334,50 @@ def test_a_message_without_every_tag_is_ignored(graph: Graph) -> None:
     assert to_ns(hand.op[0].header.stamp) == 2 * 10**9
 
 
-def test_a_value_that_is_no_number_holds_op(graph: Graph) -> None:
+def test_values_that_are_no_numbers_follow_the_plan_and_then_hold_op(graph: Graph) -> None:
     hand = Hand(graph)
     hand.show(1, 49.0)
+    for second in range(2, 12):
+        hand.show(second, float("nan"))
+    graph.spin_until(lambda: len(hand.op) == 11, "op")
+    ops = [op.position[0] for op in hand.op]
+    assert all(np.isfinite(ops))
+    assert len(set(ops[:6])) == 6  # the plan and the rest of it, five samples old at most
+    assert set(ops[6:]) == {ops[5]}
+
+
+def test_diagnostics_name_the_strategy_in_force(graph: Graph) -> None:
+    hand = Hand(graph)
+    told: list[DiagnosticArray] = []
+    graph.plain().create_subscription(DiagnosticArray, "/diagnostics", told.append, 100)
+    hand.show(1, 49.0)
     hand.show(2, float("nan"))
+
+    def strategies() -> set[str]:
+        return {
+            pair.value
+            for message in told
+            for entry in message.status
+            for pair in entry.values
+            if pair.key == "strategy"
+        }
+
+    graph.spin_until(lambda: "shift" in strategies(), "diagnostics")
+    assert strategies() <= {"solve", "shift"}
+
+
+def test_a_preview_moves_op_before_the_set_point_moves(graph: Graph) -> None:
+    hand = Hand(graph)
+    hand.show(1, 50.0)
+    graph.spin_until(lambda: hand.op, "op at rest")
+    publisher = graph.plain().create_publisher(JointTrajectory, "sp_preview", SIGNAL_QOS)
+    graph.spin_until(lambda: publisher.get_subscription_count() > 0, "the link")
+    publisher.publish(trajectory(10**9, ["PV1"], np.array([[50.0], [54.0]]), [0.0, 8.0]))
+    graph.spin_until(lambda: hand.node._inbox.preview is not None, "the preview")
+    hand.show(2, 50.0)
     graph.spin_until(lambda: len(hand.op) == 2, "op")
-    assert hand.op[1].position == hand.op[0].position
+    assert hand.op[0].position[0] == pytest.approx(50.0)
+    assert hand.op[1].position[0] > 50.5
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,12 @@ import pytest
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, StepStatus
-from stiction_ros.effects import HeStiction
+from stiction_ros.effects import ChoudhuryStiction, HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints
 from stiction_ros.online.live_controller import (
     LiveController,
     LiveControllerSettings,
-    frictions_of,
 )
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))
@@ -180,7 +179,14 @@ def test_an_adopted_process_is_the_one_that_is_controlled_by() -> None:
 
 
 def watched(**changes: object) -> LiveControllerSettings:
-    return settings(watch_samples=100, watch_settle=40, adopt_process=True, **changes)
+    return settings(
+        watch_samples=100,
+        watch_settle=40,
+        adopt_process=True,
+        offer_samples=0,
+        slip_check=False,
+        **changes,
+    )
 
 
 def process_of_gain(factor: float) -> LoopModel:
@@ -229,6 +235,140 @@ def test_a_mode_that_the_user_sets_is_not_rolled_back() -> None:
     run.live.retune(watched(mode="hold"))
     run.go(200)
     assert modes(run.live) == [(0, "unaware"), (200, "hold")]
+
+
+def test_a_change_of_friction_is_watched_as_the_first_swap_is() -> None:
+    run = Run(LiveController(watched(), PLANT))
+    run.go(400)
+    run.live.offer(process_of_gain(0.3).with_valve_effects({"V1": [HeStiction(4.0, 2.0)]}), 400)
+    run.go(500)
+    assert run.live.changes[-1].reason.startswith("rolled back: ")
+    assert run.live.frictions == (HeStiction(5.0, 2.0),)
+    assert run.live.mode is ControlMode.EMBEDDING
+
+
+# ---- what is offered, against the past ---------------------------------------------------------
+
+
+def test_friction_that_contradicts_the_past_is_doubted() -> None:
+    run = Run(LiveController(settings(hand_over_samples=100), PROCESS))
+    run.go(900)
+    assert run.live.offer(KNOWN, 900) == ""
+    run.go(300)
+    far_off = PROCESS.with_valve_effects({"V1": [HeStiction(3.0, 0.5)]})
+    assert run.live.offer(far_off, 1205) == ""
+    run.go(10)
+    assert run.live.frictions == (HeStiction(5.0, 2.0),)
+    ((sample, reason),) = run.live.doubts
+    assert sample == 1205
+    assert "explains" in reason
+
+
+def test_friction_that_really_changed_is_taken() -> None:
+    run = Run(LiveController(settings(hand_over_samples=300, slip_check=False), PROCESS))
+    run.go(900)
+    run.live.offer(KNOWN, 900)
+    run.go(100)
+    changed = PLANT.with_valve_effects({"V1": [HeStiction(10.0, 2.0)]})
+    run.plant = _with_new_valve(run.plant, changed)
+    run.go(500)
+    run.live.offer(changed, 1500)
+    run.go(1)
+    assert run.live.doubts == []
+    assert run.live.frictions == (HeStiction(10.0, 2.0),)
+
+
+def _with_new_valve(plant: Plant, model: LoopModel) -> Plant:
+    """The same process and noise from now on, behind the valve of ``model``."""
+    fresh = Plant(model, 1)
+    stem = plant._valves[0].memories[0]
+    fresh._state, fresh._now, fresh.sample = plant._state, plant._now, plant.sample
+    fresh._valves[0].memories[0] = stem
+    return fresh
+
+
+def test_a_short_past_doubts_nothing() -> None:
+    run = Run(LiveController(settings(hand_over_samples=200), PROCESS))
+    run.go(100)
+    run.live.offer(PROCESS.with_valve_effects({"V1": [HeStiction(30.0, 0.5)]}), 0)
+    run.go(1)
+    assert run.live.doubts == []
+
+
+# ---- what is said ------------------------------------------------------------------------------
+
+
+def test_embedding_without_friction_says_so() -> None:
+    live = LiveController(settings(mode="embedding"), PROCESS)
+    result = live.step(np.array([50.0]), np.array([50.0]))
+    assert (result.mode, result.status) == (ControlMode.UNAWARE, StepStatus.SOLVED)
+    assert "no friction is known" in result.reason
+    live.offer(KNOWN, 1)
+    assert live.step(np.array([50.0]), np.array([50.0])).reason == ""
+
+
+def test_a_law_without_a_jump_form_is_refused_as_a_value() -> None:
+    live = LiveController(SETTINGS, PROCESS)
+    other = PROCESS.with_valve_effects({"V1": [ChoudhuryStiction(7.0, 3.0)]})
+    assert "no jump form" in live.offer(other, 0)
+
+
+def test_friction_beyond_the_travel_is_said_and_the_valve_left_alone() -> None:
+    live = LiveController(SETTINGS, PROCESS.with_valve_effects({"V1": [HeStiction(150.0, 1.0)]}))
+    for _ in range(5):
+        result = live.step(np.array([48.0]), np.array([52.0]))
+        assert result.op.tolist() == [50.0]
+    assert result.status is StepStatus.UNREACHABLE
+    assert "V1 cannot be moved" in result.reason
+
+
+def test_a_change_found_by_the_slip_check_is_told() -> None:
+    sticky = PLANT.with_valve_effects({"V1": [HeStiction(9.0, 2.0)]})
+    run = Run(LiveController(SETTINGS, KNOWN))
+    run.plant = Plant(sticky, 1)
+    run.go(900)
+    told = [change for change in run.live.changes if "V1 stayed" in change.reason]
+    assert told
+    friction = run.live.frictions[0]
+    assert isinstance(friction, HeStiction)
+    assert 5.0 < friction.static_friction <= 9.0
+    run.live.retune(settings(horizon=40))
+    run.go(1)
+    assert run.live.frictions == (friction,), "new settings have lost it"
+
+
+def test_a_loop_without_measurements_ends_in_mode_hold_and_comes_back() -> None:
+    run = Run(LiveController(settings(shift_limit=2, hold_limit=3), PROCESS))
+    run.go(20)
+    for _ in range(10):
+        run.live.step(np.array([np.nan]), np.array([50.0]))
+    run.live.step(np.array([50.0]), np.array([50.0]))
+    assert modes(run.live) == [(0, "unaware"), (25, "hold"), (30, "unaware")]
+    assert run.live.changes[-1].reason == "a plan is found again"
+
+
+def test_the_prediction_of_an_older_plan_begins_now() -> None:
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(60)
+    solved = run.live.step(np.array([50.0]), np.array([53.0]))
+    before, _ = run.live.prediction(solved, 200)
+    shifted = run.live.step(np.array([np.nan]), np.array([53.0]))
+    rows, picks = run.live.prediction(shifted, 200)
+    assert shifted.age == 1
+    assert picks[-1] == len(before) - 2
+    assert rows[1:, 0] == pytest.approx(before[2:, 0])
+
+
+# ---- preview -----------------------------------------------------------------------------------
+
+
+def test_a_preview_moves_the_valve_before_the_set_point_moves() -> None:
+    ops = []
+    for preview in (None, np.vstack([np.full((8, 1), 50.0), np.full((60, 1), 53.0)])):
+        live = LiveController(SETTINGS, PROCESS)
+        ops.append(live.step(np.array([50.0]), np.array([50.0]), None, preview).op[0])
+    assert ops[0] == pytest.approx(50.0)
+    assert ops[1] > 50.5
 
 
 # ---- settings ----------------------------------------------------------------------------------
@@ -292,8 +432,8 @@ def test_settings_that_do_not_fit_the_model_are_refused_at_the_start() -> None:
 def test_measurements_that_are_no_numbers_do_no_lasting_harm(first: bool) -> None:
     run = Run(LiveController(SETTINGS, PROCESS))
     run.go(0 if first else 30)
-    held = run.live.step(np.array([np.nan]), np.array([50.0]))
-    assert held.status is StepStatus.HELD
+    stood_in = run.live.step(np.array([np.nan]), np.array([50.0]))
+    assert stood_in.status is (StepStatus.HELD if first else StepStatus.SHIFTED)
     run.live.offer(KNOWN, 0)
     result = run.live.step(np.array([50.0]), np.array([50.0]))
     assert result.status is StepStatus.SOLVED
@@ -340,10 +480,6 @@ def test_after_a_roll_back_new_settings_do_not_bring_the_worse_controller_back()
     run.live.retune(watched(horizon=30))
     run.go(1)
     assert run.live.mode is ControlMode.UNAWARE
-
-
-def test_frictions_are_found_by_name() -> None:
-    assert frictions_of(KNOWN, ("V0", "V1")) == (None, HeStiction(5.0, 2.0))
 
 
 def test_a_fit_must_take_effect_before_the_next_window_ends() -> None:

@@ -1,0 +1,169 @@
+"""``stiction study-control``: the exact embedding on the tank when something is not as known."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.json_output import write_json
+from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.errors import InputError
+from stiction_ros.examples.control_cases import (
+    CASES,
+    ControlOutcome,
+    run_case,
+    run_reference,
+    run_unaware,
+)
+
+OFFSET_LIMITS = (0.006, 0.02)  # kg/m³, °C
+WIDTH = 100  # characters that the table needs
+CYCLE_LIMIT = 0.15  # of the amplitude that the unaware controller leaves
+
+
+@dataclasses.dataclass(frozen=True)
+class CaseScores:
+    """One case over all seeds; outputs C and T in this order.
+
+    Attributes:
+        case: its name.
+        iae_ratio: mean IAE over that of the stiction-free loop.
+        iae_limit: what is asked for, or None.
+        offset: mean |error| at the end of the holds, in kg/m³ and °C.
+        cycle: amplitude at the period of the unaware controller's cycle, as a share of its.
+        late_turns: most turns of a stem in the last 60 samples of a hold.
+        moves: mean number of moves of the sticky stems in a run.
+        travel: mean travel of valve 1, %.
+    """
+
+    case: str
+    iae_ratio: tuple[float, float]
+    iae_limit: float | None
+    offset: tuple[float, float]
+    cycle: tuple[float, float]
+    late_turns: int
+    moves: float
+    travel: float
+
+    @property
+    def met(self) -> bool:
+        """Whether all that is asked for holds."""
+        near = all(o <= limit for o, limit in zip(self.offset, OFFSET_LIMITS, strict=True))
+        still = max(self.cycle) <= CYCLE_LIMIT
+        return near and still and (self.iae_limit is None or max(self.iae_ratio) <= self.iae_limit)
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "study-control",
+        help="the exact embedding on the tank when friction or inputs are not as known",
+        description="Run the tank of Example 2 under the exact embedding on set-points that no "
+        "tuning has seen, with right and wrong friction, unmeasured steps and two sticky valves, "
+        "and compare the noise-free outputs with the loop without stiction. Exit code 1 when a "
+        "case misses what is asked of it.",
+    )
+    parser.add_argument(
+        "--seeds", type=seed_range, default=(101, 110), metavar="A:B", help="inclusive (101:110)"
+    )
+    parser.add_argument("--cases", metavar="A,B", help=f"some of {', '.join(CASES)}")
+    add_jobs(parser)
+    parser.add_argument("--json", metavar="F", help="write the scores; - for stdout")
+    parser.set_defaults(run=run)
+
+
+Runs = tuple[ControlOutcome, ControlOutcome, ControlOutcome]  # embedding, stiction-free, unaware
+
+
+def run_seed(names: tuple[str, ...], seed: int) -> dict[str, Runs]:
+    """Run one seed of every case; a plain function, so that a worker process can run it."""
+    free: dict[object, ControlOutcome] = {}
+    unaware: dict[object, ControlOutcome] = {}
+    found = {}
+    for name in names:
+        case = CASES[name]
+        # Many cases share what they are compared with.
+        reference, cycle = (case.upset, case.own_weights), (case.upset, str(case.true))
+        if reference not in free:
+            free[reference] = run_reference(case, seed)
+        if cycle not in unaware:
+            unaware[cycle] = run_unaware(case, seed)
+        found[name] = (run_case(case, seed), free[reference], unaware[cycle])
+    return found
+
+
+def scores(name: str, runs: list[Runs]) -> CaseScores:
+    """Return the scores of the case ``name`` over ``runs``, one entry per seed."""
+    from stiction_ros.report.scoring import amplitude, dominant_cycle, holds
+
+    cycles = []
+    for embedding, _, unaware in runs:
+        stretches = holds(unaware.sp)
+        found = dominant_cycle(unaware.error, stretches)
+        if found is None:
+            continue
+        pair = [
+            [amplitude(one.error[:, i], stretches, found.period) or 0.0 for i in range(2)]
+            for one in (embedding, unaware)
+        ]
+        cycles.append(np.array(pair[0]) / np.maximum(pair[1], 1e-12))
+    after, free = (np.mean([r[i].iae for r in runs], axis=0) for i in (0, 1))
+    return CaseScores(
+        name,
+        _pair(after / free),
+        CASES[name].limit,
+        _pair(np.mean([r[0].offset for r in runs], axis=0)),
+        _pair(np.mean(cycles, axis=0)) if cycles else (0.0, 0.0),
+        max(r[0].late_turns for r in runs),
+        float(np.mean([r[0].moves for r in runs])),
+        float(np.mean([r[0].travel for r in runs])),
+    )
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    names = tuple(CASES) if options.cases is None else tuple(options.cases.split(","))
+    for name in names:
+        if name not in CASES:
+            raise InputError(f"no case {name!r}", where="--cases", fix=f"use {', '.join(CASES)}")
+    work = functools.partial(run_seed, names)
+    seeds = run_seeds(work, options.seeds, options.jobs, "tank")
+    found = [scores(name, [seed[name] for seed in seeds]) for name in names]
+    if options.json is not None:
+        write_json(options.json, [{**dataclasses.asdict(s), "met": s.met} for s in found])
+    if options.json != "-":
+        _print(found, options.seeds)
+    return 0 if all(score.met for score in found) else 1
+
+
+def _print(found: list[CaseScores], seeds: tuple[int, int]) -> None:
+    table = Table(title=f"tank, seeds {seeds[0]} to {seeds[1]}, C and T", title_justify="left")
+    table.add_column("case", no_wrap=True)
+    for name in ("IAE ratio", "asked", "offset", "cycle", "turns", "moves", "travel"):
+        table.add_column(name, justify="right")
+    table.add_column("met")
+    for s in found:
+        table.add_row(
+            s.case,
+            " ".join(f"{v:.2f}" for v in s.iae_ratio),
+            "" if s.iae_limit is None else f"{s.iae_limit:g}",
+            " ".join(f"{v:.4f}" for v in s.offset),
+            " ".join(f"{v:.2f}" for v in s.cycle),
+            str(s.late_turns),
+            f"{s.moves:.0f}",
+            f"{s.travel:.0f}",
+            "yes" if s.met else "no",
+        )
+    console = Console()
+    console.width = max(console.width, WIDTH)
+    console.print(table)
