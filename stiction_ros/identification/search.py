@@ -54,6 +54,7 @@ COMB = 0.0012
 FIRST_PARENTS = 20
 RIVALS = 2
 PARENTS = 6
+FITTED = 4
 SWEEPS = 5
 ROUNDS = 3
 CROSS = 200
@@ -158,6 +159,7 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
         parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
         rivals.append(descend(data, model, orders, valve, parents, criterion, data.delays, False))
+    rivals.append(_from_fitted(data, first, orders))
     for other in first.better_beginnings:
         chosen = other.scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)
         if not chosen:
@@ -175,6 +177,25 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
             closer = comb(data, rival, orders, valve)
             best = min(best, closer, key=lambda candidate: candidate.loss)
     return best
+
+
+def _from_fitted(data: Data, first: FirstScan, orders: Orders) -> Model:
+    """Search round the best points of the one-step scan with the noise of their own fits.
+
+    Near a pattern that is narrow, the noise of a model without it hides it.
+    """
+    model, valve, scan = first.model, first.valve, first.scans[Criterion.ONE_STEP]
+    apart = APART * float(data.limit[valve])
+    start = float(model.start[valve])
+    fitted = [
+        with_valve(data, model, orders, valve, scan.grid[i], start, scan.delays[i], warm=False)
+        for i in scan.best(FITTED, data.min_moves, apart)
+    ]
+    if not fitted:
+        return model
+    best = min(fitted, key=lambda candidate: candidate.loss)
+    parents, ranges = best.friction[valve][None, :], nearby_delays(data, best, valve)
+    return descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
 
 
 def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
