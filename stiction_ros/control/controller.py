@@ -318,7 +318,7 @@ class MpcController:
         """Return ``op`` within the limits, with ``otherwise`` where it is no number."""
         limits = self.design.limits.stem
         usable = np.where(np.isfinite(op), op, otherwise)
-        return np.asarray(np.clip(usable, limits[:, 0], limits[:, 1]))
+        return np.minimum(np.maximum(usable, limits[:, 0]), limits[:, 1])
 
     def _move(self, op: FloatArray, plan: Plan | None) -> None:
         stem = op.copy()

@@ -61,7 +61,6 @@ class TargetSelector:
         basis = null_space(balance, rcond=1e-10)
         self._basis_state, self._basis_stem = basis[:n], basis[n:]
         self._map = model.c @ self._basis_state
-        self._weights = weights
         # A trace of weight on the stems makes the choice unique where outputs leave it open.
         scale = float(np.trace(self._map.T @ (weights[:, None] * self._map)))
         if not scale > 0.0:
@@ -69,6 +68,9 @@ class TargetSelector:
         self._curvature = self._map.T @ (weights[:, None] * self._map)
         self._curvature += 1e-12 * scale * np.eye(basis.shape[1])
         self._inverse = np.linalg.pinv(balance, rcond=1e-10)
+        self._rest = self._inverse @ model.constant
+        pull = self._map.T * weights
+        self._pull, self._free = pull, np.linalg.solve(self._curvature, pull)
 
     def follow(self, preview: FloatArray, disturbance: FloatArray, dv: FloatArray) -> Target | None:
         """Return the target at the end of ``preview`` with the path that leads there.
@@ -93,23 +95,23 @@ class TargetSelector:
     def select(self, sp: FloatArray, disturbance: FloatArray, dv: FloatArray) -> Target | None:
         """Return the target for set-points ``sp`` (p,), or None when no state is feasible."""
         model = self.model
-        drive = model.constant + (model.e @ dv if model.e.shape[1] else 0.0)
-        origin = self._inverse @ drive
         n = model.order
+        origin = self._rest
+        if model.e.shape[1]:
+            origin = origin + self._inverse @ (model.e @ dv)
         origin_state, origin_stem = origin[:n], origin[n:]
         wanted = sp - model.pv0 - disturbance - model.c @ origin_state
         low = self.limits[:, 0] - model.stem0 - origin_stem
         high = self.limits[:, 1] - model.stem0 - origin_stem
-        linear = -self._map.T @ (self._weights * wanted)
-        free = np.linalg.solve(self._curvature, -linear)
+        free = self._free @ wanted
         stem = self._basis_stem @ free
         if not np.isfinite(stem).all():
             return None
-        if np.any(stem < low) or np.any(stem > high):
+        if (stem < low).any() or (stem > high).any():
             scale = np.sqrt(np.diag(self._curvature).mean())
             free, _, flag, _ = daqp.solve(
                 self._curvature / scale**2,
-                linear / scale**2,
+                -(self._pull @ wanted) / scale**2,
                 np.ascontiguousarray(self._basis_stem),
                 high,
                 low,
@@ -121,7 +123,7 @@ class TargetSelector:
             stem = np.clip(self._basis_stem @ free, low, high)
         state = origin_state + self._basis_state @ free
         miss = wanted - self._map @ free
-        reachable = bool(np.all(np.abs(miss) <= 1e-6 * (1.0 + np.abs(sp))))
+        reachable = bool((np.abs(miss) <= 1e-6 * (1.0 + np.abs(sp))).all())
         return Target(
             state,
             stem + origin_stem + model.stem0,
