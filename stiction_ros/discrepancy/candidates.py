@@ -32,7 +32,8 @@ class Axis:
     def grid(self) -> FloatArray:
         """Return the first grid, in coordinates of the search."""
         low, high = self.inner(self.low), self.inner(self.high)
-        values = np.linspace(low, high, self.points)
+        middle = [0.5 * (low + high)]
+        values = np.linspace(low, high, self.points) if self.points > 1 else np.array(middle)
         return np.unique(np.rint(values)) if self.whole else values
 
     def inner(self, value: float) -> float:
@@ -50,7 +51,7 @@ class Axis:
     def step(self) -> float:
         """Distance of two points of the first grid, in coordinates of the search."""
         if self.points < 2:
-            return 1.0 if self.whole else 0.0
+            return 0.5 * (self.inner(self.high) - self.inner(self.low))
         return (self.inner(self.high) - self.inner(self.low)) / (self.points - 1)
 
 
@@ -120,9 +121,7 @@ class Candidate(ABC):
         """Return values for coordinates of the search, both of shape (G, axes)."""
         if not self.axes:
             return coordinates
-        return np.stack(
-            [axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1
-        )
+        return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
 
     @property
     def name(self) -> str:

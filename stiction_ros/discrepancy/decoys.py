@@ -18,9 +18,7 @@ LAGS = (0.0, 2.0, 6.0, 18.0)  # samples
 class _Decoy(OutputCandidate):
     inside = False
 
-    def behaviour(
-        self, run: FreeRun, point: FloatArray, factors: FloatArray
-    ) -> Behaviour | None:
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
         return None
 
 

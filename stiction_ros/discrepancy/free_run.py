@@ -18,6 +18,7 @@ from stiction_ros.records import Record
 HELD_SHARE = 4
 BLOCKS = 24
 SHORTEST_BLOCK = 20
+DETERMINED = ("freeze", "clip", "quantisation")  # shown by the values of PV themselves
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,4 +187,16 @@ class FreeRun:
                 elif disturbance.place not in self.model.outputs:
                     response = self.responses.load(output, disturbance.place, wave[:, None])
                     added[rows] += 0.0 if response is None else response[:, 0]
+            added[rows] += self._sensed(output, self.forced[rows, output] + added[rows])
         return added
+
+    def _sensed(self, output: int, values: FloatArray) -> FloatArray:
+        """Return what the sensor's linear and additive effects change, shape (N,).
+
+        Frozen, clipped and rounded values are left out of scoring or count as noise.
+        """
+        shown = values
+        for effect in self.model.sensors[output]:
+            if effect.effect not in DETERMINED:
+                shown = effect.simulate(shown, float(shown[0]), self.runs.sample_time)
+        return np.asarray(shown - values)

@@ -110,9 +110,7 @@ def fit_noise(
     return _result(target - columns @ best[1], best[1], best[2], blocks)
 
 
-def _result(
-    residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks
-) -> NoiseFit:
+def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:
     innovations = whiten(residual, ar)
     inside, outside = innovations[blocks.train], innovations[blocks.held]
     rows, held = len(inside), len(outside)
@@ -139,7 +137,8 @@ def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
     lagged = lagged[rows]
     gram = lagged.T @ lagged
     count = max(len(lagged), 2)
-    best, best_score = np.zeros(0), count * math.log(max(gram[0, 0], _TINY))
+    best: FloatArray = np.zeros(0)
+    best_score = count * math.log(max(gram[0, 0], _TINY))
     for order in range(1, MAX_ORDER + 1):
         inner = slice(1, order + 1)
         ridge = 1e-12 * float(np.trace(gram)) * np.eye(order)

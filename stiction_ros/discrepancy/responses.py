@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from scipy.signal import lfilter
 
-from stiction_ros.effects import FloatArray
-from stiction_ros.processes import ArxProcess, LinearModel, Process, StirredTank
+from stiction_ros.effects import Filter, FloatArray, LinearFilter
+from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank
 
 
 class Responses(ABC):
@@ -140,8 +140,47 @@ class TankResponses(Responses):
         return None
 
 
+class AlteredResponses(Responses):
+    """Another process's responses behind the linear effects on its outputs."""
+
+    def __init__(self, process: AlteredProcess, sample_time: float) -> None:
+        """Take the process without its effects, and these as filters."""
+        self._inner = responses_of(process.inner, sample_time)
+        self.skip = self._inner.skip
+        self._filters = [
+            [_of_filter(e.filter(sample_time)) for e in chain if isinstance(e, LinearFilter)]
+            for chain in process.effects
+        ]
+
+    def _pass(self, output: int, values: FloatArray) -> FloatArray:
+        for numerator, denominator in self._filters[output]:
+            values = lfilter(numerator, denominator, values, axis=0)
+        return values
+
+    def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        inner = self._inner.forced(output, stems)
+        return self._pass(output, inner - inner[:1])
+
+    def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        columns = [self._pass(output, self._inner.free(output, stems))]
+        impulse = np.eye(len(stems[0]), 1)
+        for numerator, denominator in self._filters[output]:
+            for lag in range(min(len(denominator) - 1, 2)):
+                columns.append(lfilter([1.0], denominator, np.roll(impulse, lag, axis=0), axis=0))
+            if len(denominator) == 1 and len(numerator) > 1:
+                columns.append(np.eye(len(impulse), min(len(numerator) - 1, 2)))
+        columns.append(np.ones((len(impulse), 1)))
+        return np.hstack(columns)
+
+    def load(self, output: int, upset: str, values: FloatArray) -> FloatArray | None:
+        inner = self._inner.load(output, upset, values)
+        return None if inner is None else self._pass(output, inner)
+
+
 def responses_of(process: Process, sample_time: float) -> Responses:
     """Return the responses of a process."""
+    if isinstance(process, AlteredProcess):
+        return AlteredResponses(process, sample_time)
     if isinstance(process, StirredTank):
         return TankResponses(process)
     return LinearResponses(process, sample_time)
@@ -185,3 +224,17 @@ def _state_starts(model: LinearModel, denominator: FloatArray, output: int) -> l
         row = row @ model.a
     responses = np.array(rows).reshape(model.order, model.order)
     return [np.convolve(denominator, responses[:, i])[: model.order] for i in range(model.order)]
+
+
+def _of_filter(entry: Filter) -> tuple[FloatArray, FloatArray]:
+    """Return numerator and denominator in powers of q⁻¹, common zeros at the end cut off."""
+    size = len(entry.b)
+    denominator = np.real(np.poly(entry.a)) if size else np.ones(1)
+    impulse, state = [entry.d], entry.b
+    for _ in range(size):
+        impulse.append(float(entry.c @ state))
+        state = entry.a @ state
+    numerator = np.convolve(denominator, impulse)[: size + 1]
+    while len(denominator) > 1 and denominator[-1] == 0.0:
+        denominator = denominator[:-1]
+    return np.asarray(numerator), np.asarray(denominator)

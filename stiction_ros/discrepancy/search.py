@@ -13,8 +13,10 @@ from stiction_ros.discrepancy.free_run import FreeRun
 from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, projector, whiten
 from stiction_ros.effects import Behaviour, FloatArray
 
-LEADERS = 3
-STARTS = 3
+LEADERS = 4
+STARTS = 4
+MOST = 200
+SLOW = np.array([0.8])
 SHRINK = 0.4
 ROUNDS = 5
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -122,12 +124,13 @@ class _Search:
         guesses: list[Mapping[int, FloatArray]] = [
             {i: self.base.noise[i].ar for i in response.outputs},
             {i: np.zeros(0) for i in response.outputs},
+            dict.fromkeys(response.outputs, SLOW),
         ]
         leaders: dict[int, float] = {}
         for _ in range(3):
             for ar in guesses:
-                misfit = _misfit(self.base, self.gap, response, ar)
-                for point in np.argsort(misfit)[:LEADERS].tolist():
+                squares = misfit(self.base, self.gap, response, ar)
+                for point in self._apart(grid, squares):
                     if point not in leaders:
                         fit = self._judge(grid[point], values[point], response.pick(point))
                         leaders[point] = fit.delta_bic
@@ -135,6 +138,20 @@ class _Search:
             guesses = [{i: fit.ar for i, fit in best.noise.items()}]
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
+
+    def _apart(self, grid: FloatArray, squares: FloatArray) -> list[int]:
+        """Return the best points of a grid that are no neighbours of each other."""
+        steps = np.array([max(axis.step, _TINY) for axis in self.candidate.axes])
+        chosen: list[int] = []
+        for point in np.argsort(squares)[:MOST].tolist():
+            near = [
+                np.abs((grid[point] - grid[other]) / steps).max(initial=0.0) for other in chosen
+            ]
+            if all(distance > 1.5 for distance in near):
+                chosen.append(point)
+            if len(chosen) == LEADERS:
+                break
+        return chosen
 
     def refine(self, centre: FloatArray, size: float) -> None:
         """Search smaller and smaller grids around a point."""
@@ -166,9 +183,11 @@ class _Search:
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)
         noise = self.base.noise if like is None else like.noise
-        ar = {i: (noise[i] if like is None or i in like.noise else self.base.noise[i]).ar
-              for i in response.outputs}
-        best = int(np.argmin(_misfit(self.base, self.gap, response, ar)))
+        ar = {
+            i: (noise[i] if like is None or i in like.noise else self.base.noise[i]).ar
+            for i in response.outputs
+        }
+        best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
         return coordinates[best], self._judge(coordinates[best], values[best], response.pick(best))
 
     def _judge(
@@ -186,15 +205,15 @@ class _Search:
             columns = shared
             if i in response.sizes:
                 columns = np.hstack([response.sizes[i][:, 0], shared])
-            fit = fit_noise(target, columns, self.base.blocks[i])
-            other = fit_noise(target, columns, self.base.blocks[i], self.base.noise[i].ar)
-            fit = min(fit, other, key=lambda each: each.bic(0))
+            white = fit_noise(target, columns, self.base.blocks[i])
+            coloured = fit_noise(target, columns, self.base.blocks[i], self.base.noise[i].ar)
+            left = min(white, coloured, key=lambda each: each.bic(0))
             if i in response.sizes:
-                factors = fit.coefficients[: response.sizes[i].shape[2]]
-            noise[i] = fit
-            gained += self.base.noise[i].bic(0) - fit.bic(0)
-            held += self.base.noise[i].held_minus_two_log - fit.held_minus_two_log
-            energy += _energy(response, i, factors, fit, self.base)
+                factors = left.coefficients[: response.sizes[i].shape[2]]
+            noise[i] = left
+            gained += self.base.noise[i].bic(0) - left.bic(0)
+            held += self.base.noise[i].held_minus_two_log - left.held_minus_two_log
+            energy += _energy(response, i, factors, left, self.base)
         fit = CandidateFit(self.candidate, values, factors, noise, gained, held, energy)
         self.judged[key] = fit
         if self.found is None or gained > self.found.delta_bic:
@@ -206,7 +225,7 @@ class _Search:
         return float(np.log(max(rows, 2)))
 
 
-def _misfit(
+def misfit(
     base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
 ) -> FloatArray:
     """Return Σ n log(sum of squared innovations) for every point of a grid under given φ."""
