@@ -146,7 +146,7 @@ def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
         left = float(gram[0, 0] - phi @ gram[inner, 0])
         score = count * math.log(max(left, _TINY)) + order * math.log(count)
         if score < best_score:
-            best, best_score = phi, score
+            best, best_score = np.asarray(phi, dtype=np.float64), score
     return best
 
 

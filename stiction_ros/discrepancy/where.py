@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.discrepancy.noise import BoolArray, projector, whiten
+from stiction_ros.discrepancy.noise import BoolArray, projector
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 
@@ -168,13 +168,15 @@ def _hats(base: Baseline) -> FloatArray:
 
 
 def _track(base: Baseline, output: int, place: str, hats: FloatArray, columns: FloatArray) -> Track:
-    """Return the smooth wave at a place by penalised least squares, its weight by likelihood."""
-    noise, train = base.noise[output], base.blocks[output].train
-    basis = projector(whiten(base.columns[output], noise.ar)[train])
-    target = whiten(noise.residual, noise.ar)[train]
+    """Return the smooth wave at a place by penalised least squares, its weight by AIC.
+
+    What is left counts as white: the noise model would take the slow part of the gap for noise.
+    """
+    train = base.blocks[output].train
+    basis = projector(base.columns[output][train])
+    target = base.run.gap[train, output]
     target = target - basis @ (basis.T @ target)
-    inner = whiten(columns, noise.ar)[train]
-    inner = inner - basis @ (basis.T @ inner)
+    inner = columns[train] - basis @ (basis.T @ columns[train])
     gram, cross = inner.T @ inner, inner.T @ target
     rough = np.diff(np.eye(columns.shape[1]), axis=0)
     penalty = rough.T @ rough
@@ -186,7 +188,7 @@ def _track(base: Baseline, output: int, place: str, hats: FloatArray, columns: F
         beta = np.linalg.solve(held, cross)
         left = max(float(np.sum((target - inner @ beta) ** 2)), 1e-300)
         freedom = float(np.trace(np.linalg.solve(held, gram)))
-        gain = rows * float(np.log(before / left)) - np.log(max(rows, 2)) * freedom
+        gain = rows * float(np.log(before / left)) - 2.0 * freedom
         if gain > best:
             best, wave = gain, hats @ beta
     return Track(place, wave, best, _follows(base, output, wave))
