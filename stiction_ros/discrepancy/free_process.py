@@ -18,7 +18,7 @@ from stiction_ros.loop import LoopModel
 
 COARSE_ROUNDS = 3
 TURNS = 2
-SPARSE = {"stiction": (7, 3, 1), "backlash": (8,), "slew": (7,), "saturation": (4, 4)}
+SPARSE = {"stiction": (9, 4, 1), "backlash": (9,), "slew": (7,), "saturation": (4, 4)}
 # What another process would do as well cannot be told while the process is free.
 ABSORBED = ("lag", "pole", "delay", "gain", "leak", "other dynamics")
 
@@ -118,16 +118,11 @@ def _starts(candidate: Candidate, first: CandidateFit) -> list[FloatArray]:
     if counts is None:
         return [first.point]
     sparse = [
-        np.array(
-            [
-                axis.inner(axis.low) + share * (axis.inner(axis.high) - axis.inner(axis.low))
-                for share in (np.arange(n) + 0.5) / n
-            ]
-        )
+        axis.low + (axis.high - axis.low) * (np.arange(n) + 0.5) / n
         for axis, n in zip(candidate.axes, counts, strict=True)
     ]
     mesh = np.stack([m.ravel() for m in np.meshgrid(*sparse, indexing="ij")], axis=1)
-    return [first.point, *candidate.values(mesh)]
+    return [first.point, *mesh]
 
 
 def _behind(
