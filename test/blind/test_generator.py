@@ -43,9 +43,7 @@ def test_nothing_that_is_hidden_can_be_seen(family: str, seed: int) -> None:
     outputs = document["process"]["outputs"]
     assert all(not valve["effects"] for valve in document["valves"])
     assert not {"disturbances", "sensors", "provenance"} & document.keys()
-    assert not any(
-        {"effects", "noise"} & output.keys() for output in document["process"]["outputs"]
-    )
+    assert not any({"effects", "noise"} & output.keys() for output in outputs)
     assert seen.record.stem is None
     assert not seen.record.notes
     assert truth.cause not in (seen.record.name, seen.model.name)
