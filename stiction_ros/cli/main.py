@@ -18,6 +18,7 @@ from stiction_ros.cli import (
     example,
     experiment,
     fit_linear,
+    gap,
     identify,
     report,
     study,
@@ -26,7 +27,7 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (demo, identify, fit_linear, example, experiment, report, study, bench)
+COMMANDS = (demo, identify, fit_linear, gap, example, experiment, report, study, bench)
 
 
 def parser() -> argparse.ArgumentParser:
