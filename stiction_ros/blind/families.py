@@ -5,6 +5,8 @@ from __future__ import annotations
 from stiction_ros.loop import LoopModel
 
 Name = tuple[str, str]  # place and effect
+# What the values of PV, or OP recomputed from them, show without any free run.
+SHOWN_BY_DATA = ("freeze", "clip", "quantisation", "tuning", "time_shift")
 _NOTHING = 1e-6
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.blind.families import Name, family_of
+from stiction_ros.blind.families import SHOWN_BY_DATA, Name, family_of
 from stiction_ros.blind.truth import Truth
 from stiction_ros.loop import LoopModel
 
@@ -63,7 +63,7 @@ class Scored:
         testable: whether every hidden effect beats no effect by the margin.
         score: see :class:`Score`.
         said: for the matrix: an effect with its kind of place, or the verdict.
-        closed: share of the held-out excess that is gone; NaN where nothing was added.
+        closed: share of the held-out excess that is gone; NaN where no effect was fitted.
         covered: per parameter of a hidden effect that was found, whether its interval holds it.
         seconds: of the workflow.
     """
@@ -126,7 +126,7 @@ def score(
     """
     claims = claims_of(answer)
     families = {name: family_of(name, model) for name in truth.names}
-    after = answer["gap"]["closed"]
+    fitted = any(effect not in SHOWN_BY_DATA for claim in claims for _, effect in claim.names)
     return Scored(
         truth.family,
         truth.seed,
@@ -135,7 +135,7 @@ def score(
         bool(truth.hidden) and all(gains.get(name, -math.inf) >= 0.0 for name in truth.names),
         _score(claims, families, str(answer["verdict"])),
         _said(claims, families, str(answer["verdict"])),
-        float(after) if claims and after is not None else math.nan,
+        float(answer["gap"]["closed"]) if fitted else math.nan,
         _covered(truth, claims),
         float(answer["seconds"]),
     )

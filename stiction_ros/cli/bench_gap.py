@@ -15,7 +15,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.blind.families import Name
+from stiction_ros.blind.families import SHOWN_BY_DATA, Name
 from stiction_ros.blind.generator import blind_loop, write_blind_loop
 from stiction_ros.blind.scoring import Scored, score
 from stiction_ros.blind.tally import Rate, coverage, matrix, median_closed, rates, report
@@ -28,7 +28,6 @@ from stiction_ros.errors import InputError
 FIRST_SEED = 10_000  # seeds below 1000 are for tuning
 LOOPS = 20
 LOG = "bench_gap.jsonl"
-SHOWN_BY_DATA = ("freeze", "clip", "quantisation", "tuning", "time_shift")
 
 
 @dataclasses.dataclass(frozen=True)

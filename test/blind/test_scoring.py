@@ -181,6 +181,12 @@ def test_a_delay_is_a_shifted_clock_where_no_tuning_is_known() -> None:
     assert family_of(delay, LoopModel.from_mapping(known)) == {delay}
 
 
+def test_what_the_data_show_closes_no_gap() -> None:
+    frozen = answer("named", effect(("sensor:PV1", "freeze")), closed=0.0)
+    assert math.isnan(judged(FRICTION, frozen).closed)
+    assert judged(FRICTION, answer("named", effect(GAIN), closed=0.0)).closed == 0.0
+
+
 def test_a_row_survives_json() -> None:
     row = judged(FRICTION, answer("named", effect(STICTION, f_s=(4.0, 6.0))))
     assert Scored.from_mapping(row.to_mapping()) == row
