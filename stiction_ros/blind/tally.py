@@ -12,8 +12,6 @@ import numpy as np
 
 from stiction_ros.blind.scoring import Score, Scored
 
-_HELD = (Score.RIGHT, Score.PART, Score.DOUBT, Score.LOST)
-
 
 @dataclasses.dataclass(frozen=True)
 class Rate:
@@ -44,7 +42,7 @@ def rates(rows: Sequence[Scored]) -> list[Rate]:
     healthy = [row for row in single if row.cause == "none"]
     if single:
         testable = [row for row in hidden if row.testable]
-        sets = [row for row in hidden if row.said and _ambiguous(row)]
+        sets = [row for row in hidden if _ambiguous(row)]
         found += [
             _rate("wrong name", hidden, (Score.WRONG,), "<= 0.03"),
             _rate("false alarm, healthy", healthy, (Score.WRONG, Score.ALARM), "<= 0.02"),
@@ -59,9 +57,10 @@ def rates(rows: Sequence[Scored]) -> list[Rate]:
         found.append(_rate("false alarm, tight", tight, (Score.WRONG, Score.ALARM), "<= 0.02"))
     two = [row for row in rows if row.family == "two"]
     if two:
+        testable = [row for row in two if row.testable]
         found += [
-            _rate("two: both", two, (Score.RIGHT,), ">= 0.6"),
-            _rate("two: one", two, (Score.PART,)),
+            _rate("two: both among testable", testable, (Score.RIGHT,), ">= 0.6"),
+            _rate("two: one among testable", testable, (Score.PART,)),
             _rate("two: a wrong one", two, (Score.WRONG,), "<= 0.05"),
         ]
     outside = [row for row in rows if row.family == "outside"]

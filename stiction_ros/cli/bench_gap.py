@@ -15,14 +15,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.blind.families import SHOWN_BY_DATA, Name
 from stiction_ros.blind.generator import blind_loop, write_blind_loop
 from stiction_ros.blind.scoring import Scored, score
 from stiction_ros.blind.tally import Rate, coverage, matrix, median_closed, rates, report
-from stiction_ros.blind.truth import FAMILIES, Truth
+from stiction_ros.blind.testable import gains_beyond_margin
+from stiction_ros.blind.truth import FAMILIES
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
-from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
+from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.errors import InputError
 
 FIRST_SEED = 10_000  # seeds below 1000 are for tuning
@@ -112,23 +112,7 @@ def judge(family: str, seed: int, full: bool) -> Scored:
     """Run the workflow on one blind loop and compare; it sees model and record alone."""
     seen, truth = blind_loop(seed, family)
     found = find_discrepancy(seen.model, [seen.record], GapOptions(quick=not full))
-    return score(truth, seen.model, found.to_json(), gains(truth, found))
-
-
-def gains(truth: Truth, found: Discrepancy) -> dict[Name, float]:
-    """Return by how much each hidden effect, fitted, beats no effect beyond the margin.
-
-    What the values of PV or the recorded tuning show needs no fit and counts as testable.
-    """
-    values: dict[Name, float] = {}
-    for entry in truth.hidden:
-        if entry.behaviour.effect in SHOWN_BY_DATA:
-            values[entry.name] = math.inf
-            continue
-        fits = [look.scores.of(*entry.name) for look in found.looks]
-        best = max((fit.delta_bic for fit in fits if fit is not None), default=-math.inf)
-        values[entry.name] = best - GapOptions().margin
-    return values
+    return score(truth, seen.model, found.to_json(), gains_beyond_margin(seen, truth))
 
 
 def judge_all(
