@@ -12,12 +12,23 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli import bench_graph, bench_identification
+from stiction_ros.cli import bench_gap, bench_graph, bench_identification
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.errors import InputError
 
+IDENTIFICATION_ONLY: tuple[str, ...] = ("repeat", "seed", "longest", "quick")
+GAP_ONLY: tuple[str, ...] = (
+    "family",
+    "first",
+    "loops",
+    "full",
+    "jobs",
+    "log",
+    "resume",
+    "write",
+)
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
 
@@ -26,11 +37,11 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "bench",
         help="measure speed, side by side",
-        description="Measure speed against a baseline in the same run. Benchmarks: "
-        + ", ".join(BENCHMARKS),
+        description="Measure speed against a baseline in the same run (graph, identification), "
+        "or count how often the discrepancy workflow is right (gap).",
     )
     parser.add_argument(
-        "name", nargs="?", default="graph", choices=tuple(BENCHMARKS), help="default: graph"
+        "name", nargs="?", default="graph", choices=(*BENCHMARKS, "gap"), help="default: graph"
     )
     group = parser.add_argument_group("identification")
     group.add_argument(
@@ -49,12 +60,24 @@ def add(commands: Any) -> None:
         default=None,
         help="fewer delays, one start, coarser grids, records up to 10000 samples",
     )
+    bench_gap.add_options(parser)
     parser.add_argument("--json", metavar="F", help="write the rows as JSON; - for stdout")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    others = IDENTIFICATION_ONLY if options.name != "identification" else ()
+    others += GAP_ONLY if options.name != "gap" else ()
+    for key in others:
+        if getattr(options, key) is not None:
+            raise InputError(
+                f"benchmark {options.name} has no such option",
+                where=f"--{key}",
+                fix="leave it out, or measure another",
+            )
+    if options.name == "gap":
+        return bench_gap.run(options)
     with bar(f"bench {options.name}") as show:
         rows = BENCHMARKS[options.name](options, show)
     if options.json is not None:
@@ -79,13 +102,6 @@ def machine() -> str:
 
 
 def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
-    for key in ("repeat", "seed", "longest", "quick"):
-        if getattr(options, key) is not None:
-            raise InputError(
-                "benchmark graph has no such option",
-                where=f"--{key}",
-                fix="leave it out, or measure identification",
-            )
     return bench_graph.graph(show)
 
 

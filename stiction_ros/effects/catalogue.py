@@ -29,16 +29,16 @@ An effect acts at a place, `KIND:TAG`, and stands there in the loop model:
 | place | in the YAML | the signal it acts on |
 |---|---|---|
 | `valve:V1` | `valves: [{name: V1, effects: [...]}]` | OP in %, to the stem |
-| `process:PV1` | `process: {outputs: [{name: PV1, effects: [...]}]}` | output less its operating point |
+| `process:PV1` | `process: {outputs: [{name: PV1, effects: [...]}]}` | output less `pv0` |
 | `disturbance:PV1` | `disturbances: [{output: PV1, effect: ...}]` | 0, added to PV |
 | `sensor:PV1` | `sensors: [{name: PV1, effects: [...]}]` | PV with its noise |
 | `data` | none; a wrong tuning is mended in `controller:` | the record |
 
-Effects on a process act on its output without noise, whatever its kind. A disturbance may also
-name a further input of the process instead of an output, `input: F_B`. A sensor takes PV with
-its noise. Effects of one place stand in signal order. `time` counts seconds since the first
-sample, and `signal` is the unit of the signal. The laws of stiction are compared in
-[friction.md](friction.md).
+Effects on a process act on its output without noise, whatever its kind, less the operating
+point `pv0`. A disturbance may also name a further input of the process instead of an output,
+`input: F_B`. A sensor takes PV with its noise. Effects of one place stand in signal order.
+`time` counts seconds since the first sample, and `signal` is the unit of the signal. The laws
+of stiction are compared in [friction.md](friction.md).
 
 *Minimum data* is what a record must hold to tell the size. *Confusable with* names what leaves
 nearly the same traces in OP and PV.
