@@ -88,6 +88,7 @@ class Candidate(ABC):
         axes: of the figures that are searched; may be empty.
         factors: number of figures that least squares finds.
         twins: places and effects that no record of OP and PV tells from this one.
+        dated: whether its first axis is a moment of the record.
         inside: whether it belongs to the catalogue; others show only that something is amiss.
     """
 
@@ -97,6 +98,7 @@ class Candidate(ABC):
     factors: int = 0
     twins: tuple[tuple[str, str], ...] = ()
     inside: bool = True
+    dated: bool = False
 
     @abstractmethod
     def respond(self, run: FreeRun, points: FloatArray) -> Response:

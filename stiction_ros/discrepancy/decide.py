@@ -10,6 +10,7 @@ from stiction_ros.discrepancy.search import CandidateFit
 
 JUMP_SURE = 6.0  # BIC by which a jump is there
 JUMP_ABSENT = 3.0  # BIC by which it is not
+CLEAR = 40.0  # BIC below which friction is told, but not of which kind
 FRICTION = ("stiction", "backlash")
 LAGS = ("lag", "pole")
 SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
@@ -76,7 +77,7 @@ def decide(fits: Sequence[CandidateFit], margin: float, threshold: float) -> Dec
     best = kept[0]
     if stranger is not None and stranger.delta_bic > best.delta_bic:
         return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
-    best, family = _family(best, kept)
+    best, family = _family(best, ranked)
     rivals = [
         f
         for f in passed
@@ -131,17 +132,20 @@ def _same_family(one: CandidateFit, other: CandidateFit) -> bool:
 
 
 def _family(
-    best: CandidateFit, kept: Sequence[CandidateFit]
+    best: CandidateFit, ranked: Sequence[CandidateFit]
 ) -> tuple[CandidateFit, tuple[tuple[str, str], ...]]:
     """Return stiction or backlash by the test of the jump, and the other one in doubt."""
     if best.candidate.effect not in FRICTION:
         return best, ()
-    rivals = [f for f in kept if _same_family(f, best)]
+    rivals = [f for f in ranked if _same_family(f, best) and f.delta_bic > 0.0]
     jumping = [f for f in rivals if f.candidate.effect == "stiction"]
     plain = [f for f in rivals if f.candidate.effect == "backlash"]
     if not jumping or not plain:
         return best, ()
     jump = jumping[0].delta_bic - plain[0].delta_bic
+    if best.delta_bic < CLEAR:  # too little to tell whether there is a jump
+        other = jumping[0] if best.candidate.effect == "backlash" else plain[0]
+        return best, (_name(other),)
     if jump > JUMP_SURE:
         return jumping[0], ()
     if jump < -JUMP_ABSENT:

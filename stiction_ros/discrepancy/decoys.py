@@ -26,6 +26,7 @@ class GainChange(_Decoy):
     """A process whose gain changes at one moment."""
 
     factors = 2
+    dated = True
 
     def __init__(self, run: FreeRun, output: int) -> None:
         """Take the output's index."""

@@ -78,6 +78,7 @@ class StepCandidate(OutputCandidate):
     """A step of PV at one moment."""
 
     factors = 1
+    dated = True
 
     def __init__(self, run: FreeRun, output: int) -> None:
         """Take the output's index."""

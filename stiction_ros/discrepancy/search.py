@@ -15,6 +15,8 @@ from stiction_ros.effects import Behaviour, FloatArray
 
 LEADERS = 4
 STARTS = 4
+MOMENTS = 241
+REACH = 4.0  # points of the first grid, wider than a held-out block
 MOST = 200
 SLOW = np.array([0.8])
 SHRINK = 0.4
@@ -105,7 +107,27 @@ def fit_candidate(
         centres = [np.array(inner)]
     for centre in centres:
         search.refine(centre, 0.7)
+    if candidate.dated:
+        return _dated(search)
     return search.best()
+
+
+def _dated(search: _Search) -> CandidateFit:
+    """Return the best fit with its moment found on all rows, the held-out ones included.
+
+    A moment within a held-out block leaves no other trace than before and after it.
+    """
+    base, found = search.base, search.best()
+    every = tuple(Blocks(b.train | b.held, np.zeros_like(b.held)) for b in base.blocks)
+    whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
+    axis = search.candidate.axes[0]
+    centre, reach = axis.inner(float(found.point[0])), REACH * axis.step
+    coordinates = np.linspace(centre - reach, centre + reach, MOMENTS)[:, None]
+    values = search.candidate.values(coordinates)
+    response = search.candidate.respond(base.run, values)
+    best = whole.best_of(values, response, [found.noise, base.noise])
+    other = search.judge(best, search.candidate.respond(base.run, best[None, :]))
+    return max(found, other, key=lambda fit: fit.delta_bic + fit.held_gain)
 
 
 class _Search:
@@ -132,7 +154,7 @@ class _Search:
                 squares = misfit(self.base, self.gap, response, ar)
                 for point in self._apart(grid, squares):
                     if point not in leaders:
-                        fit = self._judge(grid[point], values[point], response.pick(point))
+                        fit = self.judge(values[point], response.pick(point))
                         leaders[point] = fit.delta_bic
             best = self.best()
             guesses = [{i: fit.ar for i, fit in best.noise.items()}]
@@ -176,6 +198,20 @@ class _Search:
         assert self.found is not None
         return self.found
 
+    def best_of(
+        self,
+        values: FloatArray,
+        response: Response,
+        guesses: Sequence[Mapping[int, NoiseFit] | Sequence[NoiseFit]],
+    ) -> FloatArray:
+        """Return the best of several points, each the best one under one guess of the noise."""
+        fits = []
+        for noise in guesses:
+            ar = {i: noise[i].ar for i in response.outputs}
+            best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+            fits.append(self.judge(values[best], response.pick(best)))
+        return max(fits, key=lambda fit: fit.delta_bic).point
+
     def _try(
         self, coordinates: FloatArray, like: CandidateFit | None = None
     ) -> tuple[FloatArray, CandidateFit]:
@@ -188,11 +224,10 @@ class _Search:
             for i in response.outputs
         }
         best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
-        return coordinates[best], self._judge(coordinates[best], values[best], response.pick(best))
+        return coordinates[best], self.judge(values[best], response.pick(best))
 
-    def _judge(
-        self, coordinates: FloatArray, values: FloatArray, response: Response
-    ) -> CandidateFit:
+    def judge(self, values: FloatArray, response: Response) -> CandidateFit:
+        """Return the exact fit at one point of the search; the best one is remembered."""
         key = tuple(values.tolist())
         if key in self.judged:
             return self.judged[key]

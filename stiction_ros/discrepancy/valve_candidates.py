@@ -117,11 +117,13 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     fastest = max(float(moves.max()), 1e-9) / step
     low, high = float(op.min()), float(op.max())
     lower, upper = np.quantile(op, [0.6, 0.4]).tolist()
-    friction = Axis(0.01 * span, LARGEST * span, 90, logarithmic=True)
-    axes = (friction, Axis(0.0, 1.0, 11), Axis(-1.0, 1.0, 1))
+    # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
+    fine = (Axis(0.01 * span, LARGEST * span, 160, logarithmic=True), Axis(0.0, 1.0, 17))
+    rough = (Axis(0.01 * span, LARGEST * span, 50, logarithmic=True), Axis(0.0, 1.0, 9))
+    start = Axis(-1.0, 1.0, 1)
     return [
-        StictionCandidate(run, j, HeStiction, axes),
-        StictionCandidate(run, j, XchStiction, axes),
+        StictionCandidate(run, j, HeStiction, (*fine, start)),
+        StictionCandidate(run, j, XchStiction, (*rough, start)),
         ValveCandidate(run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True),)),
         ValveCandidate(
             run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
