@@ -62,17 +62,19 @@ def test_the_given_model_is_handed_back_unchanged(sticky: Discrepancy) -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "effect"),
-    [
-        ("process:PV1", ProcessGain(1.3)),
-        ("process:PV1", ExtraDelay(4.0)),
-        ("valve:V1", Backlash(4.0)),
-    ],
+    ("place", "effect"), [("process:PV1", ProcessGain(1.3)), ("process:PV1", ExtraDelay(4.0))]
 )
 def test_one_effect_is_named(place: str, effect: Behaviour) -> None:
     answer = found(place, effect)
     assert [(e.place, e.effect) for e in answer.effects] == [(place, effect.effect)]
     assert answer.verdict is GapVerdict.NAMED
+
+
+def test_backlash_is_told_from_all_but_stiction() -> None:
+    answer = found("valve:V1", Backlash(4.0))
+    names = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
+    assert ("valve:V1", "backlash") in names
+    assert names <= {("valve:V1", "backlash"), ("valve:V1", "stiction")}
 
 
 def test_lags_are_left_in_doubt_with_their_family() -> None:
