@@ -125,6 +125,10 @@ class Candidate(ABC):
             return coordinates
         return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
 
+    def lead(self, point: FloatArray) -> float:
+        """Return how far from OP a stem stands before the first sample, %."""
+        return 0.0
+
     @property
     def name(self) -> str:
         """Name for people, such as ``valve:V1 stiction``."""

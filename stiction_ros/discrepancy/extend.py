@@ -86,9 +86,9 @@ def extend(
         effects = [_refit(bare, runs, effects, k) for k in range(len(effects))]
     worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
     model = with_effects(bare, worth)
-    after_base = Baseline.of(FreeRun(model, runs))
+    after_base = Baseline.of(run_with(bare, runs, worth))
     after = measure_gap(after_base)
-    trouble = _trouble(base, after_base, before, after)
+    trouble = _trouble(base, after_base, before, after) or _stem_trouble(base, after_base)
     if trouble:
         kept = tuple(added)
         return Extension(with_effects(bare, kept), kept, base, before, before, False, trouble)
@@ -103,10 +103,20 @@ def with_effects(model: LoopModel, effects: Sequence[AddedEffect], **provenance:
     return model
 
 
+def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> FreeRun:
+    """Return the free run with effects, every sticky stem starting where the fit puts it."""
+    leads: dict[str, float] = {}
+    for effect in effects:
+        kind, _, tag = effect.place.partition(":")
+        if kind == "valve":
+            leads[tag] = effect.fit.candidate.lead(effect.fit.point)
+    return FreeRun(with_effects(bare, effects), runs, leads)
+
+
 def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
     """Return effect k fitted again behind all others."""
     others = effects[:k] + effects[k + 1 :]
-    base = Baseline.of(FreeRun(with_effects(bare, others), runs))
+    base = Baseline.of(run_with(bare, runs, others))
     candidate = same_candidate(all_candidates(base), effects[k].fit.candidate)
     if candidate is None:
         return effects[k]
@@ -145,4 +155,19 @@ def _trouble(
     new = np.array([g.free_run_rmse / u for g, u in zip(after, unit, strict=True)])
     if float(np.sum(new**2)) > GROWTH * float(np.sum(old**2)):
         return "the free run of the held-out rows does not come nearer to PV"
+    return ""
+
+
+def _stem_trouble(base: Baseline, after_base: Baseline) -> str:
+    """Return where the measured stems contradict the effect; empty where they do not."""
+    for j, valve in enumerate(base.run.model.valve_names):
+        old = new = 0.0
+        for record, rows in zip(base.run.runs.records, base.run.runs.slices, strict=True):
+            if record.stem is None:
+                continue
+            stem = record.stem[:, record.valves.index(valve)]
+            old += float(np.sum((base.run.stems[rows, j] - stem) ** 2))
+            new += float(np.sum((after_base.run.stems[rows, j] - stem) ** 2))
+        if new > old:
+            return f"the measured stem of {valve} is further from that effect than without it"
     return ""

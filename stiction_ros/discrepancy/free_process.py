@@ -17,7 +17,8 @@ from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 
 COARSE_ROUNDS = 3
-TURNS = 2
+TURNS = 3
+WIDE = 4  # starts behind which all figures are searched again
 SPARSE = {"stiction": (9, 4, 1), "backlash": (9,), "slew": (7,), "saturation": (4, 4)}
 # What another process would do as well cannot be told while the process is free.
 ABSORBED = ("lag", "pole", "delay", "gain", "leak", "other dynamics")
@@ -98,14 +99,20 @@ def _fit(
     if not candidate.inside:
         return first, model
     best = first, model
+    tried = []
     for point in _starts(candidate, first):
         own, behind = _behind(model, runs, base, first, point)
         found = _rescored(behind, runs, base, candidate, own)
-        if found is not None and found.delta_bic > best[0].delta_bic:
-            best = found, behind
+        if found is not None:
+            tried.append((found, behind))
+    tried.sort(key=lambda each: -each[0].delta_bic)
+    for _, behind in tried[:WIDE]:
+        found = _rescored(behind, runs, base, candidate, None)
+        tried += [] if found is None else [(found, behind)]
+    best = max([best, *tried], key=lambda each: each[0].delta_bic)
     for _ in range(TURNS):
         own, behind = _behind(best[1], runs, base, best[0], best[0].point, 8)
-        found = _rescored(behind, runs, base, candidate, own)
+        found = _rescored(behind, runs, base, candidate, None)
         if found is None or found.delta_bic <= best[0].delta_bic + 0.1:
             break
         best = found, behind
@@ -146,14 +153,19 @@ def _behind(
 
 
 def _rescored(
-    model: LoopModel, runs: Runs, base: Baseline, candidate: Candidate, point: FloatArray
+    model: LoopModel, runs: Runs, base: Baseline, candidate: Candidate, point: FloatArray | None
 ) -> CandidateFit | None:
-    """Return the candidate's best fit near a point behind a refitted process, against ``base``."""
+    """Return the candidate's best fit behind a refitted process, against ``base``.
+
+    With a ``point`` only figures near it are searched.
+    """
     other = Baseline.of(FreeRun(model, runs))
     same = same_candidate(all_candidates(other), candidate)
     if same is None:
         return None
-    fit = fit_candidate(other, other.run.gap, same, point if len(point) else None)
+    fit = fit_candidate(
+        other, other.run.gap, same, point if point is not None and len(point) else None
+    )
     # The price of the process is paid by both; its worth behind this candidate is not.
     shift = other.bic - base.bic
     held = sum(

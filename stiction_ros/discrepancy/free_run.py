@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -107,13 +107,21 @@ class FreeRun:
         free: per output the free columns, shape (N, q).
     """
 
-    def __init__(self, model: LoopModel, runs: Runs) -> None:
+    def __init__(
+        self, model: LoopModel, runs: Runs, leads: Mapping[str, float] | None = None
+    ) -> None:
         """Run the model once.
+
+        Args:
+            model: what runs.
+            runs: over what.
+            leads: of valves whose last effect starts with its stem that far from OP, %.
 
         Raises:
             InputError: the model's free run is not finite.
         """
         self.model, self.runs = model, runs
+        self._leads = leads or {}
         self.responses: Responses = responses_of(model.process, model.sample_time)
         self.stems = np.column_stack(
             [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
@@ -163,9 +171,11 @@ class FreeRun:
         """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""
         low, high = self.model.limits[valve]
         stem = self.runs.op[:, valve].copy()
+        lead = self._leads.get(self.model.valves[valve].name, 0.0)
         for rows in self.runs.slices:
-            for effect in effects:
-                stem[rows] = effect.simulate(stem[rows], None, self.runs.sample_time)
+            for k, effect in enumerate(effects):
+                first = float(stem[rows.start]) + (lead if k == len(effects) - 1 else 0.0)
+                stem[rows] = effect.simulate(stem[rows], first, self.runs.sample_time)
         return np.asarray(np.clip(stem, low, high))
 
     def _free(self, output: int) -> FloatArray:

@@ -143,7 +143,9 @@ def _best_fit(problem: _Problem, own: _Equation, rounds: int) -> _Equation:
     for delay in range(longest + 1):
         shifted = tuple(max(d - longest + LATER + delay, 0) for d in own.delay)
         starts += _filtered_fits(problem, dataclasses.replace(own, delay=shifted))[-1:]
-    fitted = [(problem.fit(start, None), start) for start in starts if start.stable]
+    fitted = [(problem.fit(start, None), start) for start in starts if _bounded(problem, start)]
+    if not fitted:
+        return own
     fit, equation = min(fitted, key=lambda each: each[0].bic(0))
     for _ in range(rounds):
         total = problem.y - fit.residual
@@ -163,12 +165,19 @@ def _best_fit(problem: _Problem, own: _Equation, rounds: int) -> _Equation:
     return equation
 
 
+def _bounded(problem: _Problem, equation: _Equation) -> bool:
+    """Tell whether an equation is stable and its free run no larger than PV by orders."""
+    if not equation.stable:
+        return False
+    return float(np.ptp(problem.forced(equation))) < 1e3 * float(np.ptp(problem.y))
+
+
 def _line_search(
     problem: _Problem, equation: _Equation, fit: NoiseFit, step: FloatArray
 ) -> tuple[NoiseFit, _Equation] | None:
     for share in (1.0, 0.4, 0.1):
         tried = equation.moved(share * step)
-        if not tried.stable:
+        if not _bounded(problem, tried):
             continue
         found = problem.fit(tried, fit.ar)
         if found.bic(0) < fit.bic(0):

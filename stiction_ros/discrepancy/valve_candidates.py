@@ -83,7 +83,10 @@ class StictionCandidate(ValveCandidate):
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
-        return np.asarray(first + 0.98 * points[:, 0] * points[:, 2])
+        return np.array([first + self.lead(point) for point in points])
+
+    def lead(self, point: FloatArray) -> float:
+        return 0.98 * float(point[0] * point[2])
 
     def count(self, point: FloatArray) -> int:
         return 2

@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, sc
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
-from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, with_effects
+from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_with
 from stiction_ros.discrepancy.free_process import score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
@@ -146,7 +146,7 @@ class _Workflow:
 
     def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
         others = [*self.added[:k], *self.added[k + 1 :]]
-        base = Baseline.of(FreeRun(with_effects(self.bare, others), self.runs))
+        base = Baseline.of(run_with(self.bare, self.runs, others))
         if self.options.quick:
             return likelihood_intervals(base, effect.fit)
         done = self.options.most_effects / (self.options.most_effects + 1)
