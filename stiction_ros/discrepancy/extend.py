@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.catalogue_scores import all_candidates
 from stiction_ros.discrepancy.free_run import FreeRun, Runs
 from stiction_ros.discrepancy.measure import OutputGap, measure_gap
+from stiction_ros.discrepancy.measured_stem import stem_misfit
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
 from stiction_ros.effects import Behaviour
 from stiction_ros.loop import LoopModel
@@ -161,13 +162,7 @@ def _trouble(
 def _stem_trouble(base: Baseline, after_base: Baseline) -> str:
     """Return where the measured stems contradict the effect; empty where they do not."""
     for j, valve in enumerate(base.run.model.valve_names):
-        old = new = 0.0
-        for record, rows in zip(base.run.runs.records, base.run.runs.slices, strict=True):
-            if record.stem is None:
-                continue
-            stem = record.stem[:, record.valves.index(valve)]
-            old += float(np.sum((base.run.stems[rows, j] - stem) ** 2))
-            new += float(np.sum((after_base.run.stems[rows, j] - stem) ** 2))
-        if new > old:
+        old = stem_misfit(base.run, j, base.run.stems[:, j])
+        if stem_misfit(base.run, j, after_base.run.stems[:, j]) > old:
             return f"the measured stem of {valve} is further from that effect than without it"
     return ""

@@ -18,6 +18,7 @@ from stiction_ros.discrepancy.free_process import score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
+from stiction_ros.discrepancy.measured_stem import not_contradicted
 from stiction_ros.discrepancy.options import GapOptions
 from stiction_ros.discrepancy.process_refit import refit_process
 from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
@@ -107,7 +108,8 @@ class _Workflow:
         threshold = self.options.margin
         if not self.options.quick:
             threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
-        decision = decide(scores.fits, self.options.margin, threshold)
+        allowed = not_contradicted(self.base.run, scores.fits)
+        decision = decide(allowed, self.options.margin, threshold)
         testable = testable_effects(self.base, list(candidates), self.options.margin)
         where = locate(self.base)
         kept, reason = False, decision.reason

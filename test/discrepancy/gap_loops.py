@@ -38,7 +38,14 @@ def loop(noise: float = 0.1) -> LoopModel:
     )
 
 
-def record(model: LoopModel, seed: int = 1, samples: int = SAMPLES, moves: bool = True) -> Record:
+def record(
+    model: LoopModel,
+    seed: int = 1,
+    samples: int = SAMPLES,
+    *,
+    moves: bool = True,
+    stem: bool = False,
+) -> Record:
     """Return a closed-loop record under the model's own controller."""
     random = np.random.default_rng([seed, 3])
     times = np.arange(0.0, samples, 110.0) if moves else np.zeros(1)
@@ -47,7 +54,8 @@ def record(model: LoopModel, seed: int = 1, samples: int = SAMPLES, moves: bool 
     assert model.controller is not None
     controller = PiController(model.controller, 1.0, 50.0, (0.0, 100.0))
     points = SetPoints(("PV1",), times, values[:, None])
-    return simulate_closed_loop(model, controller, points, samples, seed).record
+    recorded = simulate_closed_loop(model, controller, points, samples, seed).record
+    return recorded if stem else dataclasses.replace(recorded, stem=None)
 
 
 def with_cause(place: str, effect: Behaviour, seed: int = 1) -> tuple[LoopModel, Record]:

@@ -83,6 +83,13 @@ def test_lags_are_left_in_doubt_with_their_family() -> None:
     assert names == {("valve:V1", "lag"), ("process:PV1", "pole"), ("sensor:PV1", "lag")}
 
 
+def test_a_measured_stem_speaks_against_a_slow_valve() -> None:
+    recorded = record(loop().with_effect("process:PV1", ExtraPole(8.0)), stem=True)
+    answer = find_discrepancy(loop(), [recorded], QUICK)
+    names = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
+    assert names == {("process:PV1", "pole"), ("sensor:PV1", "lag")}
+
+
 def test_a_step_may_be_the_sensor_s() -> None:
     answer = found("disturbance:PV1", StepDisturbance(470.0, 1.5))
     assert answer.verdict is GapVerdict.AMBIGUOUS
