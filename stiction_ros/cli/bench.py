@@ -12,12 +12,23 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli import bench_control, bench_graph, bench_identification, bench_record
+from stiction_ros.cli import (
+    bench_control,
+    bench_gap,
+    bench_graph,
+    bench_identification,
+    bench_record,
+)
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.errors import InputError
 
+OPTIONS: dict[str, tuple[str, ...]] = {
+    "control": ("seed", "quick"),
+    "identification": ("repeat", "seed", "longest", "quick"),
+    "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write"),
+}
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
 
@@ -26,11 +37,12 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "bench",
         help="measure speed, side by side",
-        description="Measure speed against a baseline in the same run. Benchmarks: "
-        + ", ".join(BENCHMARKS),
+        description="Measure speed against a baseline in the same run (graph, identification, "
+        "control, record), "
+        "or count how often the discrepancy workflow is right (gap).",
     )
     parser.add_argument(
-        "name", nargs="?", default="graph", choices=tuple(BENCHMARKS), help="default: graph"
+        "name", nargs="?", default="graph", choices=(*BENCHMARKS, "gap"), help="default: graph"
     )
     group = parser.add_argument_group("identification; --seed and --quick also for control")
     group.add_argument(
@@ -49,12 +61,23 @@ def add(commands: Any) -> None:
         default=None,
         help="fewer delays, one start, coarser grids, records up to 10000 samples",
     )
+    bench_gap.add_options(parser)
     parser.add_argument("--json", metavar="F", help="write the rows as JSON; - for stdout")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    own = OPTIONS.get(options.name, ())
+    for key in {key for keys in OPTIONS.values() for key in keys}.difference(own):
+        if getattr(options, key) is not None:
+            raise InputError(
+                f"benchmark {options.name} has no such option",
+                where=f"--{key}",
+                fix="leave it out, or measure another",
+            )
+    if options.name == "gap":
+        return bench_gap.run(options)
     with bar(f"bench {options.name}") as show:
         rows = BENCHMARKS[options.name](options, show)
     if options.json is not None:
@@ -79,24 +102,11 @@ def machine() -> str:
 
 
 def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
-    _refuse(options, ("repeat", "seed", "longest", "quick"))
     return bench_graph.graph(show)
 
 
 def _record(options: argparse.Namespace, show: Bar) -> list[Row]:
-    _refuse(options, ("repeat", "seed", "longest", "quick"))
     return bench_record.record(show)
-
-
-def _refuse(options: argparse.Namespace, keys: Sequence[str]) -> None:
-    """Raise InputError when one of ``keys`` was given."""
-    for key in keys:
-        if getattr(options, key) is not None:
-            raise InputError(
-                f"benchmark {options.name} has no such option",
-                where=f"--{key}",
-                fix="leave it out, or measure identification",
-            )
 
 
 def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
@@ -110,7 +120,6 @@ def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
 
 
 def _control(options: argparse.Namespace, show: Bar) -> list[Row]:
-    _refuse(options, ("repeat", "longest"))
     plan = bench_control.QUICK if options.quick else bench_control.FULL
     if options.seed is not None:
         plan = dataclasses.replace(plan, seed=options.seed)

@@ -8,13 +8,34 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, Parameter
+from stiction_ros.effects.backlash import Backlash
+from stiction_ros.effects.behaviour import (
+    Behaviour,
+    DrivenByNoise,
+    Filter,
+    FloatArray,
+    LinearFilter,
+    Memory,
+    Parameter,
+)
+from stiction_ros.effects.bias_step import BiasStep
+from stiction_ros.effects.characteristic import Characteristic
+from stiction_ros.effects.delay import ExtraDelay, TimeShift
 from stiction_ros.effects.disturbance import (
     DriftDisturbance,
     SineDisturbance,
     StepDisturbance,
 )
+from stiction_ros.effects.disturbance_coloured import ColouredDisturbance
+from stiction_ros.effects.freeze import Freeze
 from stiction_ros.effects.friction_parameters import FrictionLaw
+from stiction_ros.effects.lag import ExtraPole, Lag
+from stiction_ros.effects.leak import Leak
+from stiction_ros.effects.offset import Offset
+from stiction_ros.effects.process_gain import ProcessGain
+from stiction_ros.effects.quantisation import Quantisation
+from stiction_ros.effects.saturation import Clip, Saturation
+from stiction_ros.effects.slew import Slew
 from stiction_ros.effects.stiction_choudhury import ChoudhuryStiction
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
@@ -22,6 +43,7 @@ from stiction_ros.effects.stiction_kano import KanoStiction
 from stiction_ros.effects.stiction_kano_smoothed import SmoothedKanoStiction
 from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
 from stiction_ros.effects.stiction_xch import XchStiction
+from stiction_ros.effects.tuning import Tuning
 from stiction_ros.errors import InputError
 
 BEHAVIOURS: tuple[type[Behaviour], ...] = (
@@ -32,27 +54,64 @@ BEHAVIOURS: tuple[type[Behaviour], ...] = (
     SmoothedKanoStiction,
     ChoudhuryStiction,
     XchStiction,
+    Backlash,
+    Slew,
+    Lag,
+    Saturation,
+    Characteristic,
+    Offset,
+    ProcessGain,
+    ExtraDelay,
+    ExtraPole,
+    Leak,
     StepDisturbance,
     DriftDisturbance,
     SineDisturbance,
+    ColouredDisturbance,
+    BiasStep,
+    Quantisation,
+    Freeze,
+    Clip,
+    Tuning,
+    TimeShift,
 )
 
 __all__ = [
     "BEHAVIOURS",
+    "Backlash",
     "Behaviour",
+    "BiasStep",
+    "Characteristic",
     "ChoudhuryStiction",
+    "Clip",
+    "ColouredDisturbance",
     "DriftDisturbance",
+    "DrivenByNoise",
+    "ExtraDelay",
+    "ExtraPole",
+    "Filter",
     "FloatArray",
+    "Freeze",
     "FrictionLaw",
     "HeStiction",
     "KanoStiction",
+    "Lag",
+    "Leak",
+    "LinearFilter",
     "Memory",
+    "Offset",
     "Parameter",
+    "ProcessGain",
+    "Quantisation",
+    "Saturation",
     "SemiPhysicalStiction",
     "SineDisturbance",
+    "Slew",
     "SmoothedHeStiction",
     "SmoothedKanoStiction",
     "StepDisturbance",
+    "TimeShift",
+    "Tuning",
     "XchStiction",
     "from_mapping",
 ]

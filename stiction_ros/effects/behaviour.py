@@ -19,6 +19,12 @@ from stiction_ros.errors import InputError, is_finite
 
 FloatArray = NDArray[np.float64]
 Memory = float | tuple[float, ...]
+NO_SAMPLE = -1.0  # in a memory that holds the time of the last sample: there was none
+
+
+def elapsed(before: float, now: float) -> float:
+    """Return the seconds since the last sample; none for the first one."""
+    return 0.0 if before == NO_SAMPLE else now - before
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,10 +67,23 @@ class Behaviour(ABC):
 
     Subclasses set :attr:`effect` (and :attr:`law` where one effect has several), declare
     their parameters with :func:`parameter` and write :meth:`step`.
+
+    Attributes:
+        effect: name in YAML.
+        law: which of several laws of one effect, or None.
+        places: where it can act: ``valve``, ``process``, ``disturbance``, ``sensor``, ``data``.
+        signature: what a record of the loop shows, one sentence.
+        minimum_data: what a record must hold to tell its size, one sentence.
+        confusable: places and effects, such as ``sensor lag``, that look alike.
     """
 
     effect: ClassVar[str]
     law: ClassVar[str | None] = None
+    # For the page of the catalogue, docs/effects.md.
+    places: ClassVar[tuple[str, ...]] = ()
+    signature: ClassVar[str] = ""
+    minimum_data: ClassVar[str] = ""
+    confusable: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         for entry in self.parameters():
@@ -160,6 +179,41 @@ class SimulatesGrid(Protocol):
         cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
     ) -> FloatArray:
         """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters)."""
+        ...
+
+
+@runtime_checkable
+class LinearFilter(Protocol):
+    """A behaviour that is linear and does not change with time."""
+
+    def filter(self, sample_time: float) -> Filter:
+        """Return the behaviour as a filter of samples ``sample_time`` seconds apart."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Filter:
+    """z⁺ = A z + B x, y = C z + D x with z = 0 at rest at x = 0.
+
+    Attributes:
+        a, b, c: shapes (n, n), (n,), (n,); n may be 0.
+        d: direct gain.
+    """
+
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    d: float
+
+
+@runtime_checkable
+class DrivenByNoise(Protocol):
+    """A behaviour that is random: whoever simulates it draws its numbers."""
+
+    def step_with(
+        self, memory: Memory, value: float, time: float, normal: float
+    ) -> tuple[Memory, float]:
+        """Advance one sample with ``normal`` drawn from N(0, 1)."""
         ...
 
 

@@ -31,14 +31,23 @@ class FrictionLaw(SimulatesGrid, Protocol):
 
 
 @dataclasses.dataclass(frozen=True)
-class FrictionPair(Behaviour):
+class Stiction(Behaviour):
+    """What the page of the catalogue says of every friction law."""
+
+    effect: ClassVar[str] = "stiction"
+    places: ClassVar[tuple[str, ...]] = ("valve",)
+    signature: ClassVar[str] = "PV moves in jumps while OP ramps, and rests while OP reverses"
+    minimum_data: ClassVar[str] = "several slips, by a limit cycle or by set-point moves"
+    confusable: ClassVar[tuple[str, ...]] = ("valve backlash when J = 0",)
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionPair(Stiction):
     """A stiction law with static friction f_S and dynamic friction f_D, 0 ≤ f_D ≤ f_S.
 
     Raises:
         InputError: a negative or non-finite friction, or f_D > f_S.
     """
-
-    effect: ClassVar[str] = "stiction"
 
     static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
     dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
@@ -74,7 +83,7 @@ class FrictionPair(Behaviour):
 
 
 @dataclasses.dataclass(frozen=True)
-class SlipJumpPair(Behaviour):
+class SlipJumpPair(Stiction):
     """A stiction law with deadband plus stickband S and slip jump J.
 
     J = 0 is a pure deadband, J < S the undershoot, J = S no offset, J > S the overshoot
@@ -83,8 +92,6 @@ class SlipJumpPair(Behaviour):
     Raises:
         InputError: a negative or non-finite S or J.
     """
-
-    effect: ClassVar[str] = "stiction"
 
     stick_band: float = parameter("s", "%", "deadband plus stickband S", low=0.0)
     jump: float = parameter("j", "%", "slip jump J of the stem", low=0.0)

@@ -20,7 +20,7 @@ from stiction_ros.loop import (
     SetPoints,
     simulate_closed_loop,
 )
-from stiction_ros.processes import LinearModel
+from stiction_ros.loop.pi_stability import largest_gains
 from stiction_ros.records import Record
 
 FAMILIES = ("tight", "sine", "coloured")
@@ -94,10 +94,10 @@ def healthy_loop(seed: int, family: str = "tight") -> Example:
     integral_time = process.time_constants[0] * float(random.uniform(0.6, 1.6))
     if family == "tight":
         decay = float(random.uniform(60.0, 400.0))
-        gain = _gain_of(process, integral_time, math.exp(-1.0 / decay))
+        gain = _gain(process, integral_time, math.exp(-1.0 / decay))
         noise = float(random.uniform(0.01, 0.1))
     else:
-        gain = _gain_of(process, integral_time, 1.0) * float(random.uniform(0.15, 0.6))
+        gain = _gain(process, integral_time, 1.0) * float(random.uniform(0.15, 0.6))
         noise = float(random.uniform(0.02, 0.3))
     disturbance = _disturbance(random, family, process, samples)
     loop = _loop(process, PiTuning(gain, integral_time * sample_time), sample_time, noise)
@@ -193,33 +193,9 @@ def _scaled(record: Record, spread: float) -> Record:
     )
 
 
-def _gain_of(process: _Process, integral_time: float, radius: float) -> float:
+def _gain(process: _Process, integral_time: float, radius: float) -> float:
     """Return the largest PI gain whose closed-loop poles stay within ``radius``."""
     loop = _loop(process, PiTuning(1.0, integral_time), 1.0, 0.0)
-    linear, sign = loop.process.linear(1.0), math.copysign(1.0, process.gain)
-    gain = 0.1 / abs(process.gain)
-    while _radius(linear, sign * gain, integral_time) < 1.0:
-        gain *= 1.3
-    low, high = 0.5 * gain, gain
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        if _radius(linear, sign * middle, integral_time) < radius:
-            low = middle
-        else:
-            high = middle
-    return sign * low
-
-
-def _radius(linear: LinearModel, gain: float, integral_time: float) -> float:
-    """Return the largest modulus of the poles under a PI controller, times in samples.
-
-    The PI's state is its integral: OP = −K (y + (Σ y)/T_i), the sum with the present y.
-    """
-    n = linear.order
-    a, b, c = linear.a, linear.b[:, :1], linear.c[:1]
-    share = 1.0 / integral_time
-    closed = np.zeros((n + 1, n + 1))
-    closed[:n, :n] = a - gain * (1.0 + share) * (b @ c)
-    closed[:n, n:] = -gain * share * b
-    closed[n:, :n], closed[n, n] = c, 1.0
-    return float(np.abs(np.linalg.eigvals(closed)).max())
+    first = np.array([math.copysign(0.1 / abs(process.gain), process.gain)])
+    linear = loop.process.linear(1.0)
+    return float(largest_gains(linear, np.array([integral_time]), radius, first)[0])

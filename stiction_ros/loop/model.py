@@ -14,6 +14,8 @@ import yaml
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError
+from stiction_ros.loop.effect_reading import read_effects
+from stiction_ros.loop.places import append_effect
 from stiction_ros.loop.process_reading import read_process
 from stiction_ros.loop.reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process
@@ -192,6 +194,24 @@ class LoopModel:
             document.setdefault("provenance", []).append(dict(provenance))
         return LoopModel.from_mapping(document, self.name)
 
+    def with_effect(self, place: str, effect: Behaviour, **provenance: Any) -> LoopModel:
+        """Return the loop with one more effect, the last in signal order at its place.
+
+        Args:
+            place: ``valve:TAG``, ``process:TAG``, ``sensor:TAG``, or ``disturbance:TAG`` with
+                the tag of an output or of a further input of the process.
+            effect: what acts there.
+            provenance: if any, one entry of the provenance.
+
+        Raises:
+            InputError: no such place, or an effect that cannot act on a process.
+        """
+        document = self.to_mapping()
+        append_effect(document, place, effect, self.process)
+        if provenance:
+            document.setdefault("provenance", []).append(dict(provenance))
+        return LoopModel.from_mapping(document, self.name)
+
     def with_ideal_valves(self) -> LoopModel:
         """Return the loop with valves that follow OP exactly."""
         return self.with_valve_effects(dict.fromkeys(self.valve_names, ()))
@@ -209,16 +229,6 @@ def named_numbers(
     return values
 
 
-def _read_effects(section: Section) -> tuple[Behaviour, ...]:
-    effects = []
-    for entry in section.sections("effects", []):
-        try:
-            effects.append(effect_from_mapping(entry.values))
-        except InputError as error:
-            raise error.within(entry.where) from None
-    return tuple(effects)
-
-
 def _read_valve(section: Section) -> Valve:
     name = section.text("name")
     limits = None
@@ -231,7 +241,7 @@ def _read_valve(section: Section) -> Valve:
                 fix="write [low, high]",
             )
         limits = (float(low), float(high))
-    effects = _read_effects(section)
+    effects = read_effects(section)
     section.finish()
     return Valve(name, limits, effects)
 
@@ -246,7 +256,7 @@ def _read_sensors(top: Section, outputs: tuple[str, ...]) -> tuple[tuple[Behavio
                 where=section.at("name"),
                 fix="put all its effects into one list",
             )
-        found[name] = _read_effects(section)
+        found[name] = read_effects(section)
         section.finish()
     return tuple(found.get(name, ()) for name in outputs)
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects import Behaviour, FloatArray, Memory
+from stiction_ros.effects import Behaviour, DrivenByNoise, FloatArray, Memory
 from stiction_ros.loop.model import LoopModel
 from stiction_ros.processes import NoiseEntry
 
@@ -29,15 +29,23 @@ class Measurement:
 
 
 class _Chain:
-    """Effects in signal order with their memories."""
+    """Effects in signal order with their memories; those that are random draw from ``random``."""
 
-    def __init__(self, effects: tuple[Behaviour, ...], start: float) -> None:
+    def __init__(
+        self, effects: tuple[Behaviour, ...], start: float, random: np.random.Generator
+    ) -> None:
         self.effects = effects
         self.memories: list[Memory] = [effect.rest(start) for effect in effects]
+        self._random = random
 
     def step(self, value: float, time: float) -> float:
         for i, effect in enumerate(self.effects):
-            self.memories[i], value = effect.step(self.memories[i], value, time)
+            memory = self.memories[i]
+            if isinstance(effect, DrivenByNoise):
+                normal = float(self._random.standard_normal())
+                self.memories[i], value = effect.step_with(memory, value, time, normal)
+            else:
+                self.memories[i], value = effect.step(memory, value, time)
         return value
 
 
@@ -54,16 +62,19 @@ class Plant:
         self.model = model
         process = model.process
         self._random = np.random.default_rng(seed)
+        random_effects = np.random.default_rng([seed, 1])
         self._limits = model.limits.tolist()
         self._valves = [
-            _Chain(valve.effects, float(start))
+            _Chain(valve.effects, float(start), random_effects)
             for valve, start in zip(model.valves, model.stem_start, strict=True)
         ]
         self._sensors = [
-            _Chain(effects, float(start))
+            _Chain(effects, float(start), random_effects)
             for effects, start in zip(model.sensors, model.pv_start, strict=True)
         ]
-        self._disturbances = [(d.place, _Chain((d.behaviour,), 0.0)) for d in model.disturbances]
+        self._disturbances = [
+            (d.place, _Chain((d.behaviour,), 0.0, random_effects)) for d in model.disturbances
+        ]
         self._measurement_std = process.noise_std(NoiseEntry.MEASUREMENT)
         self._equation_std = process.noise_std(NoiseEntry.EQUATION)
         self._state = process.rest(model.stem_start, model.pv_start)

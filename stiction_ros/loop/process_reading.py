@@ -6,10 +6,12 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects import Behaviour, FloatArray, LinearFilter
 from stiction_ros.errors import InputError
+from stiction_ros.loop.effect_reading import read_effects
 from stiction_ros.loop.reading import Section
 from stiction_ros.processes import (
+    AlteredProcess,
     ArxOutput,
     ArxProcess,
     LinearModel,
@@ -36,7 +38,8 @@ def read_process(
     else:
         process = _read_tank(section, point, valves, sample_time)
     section.finish()
-    return process
+    effects = tuple(_read_filters(entry) for entry in section.sections("outputs", []))
+    return AlteredProcess(process, effects, sample_time) if any(effects) else process
 
 
 def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
@@ -56,6 +59,7 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Proc
             raise InputError("names no valve", where=b_section.where)
         delay = {v: delays.integer(v, 0) for v in b}
         delays.finish()
+        entry.raw("effects", [])  # see read_process
         try:
             equation = ArxOutput(
                 name,
@@ -119,8 +123,22 @@ def _read_outputs(
     for entry in section.sections("outputs"):
         names.append(entry.text("name"))
         noise.append(_read_noise(entry))
+        entry.raw("effects", [])  # see read_process
         entry.finish()
     return tuple(names), tuple(noise)
+
+
+def _read_filters(entry: Section) -> tuple[Behaviour, ...]:
+    """Return the effects on the process side of one output, which must be linear."""
+    effects = read_effects(entry)
+    for i, effect in enumerate(effects):
+        if not isinstance(effect, LinearFilter):
+            raise InputError(
+                f"{effect.title()} cannot act on a process",
+                where=f"{entry.at('effects')}[{i}]",
+                fix="use gain, delay, pole or leak, or put it to a valve or a sensor",
+            )
+    return effects
 
 
 def _read_measured(section: Section) -> tuple[str, ...]:

@@ -1,0 +1,43 @@
+"""Whether a record shows what is hidden, by the criterion of the workflow itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from stiction_ros.blind.families import SHOWN_BY_DATA, Name
+from stiction_ros.blind.generator import BlindLoop
+from stiction_ros.blind.truth import Hidden, Truth
+from stiction_ros.discrepancy.catalogue_scores import all_candidates
+from stiction_ros.discrepancy.free_run import FreeRun, join_records
+from stiction_ros.discrepancy.gate import look_at_data
+from stiction_ros.discrepancy.options import MARGIN
+from stiction_ros.discrepancy.search import Baseline, fit_candidate
+
+
+def gains_beyond_margin(seen: BlindLoop, truth: Truth) -> dict[Name, float]:
+    """Return by how much each hidden effect, fitted, beats no effect beyond the margin, in BIC.
+
+    Of two effects, the other one is in the model already, with its true figures. What the
+    values of PV or the recorded tuning show needs no fit and counts as testable.
+    """
+    return {entry.name: _gain(seen, truth, entry) for entry in truth.hidden}
+
+
+def _gain(seen: BlindLoop, truth: Truth, entry: Hidden) -> float:
+    if entry.behaviour.effect in SHOWN_BY_DATA:
+        return math.inf
+    model = seen.model
+    for other in truth.hidden:
+        if other is not entry:
+            model = model.with_effect(other.place, other.behaviour)
+    runs = join_records(model, [seen.record])
+    runs = dataclasses.replace(runs, usable=look_at_data(model, runs).usable)
+    base = Baseline.of(FreeRun(model, runs))
+    gap = base.run.gap
+    gains = [
+        fit_candidate(base, gap, candidate).delta_bic
+        for candidate in all_candidates(base)
+        if entry.name in {(candidate.place, candidate.effect), *candidate.twins}
+    ]
+    return max(gains, default=-math.inf) - MARGIN

@@ -1,0 +1,135 @@
+"""What a candidate is: one change of the current model, with figures to be searched."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+import numpy as np
+
+from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.effects import Behaviour, FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One figure that is searched: ``points`` between two ends, both included.
+
+    Attributes:
+        low, high: ends.
+        points: of the first grid.
+        logarithmic: whether the points are in proportion.
+        whole: whether only whole numbers count.
+    """
+
+    low: float
+    high: float
+    points: int
+    logarithmic: bool = False
+    whole: bool = False
+
+    def grid(self) -> FloatArray:
+        """Return the first grid, in coordinates of the search."""
+        low, high = self.inner(self.low), self.inner(self.high)
+        middle = [0.5 * (low + high)]
+        values = np.linspace(low, high, self.points) if self.points > 1 else np.array(middle)
+        return np.unique(np.rint(values)) if self.whole else values
+
+    def inner(self, value: float) -> float:
+        """Return the coordinate of the search that belongs to a value."""
+        return float(np.log(value)) if self.logarithmic else value
+
+    def outer(self, coordinates: FloatArray) -> FloatArray:
+        """Return the values that belong to coordinates, kept within the ends."""
+        if self.whole:
+            coordinates = np.rint(coordinates)
+        values = np.exp(coordinates) if self.logarithmic else coordinates
+        return np.clip(values, self.low, self.high)
+
+    @property
+    def step(self) -> float:
+        """Distance of two points of the first grid, in coordinates of the search."""
+        if self.points < 2:
+            return 0.5 * (self.inner(self.high) - self.inner(self.low))
+        return (self.inner(self.high) - self.inner(self.low)) / (self.points - 1)
+
+
+@dataclasses.dataclass(frozen=True)
+class Response:
+    """What a candidate adds to the free run, for G points of its grid.
+
+    Attributes:
+        shifts: per output, shape (N, G): added as it is.
+        sizes: per output, shape (N, G, s): added with s factors that least squares finds.
+    """
+
+    shifts: Mapping[int, FloatArray]
+    sizes: Mapping[int, FloatArray] = dataclasses.field(default_factory=dict)
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """Indices of the outputs that it touches."""
+        return tuple(sorted({*self.shifts, *self.sizes}))
+
+    def pick(self, point: int) -> Response:
+        """Return the response at one point of the grid."""
+        return Response(
+            {i: v[:, point : point + 1] for i, v in self.shifts.items()},
+            {i: v[:, point : point + 1] for i, v in self.sizes.items()},
+        )
+
+
+class Candidate(ABC):
+    """One change of the current model.
+
+    Attributes:
+        place, effect: as DESIGN names them, such as ``valve:V1`` and ``stiction``.
+        axes: of the figures that are searched; may be empty.
+        factors: number of figures that least squares finds.
+        twins: places and effects that no record of OP and PV tells from this one.
+        dated: whether its first axis is a moment of the record.
+        inside: whether it belongs to the catalogue; others show only that something is amiss.
+    """
+
+    place: str
+    effect: str
+    axes: tuple[Axis, ...] = ()
+    factors: int = 0
+    twins: tuple[tuple[str, str], ...] = ()
+    inside: bool = True
+    dated: bool = False
+
+    @abstractmethod
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        """Return the response for points of shape (G, axes), in values."""
+
+    @abstractmethod
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+        """Return the effect with these figures; None outside the catalogue."""
+
+    def count(self, point: FloatArray) -> int:
+        """Return the number of free figures at a point, for BIC."""
+        return len(self.axes) + self.factors
+
+    def grid(self) -> FloatArray:
+        """Return the first grid in coordinates of the search, shape (G, axes)."""
+        if not self.axes:
+            return np.zeros((1, 0))
+        meshed = np.meshgrid(*[axis.grid() for axis in self.axes], indexing="ij")
+        return np.stack([each.ravel() for each in meshed], axis=1)
+
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        """Return values for coordinates of the search, both of shape (G, axes)."""
+        if not self.axes:
+            return coordinates
+        return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
+
+    def lead(self, point: FloatArray) -> float:
+        """Return how far from OP a stem stands before the first sample, %."""
+        return 0.0
+
+    @property
+    def name(self) -> str:
+        """Name for people, such as ``valve:V1 stiction``."""
+        return f"{self.place} {self.effect}"

@@ -1,0 +1,71 @@
+"""Step 4: every candidate scored against the current model, which stays as it is."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.decoys import decoys
+from stiction_ros.discrepancy.output_candidates import output_candidates
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.valve_candidates import valve_candidates
+
+Progress = Callable[[float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Scores:
+    """All candidates at their best, the best one first.
+
+    Attributes:
+        base: the current model.
+        candidates: what was tried, one entry per behaviour and law.
+        fits: one per candidate, sorted by ``delta_bic``.
+    """
+
+    base: Baseline
+    candidates: tuple[Candidate, ...]
+    fits: tuple[CandidateFit, ...]
+
+    def of(self, place: str, effect: str) -> CandidateFit | None:
+        """Return the best fit of an effect, its twins' included; None when not tried."""
+        for fit in self.fits:
+            names = [(fit.candidate.place, fit.candidate.effect), *fit.candidate.twins]
+            if (place, effect) in names:
+                return fit
+        return None
+
+
+def all_candidates(base: Baseline, clock_known: bool = False) -> tuple[Candidate, ...]:
+    """Return every candidate that these records call for.
+
+    Args:
+        base: the current model.
+        clock_known: whether the record's clock is shown to be right, so that a longer delay
+            is no shift of the record.
+    """
+    gap = np.column_stack([noise.residual for noise in base.noise])
+    whitened = [noise.innovations for noise in base.noise]
+    found = valve_candidates(base.run) + output_candidates(base.run, gap, whitened)
+    if not clock_known:
+        for candidate in found:
+            if candidate.effect == "delay":
+                candidate.twins = (*candidate.twins, ("data", "time_shift"))
+    return tuple(found + decoys(base.run))
+
+
+def score_candidates(
+    base: Baseline, candidates: tuple[Candidate, ...], progress: Progress | None = None
+) -> Scores:
+    """Return the best figures and the score of every candidate."""
+    gap = base.run.gap
+    fits = []
+    for k, candidate in enumerate(candidates):
+        fits.append(fit_candidate(base, gap, candidate))
+        if progress is not None:
+            progress((k + 1) / len(candidates))
+    fits.sort(key=lambda fit: -fit.delta_bic)
+    return Scores(base, candidates, tuple(fits))

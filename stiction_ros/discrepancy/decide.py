@@ -1,0 +1,154 @@
+"""Steps 5 and 6: what the scores allow to say."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Sequence
+
+from stiction_ros.discrepancy.search import CandidateFit
+
+JUMP_SURE = 6.0  # BIC by which a jump is there
+JUMP_ABSENT = 3.0  # BIC by which it is not
+CLEAR = 40.0  # BIC below which friction is told, but not of which kind
+FRICTION = ("stiction", "backlash")
+LAGS = ("lag", "pole")
+SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
+LEAST_GAIN = 0.25
+
+
+class GapVerdict(enum.StrEnum):
+    """What the workflow says.
+
+    ``NONE``: no effect beats the current model. ``NAMED``: one does, and its rivals.
+    ``AMBIGUOUS``: one of a set does. ``UNKNOWN``: there is a gap, but the catalogue does not
+    explain it. ``UNTESTABLE``: the record could not show the effects.
+    """
+
+    NONE = "none"
+    NAMED = "named"
+    AMBIGUOUS = "ambiguous"
+    UNKNOWN = "unknown"
+    UNTESTABLE = "untestable"
+
+
+@dataclasses.dataclass(frozen=True)
+class Decision:
+    """What the scores of one look say.
+
+    Attributes:
+        verdict: none, named, ambiguous or unknown.
+        chosen: the best candidate of the catalogue, or None.
+        alternatives: places and effects that cannot be told from it.
+        inseparable: whether the alternatives are its twins or its family, so that adding it
+            serves for all of them.
+        reason: one sentence.
+    """
+
+    verdict: GapVerdict
+    chosen: CandidateFit | None
+    alternatives: tuple[tuple[str, str], ...]
+    inseparable: bool
+    reason: str
+
+
+def decide(fits: Sequence[CandidateFit], margin: float, threshold: float) -> Decision:
+    """Return what may be said.
+
+    Args:
+        fits: of all candidates.
+        margin: BIC by which the best must beat its rivals outside its family.
+        threshold: BIC by which it must beat the current model.
+    """
+    ranked = sorted(fits, key=lambda fit: -fit.delta_bic)
+    passed = [
+        f for f in ranked if f.candidate.inside and f.delta_bic >= threshold and large_enough(f)
+    ]
+    kept = [f for f in passed if f.held_gain > 0.0]
+    outside = [f for f in ranked if not f.candidate.inside and f.held_gain > 0.0]
+    stranger = outside[0] if outside else None
+    if not kept:
+        if stranger is not None and stranger.delta_bic >= threshold + margin:
+            return _unknown(stranger, "nothing in the catalogue explains the gap")
+        if passed and passed[0].delta_bic >= threshold + SURE:
+            return _unknown(passed[0], "the held-out rows do not confirm it")
+        reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
+        return Decision(GapVerdict.NONE, None, (), False, reason)
+    best = kept[0]
+    if stranger is not None and stranger.delta_bic > best.delta_bic:
+        return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
+    best, family = _family(best, ranked)
+    rivals = [
+        f
+        for f in passed
+        if _name(f) != _name(best)
+        and f.delta_bic > best.delta_bic - margin
+        and not _same_family(f, best)
+    ]
+    names = list(dict.fromkeys([*family, *best.candidate.twins, *(_name(f) for f in rivals)]))
+    for rival in rivals:
+        names += [twin for twin in rival.candidate.twins if twin not in names]
+    if names:
+        reason = "OP and PV do not tell them apart"
+        one_family = all(_lags(f) and _lags(best) for f in rivals)
+        return Decision(GapVerdict.AMBIGUOUS, best, tuple(names), one_family, reason)
+    return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
+
+
+def large_enough(fit: CandidateFit) -> bool:
+    """Tell whether an effect has an engineering size."""
+    value = float(fit.point[0]) if len(fit.point) else 0.0
+    if fit.candidate.effect == "gain":
+        # A process that hardly answers at all is a valve that does not move.
+        return abs(float(fit.factors[0])) >= 0.03 and 1.0 + float(fit.factors[0]) >= LEAST_GAIN
+    if fit.candidate.effect in FRICTION:
+        return value >= 0.1
+    if fit.candidate.effect == "characteristic":
+        return abs(value) >= 0.15
+    return True
+
+
+def _unknown(stranger: CandidateFit, reason: str) -> Decision:
+    return Decision(
+        GapVerdict.UNKNOWN,
+        None,
+        (),
+        False,
+        f"{stranger.candidate.name} would explain the gap by {stranger.delta_bic:.0f}; {reason}",
+    )
+
+
+def _name(fit: CandidateFit) -> tuple[str, str]:
+    return fit.candidate.place, fit.candidate.effect
+
+
+def _lags(fit: CandidateFit) -> bool:
+    return fit.candidate.effect in LAGS
+
+
+def _same_family(one: CandidateFit, other: CandidateFit) -> bool:
+    friction = one.candidate.effect in FRICTION and other.candidate.effect in FRICTION
+    return friction and one.candidate.place == other.candidate.place
+
+
+def _family(
+    best: CandidateFit, ranked: Sequence[CandidateFit]
+) -> tuple[CandidateFit, tuple[tuple[str, str], ...]]:
+    """Return stiction or backlash by the test of the jump, and the other one in doubt."""
+    if best.candidate.effect not in FRICTION:
+        return best, ()
+    rivals = [f for f in ranked if _same_family(f, best) and f.delta_bic > 0.0]
+    jumping = [f for f in rivals if f.candidate.effect == "stiction"]
+    plain = [f for f in rivals if f.candidate.effect == "backlash"]
+    if not jumping or not plain:
+        return best, ()
+    jump = jumping[0].delta_bic - plain[0].delta_bic
+    if best.delta_bic < CLEAR:  # too little to tell whether there is a jump
+        other = jumping[0] if best.candidate.effect == "backlash" else plain[0]
+        return best, (_name(other),)
+    if jump > JUMP_SURE:
+        return jumping[0], ()
+    if jump < -JUMP_ABSENT:
+        return plain[0], ()
+    first, second = (jumping[0], plain[0]) if jump > 0.0 else (plain[0], jumping[0])
+    return first, (_name(second),)

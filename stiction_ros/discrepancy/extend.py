@@ -1,0 +1,168 @@
+"""Step 7: an effect becomes a block of the loop model, or is rolled back."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.catalogue_scores import all_candidates
+from stiction_ros.discrepancy.free_run import FreeRun, Runs
+from stiction_ros.discrepancy.measure import OutputGap, measure_gap
+from stiction_ros.discrepancy.measured_stem import stem_misfit
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.effects import Behaviour
+from stiction_ros.loop import LoopModel
+
+ROUNDS = 2
+GROWTH = 1.02  # of the free-run error that noise may bring about
+WORTH = 10.0
+
+
+@dataclasses.dataclass(frozen=True)
+class AddedEffect:
+    """One effect that became part of the model.
+
+    Attributes:
+        fit: its last fit, with every other added effect in place.
+        behaviour: with its figures.
+        alternatives: places and effects that the record does not tell from it.
+    """
+
+    fit: CandidateFit
+    behaviour: Behaviour
+    alternatives: tuple[tuple[str, str], ...]
+
+    @property
+    def place(self) -> str:
+        """Where it acts."""
+        return self.fit.candidate.place
+
+    @property
+    def effect(self) -> str:
+        """What it is."""
+        return self.fit.candidate.effect
+
+
+@dataclasses.dataclass(frozen=True)
+class Extension:
+    """The model after one more effect.
+
+    Attributes:
+        model: with all effects that stayed.
+        added: these effects.
+        base: the free run of ``model``.
+        before, after: the gap on held-out rows without and with the last effect.
+        kept: whether the last effect stayed.
+        reason: why it did not.
+    """
+
+    model: LoopModel
+    added: tuple[AddedEffect, ...]
+    base: Baseline
+    before: tuple[OutputGap, ...]
+    after: tuple[OutputGap, ...]
+    kept: bool
+    reason: str
+
+
+def extend(
+    bare: LoopModel, runs: Runs, added: Sequence[AddedEffect], new: AddedEffect, base: Baseline
+) -> Extension:
+    """Add an effect, fit all added effects together, and see whether the gap has shrunk.
+
+    Args:
+        bare: the model without any added effect.
+        runs: the records.
+        added: effects of earlier looks.
+        new: the one to be added.
+        base: of the model with ``added``.
+    """
+    before = measure_gap(base)
+    effects = [*added, new]
+    for _ in range(ROUNDS if added else 1):
+        effects = [_refit(bare, runs, effects, k) for k in range(len(effects))]
+    worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
+    model = with_effects(bare, worth)
+    after_base = Baseline.of(run_with(bare, runs, worth))
+    after = measure_gap(after_base)
+    trouble = _trouble(base, after_base, before, after) or _stem_trouble(base, after_base)
+    if trouble:
+        kept = tuple(added)
+        return Extension(with_effects(bare, kept), kept, base, before, before, False, trouble)
+    return Extension(model, tuple(worth), after_base, before, after, True, "")
+
+
+def with_effects(model: LoopModel, effects: Sequence[AddedEffect], **provenance: Any) -> LoopModel:
+    """Return the model with effects at the end of their chains."""
+    for effect in effects:
+        note: Mapping[str, Any] = provenance
+        model = model.with_effect(effect.place, effect.behaviour, **note)
+    return model
+
+
+def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> FreeRun:
+    """Return the free run with effects, every sticky stem starting where the fit puts it."""
+    leads: dict[str, float] = {}
+    for effect in effects:
+        kind, _, tag = effect.place.partition(":")
+        if kind == "valve":
+            leads[tag] = effect.fit.candidate.lead(effect.fit.point)
+    return FreeRun(with_effects(bare, effects), runs, leads)
+
+
+def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
+    """Return effect k fitted again behind all others."""
+    others = effects[:k] + effects[k + 1 :]
+    base = Baseline.of(run_with(bare, runs, others))
+    candidate = same_candidate(all_candidates(base), effects[k].fit.candidate)
+    if candidate is None:
+        return effects[k]
+    candidate.twins = effects[k].fit.candidate.twins
+    point = effects[k].fit.point
+    fit = fit_candidate(base, base.run.gap, candidate, point if len(point) else None)
+    behaviour = fit.behaviour(base.run)
+    assert behaviour is not None
+    return dataclasses.replace(effects[k], fit=fit, behaviour=behaviour)
+
+
+def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
+    """Return the candidate of the same place, effect and behaviour; None when there is none."""
+    for candidate in candidates:
+        alike = (candidate.place, candidate.effect) == (wanted.place, wanted.effect)
+        if alike and getattr(candidate, "kind", None) is getattr(wanted, "kind", None):
+            return candidate
+    return None
+
+
+def _trouble(
+    base: Baseline,
+    after_base: Baseline,
+    before: tuple[OutputGap, ...],
+    after: tuple[OutputGap, ...],
+) -> str:
+    """Return why the effect must go again; empty when the gap has shrunk."""
+    held = sum(
+        old.held_minus_two_log - new.held_minus_two_log
+        for old, new in zip(base.noise, after_base.noise, strict=True)
+    )
+    if held <= 0.0:
+        return "the innovations of the held-out rows do not become smaller"
+    unit = [max(gap.floor_one_step, 1e-300) for gap in before]
+    old = np.array([g.free_run_rmse / u for g, u in zip(before, unit, strict=True)])
+    new = np.array([g.free_run_rmse / u for g, u in zip(after, unit, strict=True)])
+    if float(np.sum(new**2)) > GROWTH * float(np.sum(old**2)):
+        return "the free run of the held-out rows does not come nearer to PV"
+    return ""
+
+
+def _stem_trouble(base: Baseline, after_base: Baseline) -> str:
+    """Return where the measured stems contradict the effect; empty where they do not."""
+    for j, valve in enumerate(base.run.model.valve_names):
+        old = stem_misfit(base.run, j, base.run.stems[:, j])
+        if stem_misfit(base.run, j, after_base.run.stems[:, j]) > old:
+            return f"the measured stem of {valve} is further from that effect than without it"
+    return ""

@@ -1,0 +1,212 @@
+"""The free run: a loop model driven by the recorded OP of one or more records."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from stiction_ros.discrepancy.noise import MAX_ORDER, Blocks, BoolArray
+from stiction_ros.discrepancy.responses import Responses, responses_of
+from stiction_ros.effects import Behaviour, FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+HELD_SHARE = 4
+BLOCKS = 24
+SHORTEST_BLOCK = 20
+DETERMINED = ("freeze", "clip", "quantisation")  # shown by the values of PV themselves
+
+
+@dataclasses.dataclass(frozen=True)
+class Runs:
+    """Records of one loop laid end to end; nothing reaches from one into the next.
+
+    Attributes:
+        records: at least one, of one loop.
+        op: shape (N, m), %, within the limits of the valves.
+        pv: shape (N, p).
+        time: seconds since the first sample of the own record, shape (N,).
+        slices: rows of each record.
+        usable: per output the rows whose PV can be scored, shape (p, N).
+    """
+
+    records: tuple[Record, ...]
+    op: FloatArray
+    pv: FloatArray
+    time: FloatArray
+    slices: tuple[slice, ...]
+    usable: BoolArray
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds between two samples."""
+        return self.records[0].sample_time
+
+    def __len__(self) -> int:
+        return len(self.op)
+
+
+def join_records(
+    model: LoopModel, records: Sequence[Record], usable: BoolArray | None = None
+) -> Runs:
+    """Return the records end to end, signals in the order of the model.
+
+    Raises:
+        InputError: no record, other tags or another sample time than the model's.
+    """
+    if not records:
+        raise InputError("no record", where=model.name, fix="give one record at least")
+    for record in records:
+        _check(model, record)
+    op = np.vstack([r.op[:, [r.valves.index(v) for v in model.valve_names]] for r in records])
+    pv = np.vstack([r.pv[:, [r.outputs.index(o) for o in model.outputs]] for r in records])
+    ends = np.cumsum([len(r) for r in records]).tolist()
+    slices = tuple(slice(end - len(r), end) for r, end in zip(records, ends, strict=True))
+    if usable is None:
+        usable = np.ones((pv.shape[1], len(pv)), dtype=bool)
+    low, high = model.limits.T
+    time = np.concatenate([r.time for r in records])
+    return Runs(tuple(records), np.clip(op, low, high), pv, time, slices, usable)
+
+
+def _check(model: LoopModel, record: Record) -> None:
+    for what, wanted, found in (
+        ("valve", model.valve_names, record.valves),
+        ("output", model.outputs, record.outputs),
+    ):
+        for name in wanted:
+            if name not in found:
+                raise InputError(
+                    f"has no {what} {name!r}",
+                    where=record.name,
+                    fix=f"it has {', '.join(found)}; choose columns with --op and --pv",
+                )
+    if abs(record.sample_time - model.sample_time) > 1e-3 * model.sample_time:
+        raise InputError(
+            f"is sampled every {record.sample_time:g} s, the model every {model.sample_time:g} s",
+            where=record.name,
+            fix="fit a model to this sample time",
+        )
+
+
+class FreeRun:
+    """The current model under the recorded OP, and what small changes of it would give.
+
+    The state at the start, and a constant, of every record are left open: they are columns
+    that every fit projects out.
+
+    Attributes:
+        model, runs: what runs, over what.
+        stems: positions of the current model, shape (N, m), %.
+        forced: outputs of the process, shape (N, p), but for the free columns.
+        known: what disturbances and sensors of the current model add, shape (N, p).
+        free: per output the free columns, shape (N, q).
+    """
+
+    def __init__(
+        self, model: LoopModel, runs: Runs, leads: Mapping[str, float] | None = None
+    ) -> None:
+        """Run the model once.
+
+        Args:
+            model: what runs.
+            runs: over what.
+            leads: of valves whose last effect starts with its stem that far from OP, %.
+
+        Raises:
+            InputError: the model's free run is not finite.
+        """
+        self.model, self.runs = model, runs
+        self._leads = leads or {}
+        self.responses: Responses = responses_of(model.process, model.sample_time)
+        self.stems = np.column_stack(
+            [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
+        )
+        self.forced = np.column_stack([self.drive(i)[:, 0] for i in range(len(model.outputs))])
+        self.known = np.column_stack([self._known(i) for i in range(len(model.outputs))])
+        self.free = [self._free(i) for i in range(len(model.outputs))]
+        if not (np.isfinite(self.forced).all() and all(np.isfinite(f).all() for f in self.free)):
+            raise InputError(
+                "its free run grows without bound", where=model.name, fix="use a stable model"
+            )
+
+    @property
+    def gap(self) -> FloatArray:
+        """PV less the free run, shape (N, p), free columns not yet taken out."""
+        return np.asarray(self.runs.pv - self.forced - self.known)
+
+    def blocks(self, output: int) -> Blocks:
+        """Return the rows that are fitted and those kept back, interleaved."""
+        first = np.zeros(len(self.runs), dtype=bool)
+        for rows in self.runs.slices:
+            first[rows.start : rows.start + self.responses.skip + MAX_ORDER] = True
+        usable = self.runs.usable[output] & ~first
+        size = max(len(self.runs) // BLOCKS, SHORTEST_BLOCK)
+        kept = (np.arange(len(self.runs)) // size) % HELD_SHARE == HELD_SHARE - 2
+        return Blocks(usable & ~kept, usable & kept)
+
+    def drive(
+        self, output: int, valve: int | None = None, stems: FloatArray | None = None
+    ) -> FloatArray:
+        """Return one output, shape (N, G), with the stems of one valve replaced.
+
+        Args:
+            output: its index.
+            valve: whose stems are replaced; None keeps all.
+            stems: shape (N, G), %.
+        """
+        parts = []
+        for rows in self.runs.slices:
+            inputs = [self.stems[rows, j : j + 1] for j in range(self.stems.shape[1])]
+            if valve is not None and stems is not None:
+                inputs[valve] = stems[rows]
+            parts.append(self.responses.forced(output, inputs))
+        return np.vstack(parts)
+
+    def valve_chain(self, valve: int, effects: Sequence[Behaviour]) -> FloatArray:
+        """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""
+        low, high = self.model.limits[valve]
+        stem = self.runs.op[:, valve].copy()
+        lead = self._leads.get(self.model.valves[valve].name, 0.0)
+        for rows in self.runs.slices:
+            for k, effect in enumerate(effects):
+                first = float(stem[rows.start]) + (lead if k == len(effects) - 1 else 0.0)
+                stem[rows] = effect.simulate(stem[rows], first, self.runs.sample_time)
+        return np.asarray(np.clip(stem, low, high))
+
+    def _free(self, output: int) -> FloatArray:
+        blocks = []
+        for rows in self.runs.slices:
+            inputs = [self.stems[rows, j : j + 1] for j in range(self.stems.shape[1])]
+            blocks.append(self.responses.free(output, inputs))
+        return np.asarray(block_diag(*blocks))
+
+    def _known(self, output: int) -> FloatArray:
+        name = self.model.outputs[output]
+        added = np.zeros(len(self.runs))
+        for rows in self.runs.slices:
+            zeros = np.zeros(rows.stop - rows.start)
+            for disturbance in self.model.disturbances:
+                wave = disturbance.behaviour.simulate(zeros, 0.0, self.runs.sample_time)
+                if disturbance.place == name:
+                    added[rows] += wave
+                elif disturbance.place not in self.model.outputs:
+                    response = self.responses.load(output, disturbance.place, wave[:, None])
+                    added[rows] += 0.0 if response is None else response[:, 0]
+            added[rows] += self._sensed(output, self.forced[rows, output] + added[rows])
+        return added
+
+    def _sensed(self, output: int, values: FloatArray) -> FloatArray:
+        """Return what the sensor's linear and additive effects change, shape (N,).
+
+        Frozen, clipped and rounded values are left out of scoring or count as noise.
+        """
+        shown = values
+        for effect in self.model.sensors[output]:
+            if effect.effect not in DETERMINED:
+                shown = effect.simulate(shown, float(shown[0]), self.runs.sample_time)
+        return np.asarray(shown - values)

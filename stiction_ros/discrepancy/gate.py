@@ -1,0 +1,203 @@
+"""Step 1, the gate: what is wrong with the data, and what it can show at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.discrepancy.free_run import Runs
+from stiction_ros.discrepancy.noise import BoolArray
+from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
+from stiction_ros.loop import LoopModel
+
+LONGEST_REST = 12
+ENDS = 6
+
+
+@dataclasses.dataclass(frozen=True)
+class DataFinding:
+    """An effect that the recorded values themselves show.
+
+    Attributes:
+        place, effect: as DESIGN names them.
+        behaviour: with its figures.
+        delta_bic: by how much shorter the values are told with it.
+        record: index of the record.
+    """
+
+    place: str
+    effect: str
+    behaviour: Behaviour
+    delta_bic: float
+    record: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Gate:
+    """What the data allow.
+
+    Attributes:
+        usable: per output the rows whose PV is a measurement, shape (p, N).
+        findings: frozen, clipped and rounded PVs.
+        quantum: per output the distance of PV's values; 0 where they are as good as continuous.
+        set_point_moves: per output, over all records; None where SP is not recorded.
+        reversals: of OP per valve.
+        notes: remarks for people.
+    """
+
+    usable: BoolArray
+    findings: tuple[DataFinding, ...]
+    quantum: tuple[float, ...]
+    set_point_moves: tuple[int, ...] | None
+    reversals: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def look_at_data(model: LoopModel, runs: Runs) -> Gate:
+    """Return what the recorded values allow, before any model is asked."""
+    usable = np.ones((len(model.outputs), len(runs)), dtype=bool)
+    findings: list[DataFinding] = []
+    quanta, notes = [], []
+    for i, name in enumerate(model.outputs):
+        quantum = quantum_of(runs.pv[:, i])
+        quanta.append(quantum)
+        for r, rows in enumerate(runs.slices):
+            values = runs.pv[rows, i]
+            frozen = _frozen(values, name, r, runs.sample_time)
+            clipped = _clipped(values, name, r, quantum)
+            for finding, where in (*frozen, *clipped):
+                usable[i, rows] &= ~where
+                findings.append(finding)
+            if _compressed(values):
+                notes.append(
+                    f"{name} lies on straight lines: a historian has thinned it out, small "
+                    "effects are lost"
+                )
+        findings += _rounded(runs.pv[:, i], name, quantum)
+    for j, valve in enumerate(model.valve_names):
+        if np.ptp(runs.op[:, j]) == 0.0:
+            notes.append(f"OP of {valve} never moves: nothing can be said of that valve")
+    return Gate(
+        usable,
+        tuple(findings),
+        tuple(quanta),
+        _moves(model, runs),
+        tuple(_reversals(runs, j) for j in range(len(model.valves))),
+        tuple(dict.fromkeys(notes)),
+    )
+
+
+def quantum_of(values: FloatArray) -> float:
+    """Return the distance of the values; 0 where there is none above the digits of a float."""
+    distinct = np.unique(values)
+    if len(distinct) < 3:
+        return 0.0
+    steps = np.diff(distinct)
+    smallest = float(steps.min())
+    if smallest <= 1e-7 * max(float(np.abs(distinct).max()), 1e-300):
+        return 0.0
+    ratio = steps / smallest
+    if float(np.abs(ratio - np.rint(ratio)).max()) > 1e-3 * float(ratio.max()) ** 0.5:
+        return 0.0
+    return smallest
+
+
+def _frozen(
+    values: FloatArray, name: str, record: int, sample_time: float
+) -> list[tuple[DataFinding, BoolArray]]:
+    """Return each rest of PV that is too long for its noise, with its rows."""
+    same = np.concatenate([[False], np.diff(values) == 0.0])
+    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    if not len(begins):
+        return []
+    lengths = ends - begins
+    usual = np.delete(lengths, int(np.argmax(lengths)))
+    share = min(usual.sum() / max(len(values) - lengths.max(), 1), 0.99)
+    natural = math.log(max(len(values), 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
+    found = []
+    longest = int(np.argmax(lengths))
+    length = int(lengths[longest])
+    level = values[begins[longest]]
+    # What stands at the end of all values is an end of the sensor's range, not a frozen value.
+    at_an_end = level in (values.min(), values.max())
+    if length >= LONGEST_REST + 3.0 * natural and not at_an_end:
+        where = np.zeros(len(values), dtype=bool)
+        where[begins[longest] : ends[longest]] = True
+        onset, duration = begins[longest] * sample_time, length * sample_time
+        behaviour = Freeze(float(onset), float(duration))
+        bits = length * 2.0 * math.log(1.0 / max(share, 1.0 / len(values)))
+        gain = bits - 2.0 * math.log(len(values))
+        found.append((DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where))
+    return found
+
+
+def _clipped(
+    values: FloatArray, name: str, record: int, quantum: float
+) -> list[tuple[DataFinding, BoolArray]]:
+    """Return the ends of the range at which PV stands again and again, with their rows."""
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        return []
+    at_low, at_high = values == low, values == high
+    limits = [low, high]
+    where = np.zeros(len(values), dtype=bool)
+    gain, ends = 0.0, 0
+    for k, at in enumerate((at_low, at_high)):
+        count = int(at.sum())
+        beside = 0
+        if quantum:
+            beside = int((np.abs(values - limits[k] - (1 - 2 * k) * quantum) < 0.5 * quantum).sum())
+        visits = int((np.diff(at.astype(int)) == 1).sum())
+        if count >= ENDS and (visits >= 2 or count >= LONGEST_REST) and count > 3 * beside:
+            where |= at
+            ends += 1
+            gain += 2.0 * count * math.log(len(values) / 10.0)
+        else:
+            limits[k] += (2 * k - 1) * 10.0 * (high - low)  # beyond what was seen
+    if not ends:
+        return []
+    gain -= ends * math.log(len(values))
+    behaviour = Clip(limits[0], limits[1])
+    return [(DataFinding(f"sensor:{name}", "clip", behaviour, gain, record), where)]
+
+
+def _rounded(values: FloatArray, name: str, quantum: float) -> list[DataFinding]:
+    """Return a quantum that is coarse against the moves of PV from sample to sample."""
+    moves = np.abs(np.diff(values))
+    if quantum <= 0.0 or float(np.mean(moves**2)) ** 0.5 > 2.5 * quantum:
+        return []
+    levels = len(np.unique(values))
+    gain = 2.0 * len(values) * math.log(max(len(values) / levels, 1.0)) - math.log(len(values))
+    if levels < 4 or gain <= 0.0:
+        return []
+    return [DataFinding(f"sensor:{name}", "quantisation", Quantisation(quantum), gain)]
+
+
+def _compressed(values: FloatArray) -> bool:
+    bends = np.abs(np.diff(values, 2))
+    scale = float(np.ptp(values))
+    straight = float(np.mean((bends <= 1e-9 * scale) & (np.abs(np.diff(values))[1:] > 0.0)))
+    return straight > 0.5
+
+
+def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:
+    if any(record.sp is None for record in runs.records):
+        return None
+    moves = np.zeros(len(model.outputs), dtype=int)
+    for record in runs.records:
+        assert record.sp is not None
+        columns = [record.outputs.index(name) for name in model.outputs]
+        moves += (np.diff(record.sp[:, columns], axis=0) != 0.0).sum(axis=0)
+    return tuple(moves.tolist())
+
+
+def _reversals(runs: Runs, valve: int) -> int:
+    count = 0
+    for rows in runs.slices:
+        signs = np.sign(np.diff(runs.op[rows, valve]))
+        signs = signs[signs != 0.0]
+        count += int((signs[1:] != signs[:-1]).sum())
+    return count

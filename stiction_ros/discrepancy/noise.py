@@ -1,0 +1,187 @@
+"""The likelihood of a gap: linear columns projected out, autoregressive noise, innovations."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.effects import FloatArray
+
+MAX_ORDER = 6
+ROUNDS = 4
+_TINY = 1e-300
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Blocks:
+    """Which samples are fitted and which are kept back.
+
+    Attributes:
+        train, held: rows, shape (N,); a row is in at most one of them.
+    """
+
+    train: BoolArray
+    held: BoolArray
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseFit:
+    r"""One output's gap under autoregressive noise, its linear part fitted by least squares.
+
+    .. math::
+        g_k &= x_k^T \beta + r_k \\
+        r_k &= \varphi_1 r_{k-1} + \ldots + \varphi_p r_{k-p} + e_k, \quad p \le 6
+
+    Attributes:
+        ar: φ, shape (p,).
+        innovation_std: of e on the training rows, units of the output.
+        coefficients: β, shape (q,).
+        residual: r, shape (N,).
+        minus_two_log: n (log 2πσ² + 1) on the n training rows.
+        rows: n.
+        held_minus_two_log: −2 log likelihood of the held-out rows with the trained figures.
+        held_rows: their number.
+    """
+
+    ar: FloatArray
+    innovation_std: float
+    coefficients: FloatArray
+    residual: FloatArray
+    minus_two_log: float
+    rows: int
+    held_minus_two_log: float
+    held_rows: int
+
+    @property
+    def innovations(self) -> FloatArray:
+        """Innovations e, shape (N,); the first p reach before the record and are not used."""
+        return whiten(self.residual, self.ar)
+
+    @property
+    def stationary_std(self) -> float:
+        """Standard deviation of r under its own model; inf where that is not stationary."""
+        return self.innovation_std * math.sqrt(_gain_of_noise(self.ar))
+
+    def bic(self, parameters: int) -> float:
+        """Return −2 log likelihood plus (p + ``parameters``) log n."""
+        return self.minus_two_log + (len(self.ar) + parameters) * math.log(max(self.rows, 2))
+
+
+def whiten(values: FloatArray, ar: FloatArray) -> FloatArray:
+    """Return values_k − Σ φ_i values_{k−i} along the first axis; zeros before the start."""
+    out = np.array(values, dtype=float, copy=True)
+    for lag, coefficient in enumerate(ar.tolist(), start=1):
+        out[lag:] -= coefficient * values[:-lag]
+    return out
+
+
+def fit_noise(
+    target: FloatArray, columns: FloatArray, blocks: Blocks, start: FloatArray | None = None
+) -> NoiseFit:
+    """Fit the linear columns and the noise to a gap by Gaussian likelihood, in turns.
+
+    Args:
+        target: the gap, shape (N,).
+        columns: linear columns, shape (N, q).
+        blocks: rows; the first :data:`MAX_ORDER` of every run are in neither.
+        start: φ to begin with; None begins with white noise.
+
+    Returns:
+        The best of the turns; the order p is the one of least BIC.
+    """
+    train = blocks.train
+    ar = np.zeros(0) if start is None else start
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    for _ in range(ROUNDS):
+        beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
+        residual = target - columns @ beta
+        fitted = autoregression(residual, train)
+        score = _criterion(residual, fitted, train)
+        if best is not None and score >= best[0] - 1e-3:
+            break
+        best = (score, beta, fitted)
+        ar = fitted
+    assert best is not None
+    return _result(target - columns @ best[1], best[1], best[2], blocks)
+
+
+def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:
+    innovations = whiten(residual, ar)
+    inside, outside = innovations[blocks.train], innovations[blocks.held]
+    rows, held = len(inside), len(outside)
+    variance = max(float(inside @ inside) / max(rows, 1), _TINY)
+    log = math.log(2.0 * math.pi * variance)
+    return NoiseFit(
+        ar,
+        math.sqrt(variance),
+        beta,
+        residual,
+        rows * (log + 1.0),
+        rows,
+        held * log + float(outside @ outside) / variance,
+        held,
+    )
+
+
+def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return φ of the order of least BIC, least squares on ``rows``, shape (p ≤ 6,)."""
+    lagged = np.empty((len(residual), MAX_ORDER + 1))
+    for lag in range(MAX_ORDER + 1):
+        lagged[:lag, lag] = 0.0
+        lagged[lag:, lag] = residual[: len(residual) - lag]
+    lagged = lagged[rows]
+    gram = lagged.T @ lagged
+    count = max(len(lagged), 2)
+    best: FloatArray = np.zeros(0)
+    best_score = count * math.log(max(gram[0, 0], _TINY))
+    for order in range(1, MAX_ORDER + 1):
+        inner = slice(1, order + 1)
+        ridge = 1e-12 * float(np.trace(gram)) * np.eye(order)
+        phi = np.linalg.solve(gram[inner, inner] + ridge + _TINY * np.eye(order), gram[inner, 0])
+        left = float(gram[0, 0] - phi @ gram[inner, 0])
+        score = count * math.log(max(left, _TINY)) + order * math.log(count)
+        if score < best_score:
+            best, best_score = np.asarray(phi, dtype=np.float64), score
+    return best
+
+
+def projector(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
+    if not columns.shape[1]:
+        return columns
+    scale = np.linalg.norm(columns, axis=0)
+    left, sizes, _ = np.linalg.svd(columns / np.maximum(scale, _TINY), full_matrices=False)
+    return np.ascontiguousarray(left[:, sizes > 1e-9 * max(float(sizes[0]), _TINY)])
+
+
+def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
+    if not columns.shape[1]:
+        return np.zeros(0)
+    scale = np.maximum(np.linalg.norm(columns, axis=0), _TINY)
+    return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
+
+
+def _criterion(residual: FloatArray, ar: FloatArray, rows: BoolArray) -> float:
+    innovations = whiten(residual, ar)[rows]
+    count = max(len(innovations), 2)
+    square = max(float(innovations @ innovations) / count, _TINY)
+    return count * math.log(square) + len(ar) * math.log(count)
+
+
+def _gain_of_noise(ar: FloatArray) -> float:
+    """Return the variance of an autoregressive process of unit innovations."""
+    order = len(ar)
+    if not order:
+        return 1.0
+    companion = np.vstack([ar, np.eye(order)[:-1]])
+    if np.abs(np.linalg.eigvals(companion)).max() >= 1.0 - 1e-9:
+        return math.inf
+    start = np.zeros((order, order))
+    start[0, 0] = 1.0
+    flat = np.linalg.solve(np.eye(order**2) - np.kron(companion, companion), start.ravel())
+    return float(flat[0])

@@ -1,0 +1,42 @@
+"""What the user may choose."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.errors import InputError
+
+MARGIN = 10.0
+
+
+@dataclasses.dataclass(frozen=True)
+class GapOptions:
+    """Options of :func:`stiction_ros.discrepancy.find_discrepancy`.
+
+    Attributes:
+        quick: take stored thresholds and intervals of the likelihood instead of bootstraps.
+        margin: BIC by which an effect must beat no effect and its best rival.
+        most_effects: how many effects are added at most.
+        free_process: let the process be refitted with every candidate, as for a model that
+            was fitted to these records without any effect.
+        resamples: of each bootstrap.
+        seed: of the bootstraps.
+
+    Raises:
+        InputError: a negative margin, no effect at all, fewer than ten resamples.
+    """
+
+    quick: bool = False
+    margin: float = MARGIN
+    most_effects: int = 3
+    free_process: bool = False
+    resamples: int = 40
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.margin < 0.0:
+            raise InputError(f"{self.margin:g} is negative", where="margin")
+        if self.most_effects < 1:
+            raise InputError(f"{self.most_effects} effects", where="most_effects", fix="use 1 up")
+        if self.resamples < 10:
+            raise InputError(f"{self.resamples} are too few", where="resamples", fix="use 10 up")

@@ -1,0 +1,311 @@
+"""The best figures of one candidate: a grid simulated at once, then ever smaller grids."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidates import Candidate, Response
+from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, projector, whiten
+from stiction_ros.effects import Behaviour, FloatArray
+
+LEADERS = 4
+STARTS = 4
+MOMENTS = 241
+REACH = 4.0  # points of the first grid, wider than a held-out block
+MOST = 200
+SLOW = np.array([0.8])
+SHRINK = 0.4
+ROUNDS = 5
+SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
+_TINY = 1e-300
+
+
+@dataclasses.dataclass(frozen=True)
+class Baseline:
+    """The current model alone: its gap, its noise, and what every fit shares.
+
+    Attributes:
+        run: the free run.
+        columns: per output the columns that every fit projects out, shape (N, q).
+        blocks: per output the fitted and the held-out rows.
+        noise: per output the fit of the gap without any change.
+    """
+
+    run: FreeRun
+    columns: tuple[FloatArray, ...]
+    blocks: tuple[Blocks, ...]
+    noise: tuple[NoiseFit, ...]
+
+    @classmethod
+    def of(
+        cls,
+        run: FreeRun,
+        gap: FloatArray | None = None,
+        columns: Sequence[FloatArray] | None = None,
+    ) -> Baseline:
+        """Fit the noise of the current model; ``gap``, shape (N, p), replaces the recorded one."""
+        gap = run.gap if gap is None else gap
+        shared = tuple(run.free if columns is None else columns)
+        blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
+        noise = tuple(fit_noise(gap[:, i], shared[i], blocks[i]) for i in range(gap.shape[1]))
+        return cls(run, shared, blocks, noise)
+
+    @property
+    def bic(self) -> float:
+        """BIC of the current model, but for what every candidate shares with it."""
+        return sum(fit.bic(0) for fit in self.noise)
+
+
+@dataclasses.dataclass(frozen=True)
+class CandidateFit:
+    """One candidate at its best.
+
+    Attributes:
+        candidate: which.
+        point: searched figures, shape (axes,).
+        factors: figures found by least squares, shape (s,).
+        noise: per output that it touches, the noise that is left.
+        delta_bic: by how much it beats the current model alone; negative when it does not.
+        held_gain: −2 log likelihood that it gains on the held-out rows.
+        effect_energy: squared whitened response over the innovation variance.
+    """
+
+    candidate: Candidate
+    point: FloatArray
+    factors: FloatArray
+    noise: Mapping[int, NoiseFit]
+    delta_bic: float
+    held_gain: float
+    effect_energy: float
+
+    def behaviour(self, run: FreeRun) -> Behaviour | None:
+        """Return the effect with its figures; None outside the catalogue."""
+        return self.candidate.behaviour(run, self.point, self.factors)
+
+
+def fit_candidate(
+    base: Baseline, gap: FloatArray, candidate: Candidate, around: FloatArray | None = None
+) -> CandidateFit:
+    """Return the best figures of a candidate by the likelihood of the innovations.
+
+    Args:
+        base: of the current model.
+        gap: what is to be explained, shape (N, p).
+        candidate: the change.
+        around: a point near which alone is searched, shape (axes,), values; None everywhere.
+    """
+    search = _Search(base, gap, candidate)
+    if around is None:
+        centres = search.coarse()[:STARTS]
+    else:
+        inner = [axis.inner(v) for axis, v in zip(candidate.axes, around.tolist(), strict=True)]
+        centres = [np.array(inner)]
+    for centre in centres:
+        search.refine(centre, 0.7)
+    if candidate.dated:
+        return _dated(search)
+    return search.best()
+
+
+def _dated(search: _Search) -> CandidateFit:
+    """Return the best fit with its moment found on all rows, the held-out ones included.
+
+    A moment within a held-out block leaves no other trace than before and after it.
+    """
+    base, found = search.base, search.best()
+    every = tuple(Blocks(b.train | b.held, np.zeros_like(b.held)) for b in base.blocks)
+    whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
+    axis = search.candidate.axes[0]
+    centre, reach = axis.inner(float(found.point[0])), REACH * axis.step
+    coordinates = np.linspace(centre - reach, centre + reach, MOMENTS)[:, None]
+    values = search.candidate.values(coordinates)
+    response = search.candidate.respond(base.run, values)
+    best = whole.best_of(values, response, [found.noise, base.noise])
+    other = search.judge(best, search.candidate.respond(base.run, best[None, :]))
+    return max(found, other, key=lambda fit: fit.delta_bic + fit.held_gain)
+
+
+class _Search:
+    """The state of one search: the best point so far, judged by the exact likelihood."""
+
+    def __init__(self, base: Baseline, gap: FloatArray, candidate: Candidate) -> None:
+        self.base, self.gap, self.candidate = base, gap, candidate
+        self.found: CandidateFit | None = None
+        self.judged: dict[tuple[float, ...], CandidateFit] = {}
+
+    def coarse(self) -> list[FloatArray]:
+        """Return the best points of the first grid, under several guesses of the noise."""
+        grid = self.candidate.grid()
+        values = self.candidate.values(grid)
+        response = self.candidate.respond(self.base.run, values)
+        guesses: list[Mapping[int, FloatArray]] = [
+            {i: self.base.noise[i].ar for i in response.outputs},
+            {i: np.zeros(0) for i in response.outputs},
+            dict.fromkeys(response.outputs, SLOW),
+        ]
+        leaders: dict[int, float] = {}
+        for _ in range(3):
+            for ar in guesses:
+                squares = misfit(self.base, self.gap, response, ar)
+                for point in self._apart(grid, squares):
+                    if point not in leaders:
+                        fit = self.judge(values[point], response.pick(point))
+                        leaders[point] = fit.delta_bic
+            best = self.best()
+            guesses = [{i: fit.ar for i, fit in best.noise.items()}]
+        order = sorted(leaders, key=lambda point: -leaders[point])
+        return [grid[point] for point in order]
+
+    def _apart(self, grid: FloatArray, squares: FloatArray) -> list[int]:
+        """Return the best points of a grid that are no neighbours of each other."""
+        steps = np.array([max(axis.step, _TINY) for axis in self.candidate.axes])
+        chosen: list[int] = []
+        for point in np.argsort(squares)[:MOST].tolist():
+            near = [
+                np.abs((grid[point] - grid[other]) / steps).max(initial=0.0) for other in chosen
+            ]
+            if all(distance > 1.5 for distance in near):
+                chosen.append(point)
+            if len(chosen) == LEADERS:
+                break
+        return chosen
+
+    def refine(self, centre: FloatArray, size: float) -> None:
+        """Search smaller and smaller grids around a point."""
+        if not self.candidate.axes:
+            self._try(self.candidate.grid())
+            return
+        steps = np.array([axis.step for axis in self.candidate.axes])
+        whole = np.array([axis.whole for axis in self.candidate.axes])
+        best = self._try(np.array([centre]))
+        for _ in range(ROUNDS):
+            span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
+            offsets = np.array(list(itertools.product(SIDE, repeat=len(steps))))
+            found = self._try(centre + offsets * span, best[1])
+            if found[1].delta_bic >= best[1].delta_bic:
+                best, centre = found, found[0]
+            size *= SHRINK
+            if whole.all() and size * steps.max() < 0.5:
+                break
+
+    def best(self) -> CandidateFit:
+        """Return the best fit that was seen."""
+        assert self.found is not None
+        return self.found
+
+    def best_of(
+        self,
+        values: FloatArray,
+        response: Response,
+        guesses: Sequence[Mapping[int, NoiseFit] | Sequence[NoiseFit]],
+    ) -> FloatArray:
+        """Return the best of several points, each the best one under one guess of the noise."""
+        fits = []
+        for noise in guesses:
+            ar = {i: noise[i].ar for i in response.outputs}
+            best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+            fits.append(self.judge(values[best], response.pick(best)))
+        return max(fits, key=lambda fit: fit.delta_bic).point
+
+    def _try(
+        self, coordinates: FloatArray, like: CandidateFit | None = None
+    ) -> tuple[FloatArray, CandidateFit]:
+        """Judge the point of a grid that is best under the noise of another fit."""
+        values = self.candidate.values(coordinates)
+        response = self.candidate.respond(self.base.run, values)
+        noise = self.base.noise if like is None else like.noise
+        ar = {
+            i: (noise[i] if like is None or i in like.noise else self.base.noise[i]).ar
+            for i in response.outputs
+        }
+        best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        return coordinates[best], self.judge(values[best], response.pick(best))
+
+    def judge(self, values: FloatArray, response: Response) -> CandidateFit:
+        """Return the exact fit at one point of the search; the best one is remembered."""
+        key = tuple(values.tolist())
+        if key in self.judged:
+            return self.judged[key]
+        noise, factors, energy = {}, np.zeros(0), 0.0
+        gained, held = -self.candidate.count(values) * self._price(response), 0.0
+        for i in response.outputs:
+            shared, target = self.base.columns[i], self.gap[:, i]
+            if i in response.shifts:
+                target = target - response.shifts[i][:, 0]
+            columns = shared
+            if i in response.sizes:
+                columns = np.hstack([response.sizes[i][:, 0], shared])
+            white = fit_noise(target, columns, self.base.blocks[i])
+            coloured = fit_noise(target, columns, self.base.blocks[i], self.base.noise[i].ar)
+            left = min(white, coloured, key=lambda each: each.bic(0))
+            if i in response.sizes:
+                factors = left.coefficients[: response.sizes[i].shape[2]]
+            noise[i] = left
+            gained += self.base.noise[i].bic(0) - left.bic(0)
+            held += self.base.noise[i].held_minus_two_log - left.held_minus_two_log
+            energy += _energy(response, i, factors, left, self.base)
+        fit = CandidateFit(self.candidate, values, factors, noise, gained, held, energy)
+        self.judged[key] = fit
+        if self.found is None or gained > self.found.delta_bic:
+            self.found = fit
+        return fit
+
+    def _price(self, response: Response) -> float:
+        rows = sum(self.base.noise[i].rows for i in response.outputs)
+        return float(np.log(max(rows, 2)))
+
+
+def misfit(
+    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+) -> FloatArray:
+    """Return Σ n log(sum of squared innovations) for every point of a grid under given φ."""
+    total: FloatArray | float = 0.0
+    for i in response.outputs:
+        rows = base.blocks[i].train
+        basis = projector(whiten(base.columns[i], ar[i])[rows])
+        target = gap[:, i : i + 1]
+        if i in response.shifts:
+            target = target - response.shifts[i]
+        left = _without(basis, whiten(target, ar[i])[rows])
+        squares = np.einsum("ng,ng->g", left, left)
+        if i in response.sizes:
+            squares = squares - _explained(basis, left, whiten(response.sizes[i], ar[i])[rows])
+        total = total + rows.sum() * np.log(np.maximum(squares, _TINY))
+    return np.asarray(total)
+
+
+def _explained(basis: FloatArray, left: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return the sum of squares that the factors take away, shape (G,)."""
+    rows, points, count = sizes.shape
+    free = _without(basis, sizes.reshape(rows, points * count)).reshape(sizes.shape)
+    gram = np.einsum("ngs,ngt->gst", free, free)
+    if left.shape[1] == points:
+        cross = np.einsum("ngs,ng->gs", free, left)
+    else:
+        cross = np.einsum("ngs,n->gs", free, left[:, 0])
+    ridge = 1e-10 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(count)
+    solved = np.linalg.solve(gram + ridge + _TINY * np.eye(count), cross[:, :, None])[:, :, 0]
+    return np.asarray(np.einsum("gs,gs->g", solved, cross))
+
+
+def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
+    return np.asarray(values - basis @ (basis.T @ values))
+
+
+def _energy(
+    response: Response, output: int, factors: FloatArray, fit: NoiseFit, base: Baseline
+) -> float:
+    wave = np.zeros(len(base.run.runs))
+    if output in response.shifts:
+        wave = wave + response.shifts[output][:, 0]
+    if output in response.sizes:
+        wave = wave + response.sizes[output][:, 0] @ factors
+    rows = base.blocks[output].train
+    basis = projector(whiten(base.columns[output], fit.ar)[rows])
+    left = _without(basis, whiten(wave, fit.ar)[rows][:, None])
+    return float(np.sum(left**2)) / max(fit.innovation_std**2, _TINY)

@@ -1,0 +1,214 @@
+"""How sure the figures are, and how large a score chance alone brings about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.signal import lfilter
+
+from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, misfit
+from stiction_ros.effects import FloatArray
+
+CHI_SQUARE = 3.84  # 95 % of one degree of freedom
+NORMAL = 1.96
+BOX = 9
+WIDENINGS = 14
+BLOCK = 25
+DRAWS = 200
+
+Intervals = dict[str, tuple[float, float]]
+
+
+def likelihood_intervals(base: Baseline, fit: CandidateFit) -> Intervals:
+    """Return 95 % of each parameter by the likelihood, noise held at its best.
+
+    The region within 3.84 of the least −2 log likelihood is searched on boxes that grow or
+    shrink to it; factors of least squares add 1.96 standard errors.
+    """
+    found: list[tuple[FloatArray, FloatArray]] = []
+    error = _factor_errors(base, fit)
+    for point in _region(base, fit):
+        factors = fit.factors
+        if len(fit.point) and len(factors):
+            factors = _factors_at(base, fit, point)
+        found.append((point, factors))
+    for sign in (-1.0, 1.0):
+        for d in range(len(error)):
+            moved = fit.factors.copy()
+            moved[d] += sign * NORMAL * error[d]
+            found.append((fit.point, moved))
+    return _ends(base, fit.candidate, found)
+
+
+def bootstrap_intervals(
+    base: Baseline,
+    fit: CandidateFit,
+    resamples: int,
+    random: np.random.Generator,
+    progress: Callable[[float], None] | None = None,
+) -> Intervals:
+    """Return 95 % of each parameter by resampled blocks of innovations.
+
+    Every resample is the fitted response with noise rebuilt from blocks of 25 innovations in
+    random order, fitted again near the estimate. The interval is at least that of the
+    likelihood.
+    """
+    found = []
+    gap = base.run.gap
+    response = fit.candidate.respond(base.run, fit.point[None, :])
+    for b in range(resamples):
+        drawn = gap.copy()
+        for i in response.outputs:
+            noise = fit.noise[i]
+            fitted = gap[:, i] - noise.residual
+            drawn[:, i] = fitted + _rebuilt(noise.innovations, noise.ar, random)
+        again = fit_candidate(base, drawn, fit.candidate, fit.point if len(fit.point) else None)
+        found.append((again.point, again.factors))
+        if progress is not None:
+            progress((b + 1) / resamples)
+    values = [_parameters(base, fit.candidate, *each) for each in found]
+    sure = likelihood_intervals(base, fit)
+    ends: Intervals = {}
+    for key in values[0]:
+        low, high = np.quantile([v[key] for v in values], [0.025, 0.975])
+        other = sure.get(key, (float(low), float(high)))
+        ends[key] = (min(float(low), other[0]), max(float(high), other[1]))
+    return ends
+
+
+def chance_threshold(
+    base: Baseline, candidates: tuple[Candidate, ...], random: np.random.Generator
+) -> float:
+    """Return the score that 95 % of records of the current model alone stay below.
+
+    The innovations of the current model are drawn anew; every candidate's first grid is
+    scored under its noise. It corrects for the number of candidates.
+    """
+    outputs = range(len(base.noise))
+    rows = [base.blocks[i].train for i in outputs]
+    drawn = [
+        random.standard_normal((int(r.sum()), DRAWS)) * base.noise[i].innovation_std
+        for i, r in enumerate(rows)
+    ]
+    bases = [projector(whiten(base.columns[i], base.noise[i].ar)[rows[i]]) for i in outputs]
+    drawn = [each - q @ (q.T @ each) for each, q in zip(drawn, bases, strict=True)]
+    best = np.full(DRAWS, -np.inf)
+    for candidate in candidates:
+        if not candidate.inside:
+            continue
+        points = candidate.values(candidate.grid())
+        response = candidate.respond(base.run, points)
+        gain: FloatArray | float = 0.0
+        for i in response.outputs:
+            gain = gain + _chance_gain(
+                base, response.shifts.get(i), response.sizes.get(i), i, drawn[i], bases[i]
+            )
+        count = np.array([candidate.count(point) for point in points])
+        price = np.log(max(base.noise[0].rows, 2)) * count
+        best = np.maximum(best, np.max(np.asarray(gain) - price[:, None], axis=0))
+    return float(np.quantile(best, 0.95))
+
+
+def _chance_gain(
+    base: Baseline,
+    shift: FloatArray | None,
+    sizes: FloatArray | None,
+    output: int,
+    drawn: FloatArray,
+    basis: FloatArray,
+) -> FloatArray:
+    """Return what every point gains on every draw, shape (G, DRAWS)."""
+    ar, rows = base.noise[output].ar, base.blocks[output].train
+    total = np.sum(drawn**2, axis=0)
+    if shift is not None:
+        wave = whiten(shift, ar)[rows]
+        wave = wave - basis @ (basis.T @ wave)
+        left = total - 2.0 * wave.T @ drawn + np.sum(wave**2, axis=0)[:, None]
+    else:
+        assert sizes is not None
+        count, points, factors = sizes.shape
+        waves = whiten(sizes.reshape(count, -1), ar)[rows]
+        waves = (waves - basis @ (basis.T @ waves)).reshape(-1, points, factors)
+        taken = []
+        for g in range(points):
+            inner = projector(waves[:, g])
+            taken.append(np.sum((inner.T @ drawn) ** 2, axis=0))
+        left = total - np.array(taken)
+    return np.asarray(len(drawn) * np.log(total / np.maximum(left, 1e-300)))
+
+
+def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
+    """Return searched points that the likelihood does not reject, shape (K, axes)."""
+    axes = fit.candidate.axes
+    if not axes:
+        return np.zeros((1, 0))
+    centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
+    free = [d for d, a in enumerate(axes) if d < 2 and a.step > 0.0]
+    width = np.array([0.5 if a.whole else 0.05 * a.step for a in axes])
+    offsets = np.linspace(-1.0, 1.0, BOX)
+    mesh = np.stack([m.ravel() for m in np.meshgrid(*[offsets] * len(free), indexing="ij")], axis=1)
+    kept = fit.candidate.values(centre[None, :])
+    ar = {i: noise.ar for i, noise in fit.noise.items()}
+    for _ in range(WIDENINGS):
+        grid = np.tile(centre, (len(mesh) + 1, 1))
+        grid[1:, free] += mesh * width[free]
+        values = fit.candidate.values(grid)
+        score = misfit(base, base.run.gap, fit.candidate.respond(base.run, values), ar)
+        inside = score[1:] - score.min() <= CHI_SQUARE
+        kept = np.vstack([kept[:1], values[1:][inside]])
+        wide = [bool(np.any(np.abs(mesh[inside, k]) > 0.8)) for k in range(len(free))]
+        thin = [not np.any(np.abs(mesh[inside, k]) > 0.3) for k in range(len(free))]
+        if not any(wide) and not all(thin):
+            break
+        for k, d in enumerate(free):
+            width[d] *= 2.0 if wide[k] else 0.5 if thin[k] and not axes[d].whole else 1.0
+    return kept
+
+
+def _factor_errors(base: Baseline, fit: CandidateFit) -> FloatArray:
+    """Return the standard errors of the factors, shape (s,)."""
+    if not len(fit.factors):
+        return np.zeros(0)
+    response = fit.candidate.respond(base.run, fit.point[None, :])
+    (output,) = response.sizes
+    noise, rows = fit.noise[output], base.blocks[output].train
+    basis = projector(whiten(base.columns[output], noise.ar)[rows])
+    columns = whiten(response.sizes[output][:, 0], noise.ar)[rows]
+    columns = columns - basis @ (basis.T @ columns)
+    inverse = np.linalg.pinv(columns.T @ columns)
+    return np.asarray(noise.innovation_std * np.sqrt(np.maximum(np.diag(inverse), 0.0)))
+
+
+def _factors_at(base: Baseline, fit: CandidateFit, point: FloatArray) -> FloatArray:
+    response = fit.candidate.respond(base.run, point[None, :])
+    (output,) = response.sizes
+    columns = np.hstack([response.sizes[output][:, 0], base.columns[output]])
+    ar = fit.noise[output].ar
+    again = fit_noise(base.run.gap[:, output], columns, base.blocks[output], ar)
+    return again.coefficients[: len(fit.factors)]
+
+
+def _parameters(
+    base: Baseline, candidate: Candidate, point: FloatArray, factors: FloatArray
+) -> dict[str, float]:
+    behaviour = candidate.behaviour(base.run, point, factors)
+    assert behaviour is not None
+    return {p.key: getattr(behaviour, p.attribute) for p in behaviour.parameters()}
+
+
+def _ends(
+    base: Baseline, candidate: Candidate, found: list[tuple[FloatArray, FloatArray]]
+) -> Intervals:
+    values = [_parameters(base, candidate, *each) for each in found]
+    return {key: (min(v[key] for v in values), max(v[key] for v in values)) for key in values[0]}
+
+
+def _rebuilt(innovations: FloatArray, ar: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Return noise of the same length from blocks of innovations in random order."""
+    count = len(innovations)
+    begins = random.integers(0, max(count - BLOCK, 1), count // BLOCK + 1)
+    drawn = np.concatenate([innovations[b : b + BLOCK] for b in begins])[:count]
+    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), drawn - drawn.mean()))

@@ -1,0 +1,157 @@
+"""Candidates at a valve: one more effect behind those that the model has already."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidates import Axis, Candidate, Response
+from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.effects import (
+    Backlash,
+    Behaviour,
+    Characteristic,
+    FloatArray,
+    HeStiction,
+    Lag,
+    Saturation,
+    Slew,
+    XchStiction,
+)
+
+Rows = Callable[[FloatArray], FloatArray]
+LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
+_NEGLIGIBLE = 1e-9
+
+
+class ValveCandidate(Candidate):
+    """A behaviour at the end of a valve's chain.
+
+    Its stems start at rest at the first OP; stiction has one more figure, where its stem
+    stood within the band.
+    """
+
+    def __init__(
+        self, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...]
+    ) -> None:
+        """Take the valve's index, the behaviour and the figures that are searched."""
+        self.valve, self.kind, self.axes = valve, kind, axes
+        self.place = f"valve:{run.model.valves[valve].name}"
+        self.effect = kind.effect
+        self.twins = ()
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
+        return points
+
+    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return stem positions, shape (N, G), %."""
+        low, high = run.model.limits[self.valve]
+        rows = self.rows(points)
+        parts = []
+        for part in run.runs.slices:
+            values = run.stems[part, self.valve]
+            start = self.starts(points, float(values[0]))
+            parts.append(simulate_grid(self.kind, rows, values, start, run.runs.sample_time))
+        return np.clip(np.vstack(parts), low, high)
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        """Return where the stems stand before the first sample, shape (G,), %."""
+        return np.full(len(points), first)
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        stems = self.stems(run, points)
+        shifts = {}
+        for i in range(run.forced.shape[1]):
+            shift = run.drive(i, self.valve, stems) - run.forced[:, i : i + 1]
+            if np.abs(shift).max(initial=0.0) > _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9):
+                shifts[i] = shift
+        return Response(shifts or {0: np.zeros((len(stems), len(points)))})
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        row = self.rows(point[None, :])[0]
+        values = dict(zip((p.key for p in self.kind.parameters()), row.tolist(), strict=False))
+        return self.kind.from_mapping(values)
+
+
+class StictionCandidate(ValveCandidate):
+    """Stiction by f_S, f_D / f_S and the place of the stem in its band at the start."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        return np.array([first + self.lead(point) for point in points])
+
+    def lead(self, point: FloatArray) -> float:
+        return 0.98 * float(point[0] * point[2])
+
+    def count(self, point: FloatArray) -> int:
+        return 2
+
+
+class SaturationCandidate(ValveCandidate):
+    """A stem that stops short of what OP asks, at one end or both."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return np.column_stack([np.minimum(points[:, 0], points[:, 1]), points.max(axis=1)])
+
+    def count(self, point: FloatArray) -> int:
+        low, high = self.axes[0].low, self.axes[1].high
+        return int(point[0] > low) + int(point[1] < high)
+
+
+def valve_candidates(run: FreeRun) -> list[Candidate]:
+    """Return the candidates at every valve whose OP moves."""
+    found: list[Candidate] = []
+    for j in range(len(run.model.valves)):
+        op = run.stems[:, j]
+        span = float(np.quantile(op, 0.998) - np.quantile(op, 0.002))
+        if span > 0.0:
+            found += _at_valve(run, j, op, span)
+    return found
+
+
+def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candidate]:
+    step = run.runs.sample_time
+    moves = np.abs(np.concatenate([np.diff(op[rows]) for rows in run.runs.slices]))
+    fastest = max(float(moves.max()), 1e-9) / step
+    low, high = float(op.min()), float(op.max())
+    lower, upper = np.quantile(op, [0.6, 0.4]).tolist()
+    # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
+    fine = (Axis(0.01 * span, LARGEST * span, 160, logarithmic=True), Axis(0.0, 1.0, 17))
+    rough = (Axis(0.01 * span, LARGEST * span, 50, logarithmic=True), Axis(0.0, 1.0, 9))
+    start = Axis(-1.0, 1.0, 1)
+    return [
+        StictionCandidate(run, j, HeStiction, (*fine, start)),
+        StictionCandidate(run, j, XchStiction, (*rough, start)),
+        ValveCandidate(run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True),)),
+        ValveCandidate(
+            run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
+        ),
+        ValveCandidate(run, j, Lag, (lag_axis(run),)),
+        SaturationCandidate(run, j, Saturation, (Axis(low, lower, 10), Axis(upper, high, 10))),
+        ValveCandidate(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
+    ]
+
+
+def lag_axis(run: FreeRun) -> Axis:
+    """Return the range of time constants that a record tells."""
+    step = run.runs.sample_time
+    return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)
+
+
+def simulate_grid(
+    kind: type[Behaviour],
+    rows: FloatArray,
+    values: FloatArray,
+    start: FloatArray | float,
+    sample_time: float,
+) -> FloatArray:
+    """Return ``kind.simulate_grid``, with the sample time where it asks for one."""
+    simulate = kind.simulate_grid  # type: ignore[attr-defined]
+    if "sample_time" in inspect.signature(simulate).parameters:
+        return np.asarray(simulate(rows, values, start, sample_time))
+    return np.asarray(simulate(rows, values, start))

@@ -1,0 +1,241 @@
+"""The workflow: gate, measure, where, score, decide, say, add, look again."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, score_candidates
+from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
+from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
+from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
+from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_with
+from stiction_ros.discrepancy.free_process import score_with_free_process
+from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
+from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
+from stiction_ros.discrepancy.measure import closed_share, measure_gap
+from stiction_ros.discrepancy.measured_stem import not_contradicted
+from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.process_refit import refit_process
+from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
+from stiction_ros.discrepancy.say import experiment_for, overall
+from stiction_ros.discrepancy.search import Baseline
+from stiction_ros.discrepancy.testable import Testable, testable_effects
+from stiction_ros.discrepancy.uncertainty import (
+    Intervals,
+    bootstrap_intervals,
+    chance_threshold,
+    likelihood_intervals,
+)
+from stiction_ros.discrepancy.where import locate
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+Progress = Callable[[float], None]
+
+
+def find_discrepancy(
+    model: LoopModel,
+    records: Sequence[Record],
+    options: GapOptions | None = None,
+    progress: Progress | None = None,
+) -> Discrepancy:
+    """Find what the simulation of a loop misses, add it to the model and measure the gap again.
+
+    The model is driven by the recorded OP, one change is tried at a time, and what is said is
+    checked on samples that nothing was fitted to; see docs/discrepancy.md.
+
+    Args:
+        model: the loop as it is simulated now.
+        records: of this loop, one or more; OP and PV at least.
+        options: None for the defaults.
+        progress: called with the share done, 0 to 1.
+
+    Raises:
+        InputError: records that do not fit the model, or a model whose free run grows
+            without bound.
+    """
+    return _Workflow(model, records, options or GapOptions(), progress).run()
+
+
+class _Workflow:
+    """One pass over the steps; every step leaves its result here."""
+
+    def __init__(
+        self,
+        model: LoopModel,
+        records: Sequence[Record],
+        options: GapOptions,
+        progress: Progress | None,
+    ) -> None:
+        self.model, self.options = model, options
+        self.report = progress or (lambda share: None)
+        self.begun = time.perf_counter()
+        self.random = np.random.default_rng(options.seed)
+        runs = join_records(model, records)
+        self.gate: Gate = look_at_data(model, runs)
+        runs = dataclasses.replace(runs, usable=self.gate.usable)
+        self.controller: ControllerCheck = check_controller(model, runs)
+        found = self.controller.finding
+        self.data: list[DataFinding] = [*([found] if found else []), *self.gate.findings]
+        self.runs: Runs = corrected(runs, found)
+        self.bare = add_data_effects(model, self.data)
+        if options.free_process:
+            self.bare = refit_process(self.bare, self.runs)
+        self.base_before = Baseline.of(FreeRun(model, self.runs))
+        self.looks: list[Look] = []
+        self.added: tuple[AddedEffect, ...] = ()
+        self.base = self.base_before
+
+    def run(self) -> Discrepancy:
+        """Look until nothing more is found, then put the answer together."""
+        testable: tuple[Testable, ...] = ()
+        for k in range(self.options.most_effects):
+            look, testable = self._look(k)
+            self.looks.append(look)
+            if not look.kept:
+                break
+        return self._result(testable)
+
+    def _look(self, k: int) -> tuple[Look, tuple[Testable, ...]]:
+        share = 1.0 / (self.options.most_effects + 1)
+        candidates = all_candidates(self.base, self.controller.clock_known)
+        scores, models = self._score(candidates, lambda done: self.report((k + 0.8 * done) * share))
+        threshold = self.options.margin
+        if not self.options.quick:
+            threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
+        allowed = not_contradicted(self.base.run, scores.fits)
+        decision = decide(allowed, self.options.margin, threshold)
+        testable = testable_effects(self.base, list(candidates), self.options.margin)
+        where = locate(self.base)
+        kept, reason = False, decision.reason
+        if decision.chosen is not None and decision.inseparable:
+            chosen = decision.chosen.candidate
+            bare = models.get((chosen.place, chosen.effect), self.bare)
+            step = self._extend(decision, bare)
+            kept, reason = step.kept, step.reason
+            if step.kept:
+                self.added, self.base, self.bare = step.added, step.base, bare
+        return Look(scores, decision, where, kept, reason), testable
+
+    def _score(
+        self, candidates: tuple[Candidate, ...], report: Progress
+    ) -> tuple[Scores, Mapping[tuple[str, str], LoopModel]]:
+        """Return the scores, and the model behind each candidate where the process is free."""
+        if not self.options.free_process:
+            return score_candidates(self.base, candidates, report), {}
+        model = self.base.run.model
+        found = score_with_free_process(model, self.runs, self.base, candidates, report)
+        self.base = found.scores.base
+        if not self.added:
+            self.base_before = self.base
+            self.bare = _with_process(self.bare, self.base.run.model)
+        return found.scores, {
+            name: _with_process(self.bare, refitted) for name, refitted in found.models.items()
+        }
+
+    def _extend(self, decision: Decision, bare: LoopModel) -> Extension:
+        chosen = decision.chosen
+        assert chosen is not None
+        behaviour = chosen.behaviour(self.base.run)
+        assert behaviour is not None
+        new = AddedEffect(chosen, behaviour, decision.alternatives)
+        return extend(bare, self.runs, self.added, new, self.base)
+
+    def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
+        others = [*self.added[:k], *self.added[k + 1 :]]
+        base = Baseline.of(run_with(self.bare, self.runs, others))
+        if self.options.quick:
+            return likelihood_intervals(base, effect.fit)
+        done = self.options.most_effects / (self.options.most_effects + 1)
+        part = (1.0 - done) / len(self.added)
+        return bootstrap_intervals(
+            base,
+            effect.fit,
+            self.options.resamples,
+            self.random,
+            lambda share: self.report(done + (k + share) * part),
+        )
+
+    def _result(self, testable: tuple[Testable, ...]) -> Discrepancy:
+        before, after = measure_gap(self.base_before), measure_gap(self.base)
+        effects = [_data_effect(finding) for finding in self.data]
+        effects += [self._effect(k, effect) for k, effect in enumerate(self.added)]
+        verdict, alternatives = overall(effects, self.looks, testable)
+        model = self.bare
+        for shown, added in zip(effects[len(self.data) :], self.added, strict=True):
+            model = model.with_effect(added.place, added.behaviour, **self._provenance(shown))
+        where = [sentence for look in self.looks[:1] for sentence in look.where.sentences]
+        where += [
+            look.decision.reason
+            for look in self.looks[-1:]
+            if look.decision.verdict is GapVerdict.UNKNOWN
+        ]
+        self.report(1.0)
+        return Discrepancy(
+            verdict=verdict,
+            effects=tuple(effects),
+            alternatives=alternatives,
+            experiment=experiment_for(verdict, effects, alternatives, testable),
+            where=tuple(where),
+            untestable=tuple(t for t in testable if not t.testable),
+            before=before,
+            after=after,
+            closed=closed_share(before, after) if self.added else 0.0,
+            model_before=self.model,
+            model_after=model,
+            looks=tuple(self.looks),
+            gate=self.gate,
+            controller=self.controller,
+            runs=self.runs,
+            base_before=self.base_before,
+            base_after=self.base,
+            seconds=time.perf_counter() - self.begun,
+            notes=(*self.gate.notes, *(n for r in self.runs.records for n in r.notes)),
+        )
+
+    def _effect(self, k: int, effect: AddedEffect) -> FoundEffect:
+        verdict = GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED
+        values = {
+            p.key: float(getattr(effect.behaviour, p.attribute))
+            for p in effect.behaviour.parameters()
+        }
+        return FoundEffect(
+            effect.place,
+            effect.effect,
+            values,
+            self._intervals(k, effect),
+            effect.fit.delta_bic,
+            verdict,
+            effect.alternatives,
+        )
+
+    def _provenance(self, effect: FoundEffect) -> dict[str, object]:
+        return {
+            "what": effect.effect,
+            "at": effect.place,
+            "by": "stiction gap",
+            "records": [record.name for record in self.runs.records],
+            "delta_bic": round(effect.delta_bic, 2),
+            "verdict": effect.verdict.value,
+            "alternatives": [f"{place} {name}" for place, name in effect.alternatives],
+        }
+
+
+def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
+    """Return ``model`` with the process of ``other``."""
+    document = model.to_mapping()
+    document["process"] = other.to_mapping()["process"]
+    return LoopModel.from_mapping(document, model.name)
+
+
+def _data_effect(finding: DataFinding) -> FoundEffect:
+    behaviour = finding.behaviour
+    values = {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}
+    return FoundEffect(
+        finding.place, finding.effect, values, {}, finding.delta_bic, GapVerdict.NAMED
+    )

@@ -1,0 +1,87 @@
+"""The catalogue of effects as a page of the documentation.
+
+``python -m stiction_ros.effects.catalogue > docs/effects.md`` writes it.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+
+from stiction_ros.effects import BEHAVIOURS
+from stiction_ros.effects.behaviour import Behaviour, Parameter
+
+PLACES = {
+    "valve": "Valves",
+    "process": "Process",
+    "disturbance": "Disturbances",
+    "sensor": "Sensors",
+    "data": "Data",
+}
+_HEAD = """# The catalogue of effects
+
+Made from the classes in `stiction_ros/effects/` by
+`python -m stiction_ros.effects.catalogue > docs/effects.md`.
+
+An effect acts at a place, `KIND:TAG`, and stands there in the loop model:
+
+| place | in the YAML | the signal it acts on |
+|---|---|---|
+| `valve:V1` | `valves: [{name: V1, effects: [...]}]` | OP in %, to the stem |
+| `process:PV1` | `process: {outputs: [{name: PV1, effects: [...]}]}` | output less `pv0` |
+| `disturbance:PV1` | `disturbances: [{output: PV1, effect: ...}]` | 0, added to PV |
+| `sensor:PV1` | `sensors: [{name: PV1, effects: [...]}]` | PV with its noise |
+| `data` | none; a wrong tuning is mended in `controller:` | the record |
+
+Effects on a process act on its output without noise, whatever its kind, less the operating
+point `pv0`. A disturbance may also name a further input of the process instead of an output,
+`input: F_B`. A sensor takes PV with its noise. Effects of one place stand in signal order.
+`time` counts seconds since the first sample, and `signal` is the unit of the signal. The laws
+of stiction are compared in [friction.md](friction.md).
+
+*Minimum data* is what a record must hold to tell the size. *Confusable with* names what leaves
+nearly the same traces in OP and PV.
+"""
+
+
+def page() -> str:
+    """Return the page, Markdown."""
+    parts = [_HEAD]
+    for place, title in PLACES.items():
+        kinds = [kind for kind in BEHAVIOURS if place in kind.places]
+        parts.append(f"## {title}\n\n" + "\n".join(_entry(kind, place) for kind in kinds))
+    return "\n".join(parts)
+
+
+def _entry(kind: type[Behaviour], place: str) -> str:
+    name = f"`{kind.effect}`" + (f", law `{kind.law}`" if kind.law else "")
+    rows = [f"| `{p.key}` | {p.unit} | {_range(p)} | {p.description} |" for p in kind.parameters()]
+    head = f"### {name}\n\n{_summary(kind)}\n\n"
+    table = "| parameter | unit | range | meaning |\n|---|---|---|---|\n" + "\n".join(rows)
+    if kind.law not in (None, "he"):
+        return f"{head}{table}\n\nOtherwise as law `he`.\n"
+    others = [other for other in kind.confusable if other != f"{place} {kind.effect}"]
+    return (
+        f"{head}{table}\n\n- Signature: {kind.signature}.\n- Minimum data: {kind.minimum_data}.\n"
+        f"- Confusable with: {', '.join(others)}.\n"
+    )
+
+
+def _summary(kind: type[Behaviour]) -> str:
+    text = (inspect.getdoc(kind) or "").partition("\n\n")[0]
+    text = re.sub(r":\w+:`~?(?:\w+\.)*(\w+)`", r"\1", text).replace("``", "`")
+    return " ".join(text.split())
+
+
+def _range(entry: Parameter) -> str:
+    low, high = (f"{bound:g}" for bound in (entry.low, entry.high))
+    if math.isfinite(entry.low) and math.isfinite(entry.high):
+        return f"{low} … {high}"
+    if math.isfinite(entry.low):
+        return f"≥ {low}"
+    return f"≤ {high}" if math.isfinite(entry.high) else "any"
+
+
+if __name__ == "__main__":
+    print(page(), end="")

@@ -1,0 +1,96 @@
+"""First-order lags: of a valve or a sensor, and of the process behind them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import (
+    NO_SAMPLE,
+    Behaviour,
+    Filter,
+    FloatArray,
+    Memory,
+    elapsed,
+    parameter,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Lag(Behaviour):
+    r"""The signal follows with a time constant.
+
+    .. math::
+        y_k = \alpha y_{k-1} + (1 - \alpha) x_k, \quad \alpha = e^{-T_s/\tau}
+
+    The memory is (y, time of the last sample). At the first sample no time has passed, so
+    the signal is where it rested. τ = 0 leaves the signal as it is.
+
+    Raises:
+        InputError: a negative or non-finite time constant.
+    """
+
+    effect: ClassVar[str] = "lag"
+    places: ClassVar[tuple[str, ...]] = ("valve", "sensor")
+    signature: ClassVar[str] = "PV answers every move later and smoother than the model"
+    minimum_data: ClassVar[str] = "set-point moves or other fast moves of OP"
+    confusable: ClassVar[tuple[str, ...]] = (
+        "valve lag",
+        "process pole",
+        "sensor lag",
+        "process delay",
+    )
+
+    time_constant: float = parameter("tau", "s", "time constant τ", low=0.0)
+
+    def rest(self, value: float) -> Memory:
+        return (value, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        """Return the memory (y, time) and y."""
+        assert isinstance(memory, tuple)
+        last, before = memory
+        share = -math.expm1(-_ratio(elapsed(before, time), self.time_constant))
+        out = value if share == 1.0 else last + share * (value - last)
+        return (out, time), out
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return outputs, shape (N, G), for rows (tau,)."""
+        share = np.array([-math.expm1(-_ratio(sample_time, tau)) for tau in grid[:, 0].tolist()])
+        last = np.broadcast_to(np.asarray(start, dtype=float), share.shape)
+        out = np.empty((len(values), len(share)))
+        out[:1] = last
+        for k, value in enumerate(values[1:].tolist(), start=1):
+            last = np.where(share == 1.0, value, last + share * (value - last))
+            out[k] = last
+        return out
+
+    def filter(self, sample_time: float) -> Filter:
+        """Return the lag with z_k = y_{k−1}."""
+        alpha = math.exp(-_ratio(sample_time, self.time_constant))
+        return Filter(np.array([[alpha]]), np.array([1.0 - alpha]), np.array([alpha]), 1.0 - alpha)
+
+
+@dataclasses.dataclass(frozen=True)
+class ExtraPole(Lag):
+    """A process that is slower by one more :class:`Lag`, which acts on its output."""
+
+    effect: ClassVar[str] = "pole"
+    places: ClassVar[tuple[str, ...]] = ("process",)
+
+
+def _ratio(elapsed_time: float, time_constant: float) -> float:
+    """Return T/τ; a lag without a time constant forgets whatever time has passed."""
+    if elapsed_time == 0.0:
+        return 0.0
+    return elapsed_time / time_constant if time_constant > 0.0 else math.inf
