@@ -12,6 +12,8 @@ JUMP_SURE = 6.0  # BIC by which a jump is there
 JUMP_ABSENT = 3.0  # BIC by which it is not
 FRICTION = ("stiction", "backlash")
 LAGS = ("lag", "pole")
+SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
+LEAST_GAIN = 0.25
 
 
 class GapVerdict(enum.StrEnum):
@@ -58,13 +60,17 @@ def decide(fits: Sequence[CandidateFit], margin: float, threshold: float) -> Dec
         threshold: BIC by which it must beat the current model.
     """
     ranked = sorted(fits, key=lambda fit: -fit.delta_bic)
-    passed = [f for f in ranked if f.candidate.inside and f.delta_bic >= threshold]
-    kept = [f for f in passed if f.held_gain > 0.0 and large_enough(f)]
+    passed = [
+        f for f in ranked if f.candidate.inside and f.delta_bic >= threshold and large_enough(f)
+    ]
+    kept = [f for f in passed if f.held_gain > 0.0]
     outside = [f for f in ranked if not f.candidate.inside and f.held_gain > 0.0]
     stranger = outside[0] if outside else None
     if not kept:
         if stranger is not None and stranger.delta_bic >= threshold + margin:
             return _unknown(stranger, "nothing in the catalogue explains the gap")
+        if passed and passed[0].delta_bic >= threshold + SURE:
+            return _unknown(passed[0], "the held-out rows do not confirm it")
         reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
         return Decision(GapVerdict.NONE, None, (), False, reason)
     best = kept[0]
@@ -92,7 +98,8 @@ def large_enough(fit: CandidateFit) -> bool:
     """Tell whether an effect has an engineering size."""
     value = float(fit.point[0]) if len(fit.point) else 0.0
     if fit.candidate.effect == "gain":
-        return abs(float(fit.factors[0])) >= 0.03
+        # A process that hardly answers at all is a valve that does not move.
+        return abs(float(fit.factors[0])) >= 0.03 and 1.0 + float(fit.factors[0]) >= LEAST_GAIN
     if fit.candidate.effect in FRICTION:
         return value >= 0.1
     if fit.candidate.effect == "characteristic":

@@ -107,7 +107,7 @@ def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> A
     """Return effect k fitted again behind all others."""
     others = effects[:k] + effects[k + 1 :]
     base = Baseline.of(FreeRun(with_effects(bare, others), runs))
-    candidate = _same(all_candidates(base), effects[k].fit.candidate)
+    candidate = same_candidate(all_candidates(base), effects[k].fit.candidate)
     if candidate is None:
         return effects[k]
     candidate.twins = effects[k].fit.candidate.twins
@@ -118,7 +118,8 @@ def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> A
     return dataclasses.replace(effects[k], fit=fit, behaviour=behaviour)
 
 
-def _same(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
+def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
+    """Return the candidate of the same place, effect and behaviour; None when there is none."""
     for candidate in candidates:
         alike = (candidate.place, candidate.effect) == (wanted.place, wanted.effect)
         if alike and getattr(candidate, "kind", None) is getattr(wanted, "kind", None):

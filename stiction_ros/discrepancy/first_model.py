@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear_data import LinearKind
 from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
@@ -13,6 +15,10 @@ from stiction_ros.records import Record
 
 def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> LoopModel:
     """Return ARX equations fitted to the longest record, with ideal valves.
+
+    Without set-points the record is that of a loop at rest but for its own noise or cycle: a
+    model with several b could be the controller turned upside down, whose zero at one a
+    single b cannot have.
 
     Args:
         records: one at least.
@@ -24,5 +30,12 @@ def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> 
     if not records:
         raise InputError("no record", where="fit-linear")
     longest = max(records, key=len)
-    found = fit_linear(longest, LinearOptions(kind=LinearKind.ARX, delay=delay))
+    options = LinearOptions(kind=LinearKind.ARX, delay=delay)
+    if not _moved(longest):
+        options = LinearOptions(LinearKind.ARX, output_order=2, input_order=1, delay=delay)
+    found = fit_linear(longest, options)
     return found.loop_model(longest.name.removesuffix(".csv") or "loop")
+
+
+def _moved(record: Record) -> bool:
+    return record.sp is not None and bool(np.any(np.ptp(record.sp, axis=0) > 0.0))

@@ -120,11 +120,10 @@ def _frozen(
     found = []
     longest = int(np.argmax(lengths))
     length = int(lengths[longest])
-    # A value that comes back again and again is an end of the sensor's range.
     level = values[begins[longest]]
-    ends_of_range = level in (values.min(), values.max())
-    again = int((values == level).sum()) - length - 1
-    if length >= LONGEST_REST + 3.0 * natural and not (ends_of_range and again > ENDS):
+    # What stands at the end of all values is an end of the sensor's range, not a frozen value.
+    at_an_end = level in (values.min(), values.max())
+    if length >= LONGEST_REST + 3.0 * natural and not at_an_end:
         where = np.zeros(len(values), dtype=bool)
         where[begins[longest] : ends[longest]] = True
         onset, duration = begins[longest] * sample_time, length * sample_time
@@ -152,7 +151,7 @@ def _clipped(
         if quantum:
             beside = int((np.abs(values - limits[k] - (1 - 2 * k) * quantum) < 0.5 * quantum).sum())
         visits = int((np.diff(at.astype(int)) == 1).sum())
-        if count >= ENDS and visits >= 2 and count > 3 * beside:
+        if count >= ENDS and (visits >= 2 or count >= LONGEST_REST) and count > 3 * beside:
             where |= at
             ends += 1
             gain += 2.0 * count * math.log(len(values) / 10.0)

@@ -116,9 +116,9 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     moves = np.abs(np.concatenate([np.diff(op[rows]) for rows in run.runs.slices]))
     fastest = max(float(moves.max()), 1e-9) / step
     low, high = float(op.min()), float(op.max())
+    lower, upper = np.quantile(op, [0.6, 0.4]).tolist()
     friction = Axis(0.01 * span, LARGEST * span, 90, logarithmic=True)
     axes = (friction, Axis(0.0, 1.0, 11), Axis(-1.0, 1.0, 1))
-    middle = 0.5 * (low + high)
     return [
         StictionCandidate(run, j, HeStiction, axes),
         StictionCandidate(run, j, XchStiction, axes),
@@ -127,7 +127,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
             run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
         ),
         ValveCandidate(run, j, Lag, (lag_axis(run),)),
-        SaturationCandidate(run, j, Saturation, (Axis(low, middle, 10), Axis(middle, high, 10))),
+        SaturationCandidate(run, j, Saturation, (Axis(low, lower, 10), Axis(upper, high, 10))),
         ValveCandidate(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
     ]
 

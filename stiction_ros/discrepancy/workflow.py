@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.catalogue_scores import all_candidates, score_candidates
+from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, score_candidates
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
 from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, with_effects
+from stiction_ros.discrepancy.free_process import score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.process_refit import refit_process
 from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
 from stiction_ros.discrepancy.say import experiment_for, overall
 from stiction_ros.discrepancy.search import Baseline
@@ -80,6 +83,8 @@ class _Workflow:
         self.data: list[DataFinding] = [*([found] if found else []), *self.gate.findings]
         self.runs: Runs = corrected(runs, found)
         self.bare = add_data_effects(model, self.data)
+        if options.free_process:
+            self.bare = refit_process(self.bare, self.runs)
         self.base_before = Baseline.of(FreeRun(model, self.runs))
         self.looks: list[Look] = []
         self.added: tuple[AddedEffect, ...] = ()
@@ -98,9 +103,7 @@ class _Workflow:
     def _look(self, k: int) -> tuple[Look, tuple[Testable, ...]]:
         share = 1.0 / (self.options.most_effects + 1)
         candidates = all_candidates(self.base, self.controller.clock_known)
-        scores = score_candidates(
-            self.base, candidates, lambda done: self.report((k + 0.8 * done) * share)
-        )
+        scores, models = self._score(candidates, lambda done: self.report((k + 0.8 * done) * share))
         threshold = self.options.margin
         if not self.options.quick:
             threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
@@ -109,19 +112,37 @@ class _Workflow:
         where = locate(self.base)
         kept, reason = False, decision.reason
         if decision.chosen is not None and decision.inseparable:
-            step = self._extend(decision)
+            chosen = decision.chosen.candidate
+            bare = models.get((chosen.place, chosen.effect), self.bare)
+            step = self._extend(decision, bare)
             kept, reason = step.kept, step.reason
             if step.kept:
-                self.added, self.base = step.added, step.base
+                self.added, self.base, self.bare = step.added, step.base, bare
         return Look(scores, decision, where, kept, reason), testable
 
-    def _extend(self, decision: Decision) -> Extension:
+    def _score(
+        self, candidates: tuple[Candidate, ...], report: Progress
+    ) -> tuple[Scores, Mapping[tuple[str, str], LoopModel]]:
+        """Return the scores, and the model behind each candidate where the process is free."""
+        if not self.options.free_process:
+            return score_candidates(self.base, candidates, report), {}
+        model = self.base.run.model
+        found = score_with_free_process(model, self.runs, self.base, candidates, report)
+        self.base = found.scores.base
+        if not self.added:
+            self.base_before = self.base
+            self.bare = _with_process(self.bare, self.base.run.model)
+        return found.scores, {
+            name: _with_process(self.bare, refitted) for name, refitted in found.models.items()
+        }
+
+    def _extend(self, decision: Decision, bare: LoopModel) -> Extension:
         chosen = decision.chosen
         assert chosen is not None
         behaviour = chosen.behaviour(self.base.run)
         assert behaviour is not None
         new = AddedEffect(chosen, behaviour, decision.alternatives)
-        return extend(self.bare, self.runs, self.added, new, self.base)
+        return extend(bare, self.runs, self.added, new, self.base)
 
     def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
         others = [*self.added[:k], *self.added[k + 1 :]]
@@ -201,6 +222,13 @@ class _Workflow:
             "verdict": effect.verdict.value,
             "alternatives": [f"{place} {name}" for place, name in effect.alternatives],
         }
+
+
+def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
+    """Return ``model`` with the process of ``other``."""
+    document = model.to_mapping()
+    document["process"] = other.to_mapping()["process"]
+    return LoopModel.from_mapping(document, model.name)
 
 
 def _data_effect(finding: DataFinding) -> FoundEffect:
