@@ -67,6 +67,7 @@ def rates(rows: Sequence[Scored]) -> list[Rate]:
     if outside:
         found += [
             _rate("outside: named", outside, (Score.WRONG,), "<= 0.1"),
+            _rate("outside: a set", outside, (Score.ALARM,)),
             _rate("outside: unknown", outside, (Score.UNKNOWN,)),
         ]
     physics = [row for row in rows if row.family == "physics" and row.testable]

@@ -138,6 +138,11 @@ def test_intervals_of_another_effect_are_not_asked() -> None:
     assert judged(LOAD, answer("named", effect(STICTION, f_s=(1.0, 2.0)))).covered == {}
 
 
+def test_a_stem_by_mechanics_has_no_figures_to_cover() -> None:
+    law = truth(("valve:V1", HeStiction(5.0, 2.0)), family="physics")
+    assert judged(law, answer("named", effect(STICTION, f_s=(4.0, 6.0)))).covered == {}
+
+
 def test_a_named_effect_has_no_alternatives() -> None:
     named, doubted = claims_of(answer("ambiguous", effect(GAIN), effect(STEP, BIAS)))
     assert named.named
