@@ -37,7 +37,11 @@ _SEPARATING = (
 def overall(
     effects: Sequence[FoundEffect], looks: Sequence[Look], testable: Sequence[Testable]
 ) -> tuple[GapVerdict, tuple[tuple[str, str], ...]]:
-    """Return the verdict of all looks and what stays possible beside the effects."""
+    """Return the verdict of all looks and what stays possible beside the effects.
+
+    With several effects it is that of the largest, which is found first; each effect has a
+    verdict of its own.
+    """
     last = looks[-1].decision
     alternatives = [name for effect in effects for name in effect.alternatives]
     open_set = last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable
@@ -55,9 +59,7 @@ def overall(
         return GapVerdict.NONE, ()
     if last.verdict is GapVerdict.UNKNOWN and _much_left(effects, looks[-1]):
         return GapVerdict.UNKNOWN, tuple(alternatives)
-    if any(effect.verdict is GapVerdict.AMBIGUOUS for effect in effects):
-        return GapVerdict.AMBIGUOUS, tuple(dict.fromkeys(alternatives))
-    return GapVerdict.NAMED, ()
+    return effects[0].verdict, tuple(dict.fromkeys(alternatives))
 
 
 def experiment_for(
@@ -71,7 +73,7 @@ def experiment_for(
         return "; ".join(dict.fromkeys(t.experiment for t in testable if not t.testable))
     if verdict is GapVerdict.UNKNOWN:
         return "record the stem position and a second sensor, and move the set-point in steps"
-    if verdict is not GapVerdict.AMBIGUOUS:
+    if not alternatives:
         return ""
     names = {effect for _, effect in alternatives}
     names |= {effect.effect for effect in effects if effect.alternatives}
