@@ -175,7 +175,12 @@ def _before_and_after(found: Discrepancy) -> Drawing:
     figure, axes = panels(2 * len(names), 0.8 + 3.6 * len(names), sharex=True)
     at, axis_of_time = _time(found)
     for i, name in enumerate(names):
-        old, new = found.base_before.noise[i].residual, found.base_after.noise[i].residual
+        # At the start of a record nothing is scored, and the fitted state may run anywhere.
+        scored = found.base_before.blocks[i].train | found.base_before.blocks[i].held
+        old, new = (
+            np.where(scored, base.noise[i].residual, np.nan)
+            for base in (found.base_before, found.base_after)
+        )
         pv = found.base_after.run.runs.pv[:, i]
         top, low = axes[2 * i, 0], axes[2 * i + 1, 0]
         top.plot(at, pv, color=GREY, linewidth=0.8, label=f"{name} measured")
