@@ -19,7 +19,7 @@ from stiction_ros.loop import LoopModel
 COARSE_ROUNDS = 3
 TURNS = 3
 WIDE = 4  # starts behind which all figures are searched again
-SPARSE = {"stiction": (9, 4, 1), "backlash": (9,), "slew": (7,), "saturation": (4, 4)}
+SPARSE = {"stiction": (9, 4, 1), "backlash": (9, 1), "slew": (7,), "saturation": (4, 4)}
 # What another process would do as well cannot be told while the process is free.
 ABSORBED = ("lag", "pole", "delay", "gain", "leak", "other dynamics")
 

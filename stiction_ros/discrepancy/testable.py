@@ -100,7 +100,7 @@ def reference_point(base: Baseline, candidate: Candidate) -> FloatArray:
         return np.array([[low.low, float(np.clip(np.quantile(op, 0.95), high.low, high.high))]])
     sizes = {
         "stiction": (1.0, 0.5, 0.0),
-        "backlash": (1.0,),
+        "backlash": (1.0, 0.0),
         "lag": (3.0 * step,),
         "pole": (3.0 * step,),
         "delay": (2.0,),

@@ -29,8 +29,8 @@ _NEGLIGIBLE = 1e-9
 class ValveCandidate(Candidate):
     """A behaviour at the end of a valve's chain.
 
-    Its stems start at rest at the first OP; stiction has one more figure, where its stem
-    stood within the band.
+    Its stems start at rest at the first OP; stiction and backlash have one more figure, where
+    the stem stood within the band.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class ValveCandidate(Candidate):
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         """Return where the stems stand before the first sample, shape (G,), %."""
-        return np.full(len(points), first)
+        return np.array([first + self.lead(point) for point in points])
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         stems = self.stems(run, points)
@@ -82,14 +82,24 @@ class StictionCandidate(ValveCandidate):
     def rows(self, points: FloatArray) -> FloatArray:
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
-    def starts(self, points: FloatArray, first: float) -> FloatArray:
-        return np.array([first + self.lead(point) for point in points])
-
     def lead(self, point: FloatArray) -> float:
         return 0.98 * float(point[0] * point[2])
 
     def count(self, point: FloatArray) -> int:
         return 2
+
+
+class BacklashCandidate(ValveCandidate):
+    """Backlash by its band and the place of the stem in it at the start."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return points[:, :1]
+
+    def lead(self, point: FloatArray) -> float:
+        return 0.49 * float(point[0] * point[1])
+
+    def count(self, point: FloatArray) -> int:
+        return 1
 
 
 class SaturationCandidate(ValveCandidate):
@@ -127,7 +137,9 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     return [
         StictionCandidate(run, j, HeStiction, (*fine, start)),
         StictionCandidate(run, j, XchStiction, (*rough, start)),
-        ValveCandidate(run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True),)),
+        BacklashCandidate(
+            run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True), start)
+        ),
         ValveCandidate(
             run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
         ),

@@ -173,8 +173,10 @@ def test_log_time_is_simulated_time(bag):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
     out = tmp_path / "demo"
+    # Tests that run in the background inherit a SIGINT that is ignored.
+    start = ["env", "--default-signal=INT", sys.executable, "-m", "stiction_ros.cli.main"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "stiction_ros.cli.main", "demo", "siso", "--out", str(out)],
+        [*start, "demo", "siso", "--out", str(out)],
         env=ros_environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
