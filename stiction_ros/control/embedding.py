@@ -146,8 +146,9 @@ class EmbeddingMpc:
         """Return the cheapest plan from ξ̂ (n,) and the stem estimates ``last`` (m,), or None."""
         best: tuple[float, EmbeddingProblem, HorizonSolution] | None = None
         valves, converged = self.valves(last), True
+        gradient = self.cost.linear(state - target.state, last - target.stem, target.path)
         for problem in self._problems:
-            solution = problem.solve(state, target, valves)
+            solution = problem.solve(state, target, valves, gradient)
             converged = converged and not problem.limit_reached
             if solution is None:
                 continue

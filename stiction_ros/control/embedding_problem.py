@@ -6,7 +6,13 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.control.horizon import HorizonCost, HorizonLimits, HorizonQp, HorizonSolution
+from stiction_ros.control.horizon import (
+    HorizonCost,
+    HorizonLimits,
+    HorizonQp,
+    HorizonSolution,
+    SharedTerms,
+)
 from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
 
@@ -89,6 +95,17 @@ class EmbeddingProblem:
         for i, (column, before) in enumerate(rows):
             matrix[i, column], matrix[i, before] = 1.0, -1.0
         self._rows = len(rows)
+        # Where the stem of a valve stays until it jumps, and the curvature along that.
+        anchors = []
+        for j, pattern in enumerate(combination):
+            stays = 0
+            if pattern is not None:
+                stays = cost.horizon if pattern.direction == 0 else pattern.wait
+            anchors.append(self._column(j, 0, stays))
+        self._anchors = np.array(anchors).T
+        self._curved = cost.hessian @ self._anchors
+        self._free = np.full((2, shape.shape[1] + len(rows)), FREE)
+        self._free[0] = -FREE
         self._qp = HorizonQp(
             cost, np.ascontiguousarray(shape), matrix, limits.output, limits.iterations
         )
@@ -104,29 +121,34 @@ class EmbeddingProblem:
         return column.reshape(-1)
 
     def solve(
-        self, state: FloatArray, target: Target, valves: StickyState
+        self,
+        state: FloatArray,
+        target: Target,
+        valves: StickyState,
+        gradient: FloatArray | None = None,
     ) -> HorizonSolution | None:
-        """Return the best plan of this combination from ξ̂ (n,), or None."""
+        """Return the best plan of this combination from ξ̂ (n,), or None.
+
+        ``gradient`` is that of the cost, shape (N m,), where the caller has it already.
+        """
         deviation = valves.last - target.stem
-        offset = np.zeros((self._horizon, self._width))
-        for j, pattern in enumerate(self.combination):
-            if pattern is not None:
-                stays = self._horizon if pattern.direction == 0 else pattern.wait
-                offset[:stays, j] = deviation[j]
+        if gradient is None:
+            gradient = self._qp.cost.linear(state - target.state, deviation, target.path)
         lower, upper = self._bounds(target, valves)
         return self._qp.solve(
             state - target.state,
             deviation,
-            offset.reshape(-1),
+            self._anchors @ deviation,
             lower,
             upper,
             target.pv,
             target.path,
+            SharedTerms(gradient, self._curved @ deviation),
         )
 
     def _bounds(self, target: Target, valves: StickyState) -> tuple[FloatArray, FloatArray]:
         size = self._qp.size
-        lower, upper = np.full(size + self._rows, -FREE), np.full(size + self._rows, FREE)
+        lower, upper = self._free.copy()
         row = size
         for j, pattern in enumerate(self.combination):
             first = self._first[j]

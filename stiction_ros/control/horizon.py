@@ -132,6 +132,19 @@ class HorizonSolution:
 
 
 @dataclasses.dataclass(frozen=True)
+class SharedTerms:
+    """Products that several programmes of one step share.
+
+    Attributes:
+        gradient: of :meth:`HorizonCost.linear`, shape (N m,).
+        curved: Hessian times the offset, shape (N m,).
+    """
+
+    gradient: FloatArray
+    curved: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
 class QpData:
     """min x'Hx/2 + f'x with bounds on x and then on the rows A x, as daqp takes it."""
 
@@ -206,6 +219,7 @@ class HorizonQp:
         upper: FloatArray,
         target_pv: FloatArray,
         path: FloatArray | None = None,
+        shared: SharedTerms | None = None,
     ) -> HorizonSolution | None:
         """Return the best plan, or None when there is none.
 
@@ -218,17 +232,18 @@ class HorizonQp:
             lower, upper: bounds on r and then on the further rows, shape (r + c,).
             target_pv: outputs at the target, shape (p,), about which soft bounds are written.
             path: as in :meth:`HorizonCost.linear`.
+            shared: products that the caller has already; None computes them.
         """
         self.limit_reached = False
-        gradient = self.cost.linear(state, last, path)
+        gradient = self.cost.linear(state, last, path) if shared is None else shared.gradient
         linear = np.zeros(self.size + self._slacks)
         base = 0.0
-        if offset.any():
-            curved = self.cost.hessian @ offset
+        if shared is not None or offset.any():
+            curved = self.cost.hessian @ offset if shared is None else shared.curved
             base = float(offset @ (0.5 * curved + gradient))
             gradient = gradient + curved
         linear[: self.size] = self.shape.T @ gradient
-        if np.any(lower > upper):
+        if (lower > upper).any():
             return None
         self._fill_bounds(state, offset, lower, upper, target_pv)
         if self.size == 0:
