@@ -23,7 +23,7 @@ def message_class(kind: str) -> Any:
     package, _, name = kind.partition("/msg/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError):
+    except (ImportError, AttributeError, ValueError):
         raise InputError(
             f"type {kind} is not installed", fix=f"install and source the package {package}"
         ) from None

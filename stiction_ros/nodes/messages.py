@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 from array import array
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -16,7 +14,6 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from stiction_ros.control import StepResult
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
 
 SECOND = 1_000_000_000
 LEVELS = {"ok": b"\x00", "warn": b"\x01", "error": b"\x02"}
@@ -112,18 +109,3 @@ def status(
         message=text,
         values=[KeyValue(key=key, value=str(value)) for key, value in values],
     )
-
-
-def message_class(kind: str) -> Any:
-    """Return the class of a message type such as ``sensor_msgs/msg/JointState``.
-
-    Raises:
-        InputError: its package is not installed.
-    """
-    package, _, name = kind.partition("/msg/")
-    try:
-        return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError, ValueError):
-        raise InputError(
-            f"type {kind} is not installed", fix=f"install and source the package {package}"
-        ) from None

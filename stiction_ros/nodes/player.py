@@ -12,8 +12,9 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stiction_ros.errors import InputError
+from stiction_ros.nodes.endpoints import message_class
 from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode, Outlet
-from stiction_ros.nodes.messages import SECOND, message_class, to_stamp
+from stiction_ros.nodes.messages import SECOND, to_stamp
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.node_settings import PlayerNodeSettings
 from stiction_ros.records.bag_metadata import BagTopic, Qos
