@@ -38,8 +38,7 @@ def add(commands: Any) -> None:
         "bench",
         help="measure speed, side by side",
         description="Measure speed against a baseline in the same run (graph, identification, "
-        "control, record), "
-        "or count how often the discrepancy workflow is right (gap).",
+        "control, record), or count how often the discrepancy workflow is right (gap).",
     )
     parser.add_argument(
         "name", nargs="?", default="graph", choices=(*BENCHMARKS, "gap"), help="default: graph"

@@ -21,6 +21,7 @@ from stiction_ros.examples.control_cases import (
     run_reference,
     run_unaware,
 )
+from stiction_ros.loop.set_points import holds
 
 OFFSET_LIMITS = (0.006, 0.02)  # kg/m³, °C
 WIDTH = 100  # characters that the table needs
@@ -100,7 +101,7 @@ def run_seed(names: tuple[str, ...], seed: int) -> dict[str, Runs]:
 
 def scores(name: str, runs: list[Runs]) -> CaseScores:
     """Return the scores of the case ``name`` over ``runs``, one entry per seed."""
-    from stiction_ros.report.scoring import amplitude, dominant_cycle, holds
+    from stiction_ros.report.scoring import amplitude, dominant_cycle
 
     cycles = []
     for embedding, _, unaware in runs:

@@ -9,6 +9,7 @@ import numpy as np
 from stiction_ros.discrepancy.noise import BoolArray, projector
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
+from stiction_ros.loop.set_points import set_point_moves
 
 KNOTS = 60
 WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
@@ -100,7 +101,7 @@ def _moments(base: Baseline) -> dict[str, BoolArray]:
     moved = np.zeros(count, dtype=bool)
     for record, rows in zip(run.runs.records, run.runs.slices, strict=True):
         if record.sp is not None:
-            moved[rows][1:] |= np.any(np.diff(record.sp, axis=0) != 0.0, axis=1)
+            moved[rows][set_point_moves(record.sp)] = True
     reach = max(run.responses.skip + 10, 10)
     if moved.any():
         found["after moves of the set-point"] = _after(moved, reach)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,6 +12,7 @@ from stiction_ros.effects import Behaviour, HeStiction, StepDisturbance
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Measurement, SetPoints, simulate_closed_loop
+from stiction_ros.loop.set_points import holds
 from stiction_ros.online.live_controller import LiveController
 from stiction_ros.online.session import Scenario
 
@@ -167,9 +167,7 @@ def _upset(plant: LoopModel, upset: tuple[str, float, float]) -> LoopModel:
 
 
 def _scores(error: FloatArray, sp: FloatArray, stem: FloatArray, sticky: int) -> ControlOutcome:
-    moves = np.flatnonzero(np.any(np.diff(sp, axis=0) != 0.0, axis=1)) + 1
-    edges = [0, *moves.tolist(), len(sp)]
-    ends = [b for a, b in itertools.pairwise(edges) if b - a >= 2 * OFFSET_SAMPLES]
+    ends = [b for a, b in holds(sp) if b - a >= 2 * OFFSET_SAMPLES]
     offset = np.mean([np.abs(error[b - OFFSET_SAMPLES : b].mean(axis=0)) for b in ends], axis=0)
     changes = np.diff(stem[:, :sticky], axis=0)
     turns = [_turns(stem[b - LATE_SAMPLES : b, j]) for b in ends for j in range(sticky)]

@@ -14,10 +14,9 @@ import numpy as np
 from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
-from stiction_ros.identification.scan import OutputScan
+from stiction_ros.identification.scan import BATCH, OutputScan
 from stiction_ros.identification.stem_kernels import count_moves
 
-BLOCK = 160_000
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
 
@@ -202,7 +201,7 @@ def scan_criteria(
     scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
     u = data.u[valve]
     start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    size = max(1, BLOCK // len(u))
+    size = max(1, BATCH // len(u))
     loss = np.zeros((len(criteria), len(grid)))
     best = np.zeros((len(criteria), len(grid), len(data.y)), dtype=int)
     moves = np.zeros(len(grid))

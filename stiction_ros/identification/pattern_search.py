@@ -33,10 +33,9 @@ from stiction_ros.identification.patterns import (
     levels_of,
     resting_cells,
 )
-from stiction_ros.identification.scan import PatternEnergy
+from stiction_ros.identification.scan import BATCH, PatternEnergy
 from stiction_ros.identification.stem_kernels import count_moves
 
-BLOCK = 160_000
 MOST_CELLS = 3000
 CELL_SAMPLES = 3e7
 SAMPLES = 6000  # up to which neighbourhoods are of full size
@@ -71,7 +70,7 @@ class PatternSearch:
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D."""
-        size = max(1, BLOCK // len(self.u))
+        size = max(1, BATCH // len(self.u))
         parts = [
             self._evaluate(cells.part(slice(i, i + size)))
             for i in range(0, len(cells.bounds), size)

@@ -20,6 +20,8 @@ from stiction_ros.identification.scan_kernels import (
     subtract_projections,
 )
 
+BATCH = 160_000  # samples of all stems of a batch together, which stay in the cache
+
 
 class OutputScan:
     """Criterion of one output as a function of one valve's stem.

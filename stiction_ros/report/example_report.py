@@ -15,6 +15,7 @@ from stiction_ros.examples.example import Example
 from stiction_ros.examples.one_step import one_step_estimate
 from stiction_ros.identification import Identification, OutputModel
 from stiction_ros.json_values import finite
+from stiction_ros.loop.set_points import set_point_moves
 from stiction_ros.processes import StirredTank
 from stiction_ros.report.drawing import (
     BLUE,
@@ -139,7 +140,7 @@ def window(example: Example) -> slice:
     width = max(count // 5, 2)
     move = count // 2
     if record.sp is not None:
-        moves = np.flatnonzero(np.any(np.diff(record.sp, axis=0) != 0.0, axis=1)) + 1
+        moves = set_point_moves(record.sp)
         if moves.size:
             move = int(moves[np.argmin(np.abs(moves - count // 2))])
     first = min(max(move - round(0.4 * width), 0), count - width)

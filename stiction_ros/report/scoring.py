@@ -21,12 +21,12 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.loop.set_points import holds
 from stiction_ros.records import Record
 
 OFFSET_SAMPLES = 50
@@ -107,17 +107,6 @@ class Phases:
     cycle: Cycle | None
     before: Phase | None
     after: Phase | None
-
-
-def holds(sp: FloatArray) -> list[tuple[int, int]]:
-    """Return first and one-past-last sample of every stretch without a set-point move.
-
-    Args:
-        sp: set-points, shape (N, p).
-    """
-    moves = np.flatnonzero(np.any(np.diff(sp, axis=0) != 0.0, axis=1)) + 1
-    edges = [0, *moves.tolist(), len(sp)]
-    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
 
 
 def round_length(sp: FloatArray) -> int | None:
