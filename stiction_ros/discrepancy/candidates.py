@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from stiction_ros.discrepancy.free_run import FreeRun
-from stiction_ros.effects import Behaviour, FloatArray
+from stiction_ros.effects import Behaviour, FloatArray, Parameter
+from stiction_ros.effects.behaviour import SimulatesGrid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,6 +80,22 @@ class Response:
             {i: v[:, point : point + 1] for i, v in self.shifts.items()},
             {i: v[:, point : point + 1] for i, v in self.sizes.items()},
         )
+
+
+class GridBehaviour(SimulatesGrid, Protocol):
+    """What a candidate needs of a behaviour: whole grids at once, and one by its figures."""
+
+    effect: ClassVar[str]
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """Return the parameters in the order of the grid's columns."""
+        ...
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Behaviour:
+        """Return the behaviour with the given values by key."""
+        ...
 
 
 class Candidate(ABC):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidates import Axis, Candidate, Response
+from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
 from stiction_ros.discrepancy.free_run import FreeRun
-from stiction_ros.discrepancy.valve_candidates import lag_axis, simulate_grid
+from stiction_ros.discrepancy.valve_candidates import lag_axis
 from stiction_ros.effects import (
     Behaviour,
     DriftDisturbance,
@@ -41,7 +41,7 @@ class OutputCandidate(Candidate):
 class FilterCandidate(OutputCandidate):
     """A linear change between process and sensor: pole, delay, leak."""
 
-    def __init__(self, run: FreeRun, output: int, kind: type[Behaviour], axis: Axis) -> None:
+    def __init__(self, run: FreeRun, output: int, kind: type[GridBehaviour], axis: Axis) -> None:
         """Take the output's index, the behaviour and its one figure."""
         super().__init__(run, output, "process", kind.effect)
         self.kind, self.axes = kind, (axis,)
@@ -51,7 +51,7 @@ class FilterCandidate(OutputCandidate):
         for rows in run.runs.slices:
             values = run.forced[rows, self.output]
             step = run.runs.sample_time
-            parts.append(simulate_grid(self.kind, points, values, float(values[0]), step))
+            parts.append(self.kind.simulate_grid(points, values, float(values[0]), step))
         return Response({self.output: np.vstack(parts) - run.forced[:, self.output, None]})
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:

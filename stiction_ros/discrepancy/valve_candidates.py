@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidates import Axis, Candidate, Response
+from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
 from stiction_ros.discrepancy.free_run import FreeRun
 from stiction_ros.effects import (
     Backlash,
@@ -34,7 +33,7 @@ class ValveCandidate(Candidate):
     """
 
     def __init__(
-        self, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...]
+        self, run: FreeRun, valve: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
     ) -> None:
         """Take the valve's index, the behaviour and the figures that are searched."""
         self.valve, self.kind, self.axes = valve, kind, axes
@@ -54,7 +53,7 @@ class ValveCandidate(Candidate):
         for part in run.runs.slices:
             values = run.stems[part, self.valve]
             start = self.starts(points, float(values[0]))
-            parts.append(simulate_grid(self.kind, rows, values, start, run.runs.sample_time))
+            parts.append(self.kind.simulate_grid(rows, values, start, run.runs.sample_time))
         return np.clip(np.vstack(parts), low, high)
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
@@ -153,17 +152,3 @@ def lag_axis(run: FreeRun) -> Axis:
     """Return the range of time constants that a record tells."""
     step = run.runs.sample_time
     return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)
-
-
-def simulate_grid(
-    kind: type[Behaviour],
-    rows: FloatArray,
-    values: FloatArray,
-    start: FloatArray | float,
-    sample_time: float,
-) -> FloatArray:
-    """Return ``kind.simulate_grid``, with the sample time where it asks for one."""
-    simulate = kind.simulate_grid  # type: ignore[attr-defined]
-    if "sample_time" in inspect.signature(simulate).parameters:
-        return np.asarray(simulate(rows, values, start, sample_time))
-    return np.asarray(simulate(rows, values, start))

@@ -43,7 +43,11 @@ class Backlash(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for rows (band,)."""
         half = grid[:, 0] / 2.0

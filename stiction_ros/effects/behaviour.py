@@ -176,9 +176,20 @@ class SimulatesGrid(Protocol):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
-        """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters)."""
+        """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters).
+
+        Args:
+            grid: one set of parameters a row.
+            values: the incoming signal, shape (N,).
+            start: where it had rested before, one for all or shape (G,).
+            sample_time: s; only behaviours with a time of their own take notice.
+        """
         ...
 
 

@@ -43,7 +43,11 @@ class Characteristic(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (curve,)."""
         straight = np.abs(grid[:, 0]) < _STRAIGHT

@@ -41,7 +41,11 @@ class _Delay(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (delay in samples,)."""
         starts = np.broadcast_to(np.asarray(start, dtype=float), len(grid))

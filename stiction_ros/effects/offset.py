@@ -25,7 +25,11 @@ class Offset(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (size,)."""
         return values[:, None] + grid[:, 0]

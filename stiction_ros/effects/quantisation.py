@@ -31,7 +31,11 @@ class Quantisation(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (step,)."""
         quantum = grid[:, 0]

@@ -37,7 +37,11 @@ class _Limits(Behaviour):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (low, high)."""
         return np.minimum(np.maximum(values[:, None], grid[:, 0]), grid[:, 1])

@@ -45,7 +45,11 @@ class HeStiction(FrictionPair):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
         # Compiled code takes half a second to import, which nodes that scan no grid save.

@@ -58,7 +58,11 @@ class SmoothedKanoStiction(SlipJumpPair):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for rows (S, J) or (S, J, τ).
 

@@ -59,7 +59,11 @@ class SemiPhysicalStiction(FrictionPair):
 
     @classmethod
     def simulate_grid(
-        cls, grid: FloatArray, values: FloatArray, start: FloatArray | float
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for rows (f_S, f_D) or (f_S, f_D, K)."""
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
