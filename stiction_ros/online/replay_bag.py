@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -16,6 +15,7 @@ from stiction_ros.records.bag_messages import BagMessage, last_part, read_messag
 from stiction_ros.records.bag_metadata import BagTopic
 from stiction_ros.records.bag_reader import JOINT_STATE
 from stiction_ros.records.run_log import Fit, ModeChange, fits, mode_changes
+from stiction_ros.records.run_metadata import mapping_of
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 STRING = "std_msgs/msg/String"
@@ -224,7 +224,7 @@ def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
             ops += 1
         elif message.type == STRING and name == "loop_model":
             text = str(message.message.data)
-            document = _document(text)
+            document = mapping_of(text)
             valid_from = document.get("valid_from", 0)
             yield PublishedModel(text, valid_from if isinstance(valid_from, int) else 0, ops)
 
@@ -235,7 +235,7 @@ def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> di
     for message in messages:
         if message.type != STRING or last_part(message.topic)[1] != "config":
             continue
-        document = _document(str(message.message.data))
+        document = mapping_of(str(message.message.data))
         parameters, model = document.get("parameters"), document.get("model")
         if not isinstance(parameters, dict):
             continue
@@ -253,14 +253,6 @@ def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> di
             continue
         found.setdefault(kind, config)
     return found
-
-
-def _document(text: str) -> dict[str, Any]:
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError:
-        return {}
-    return document if isinstance(document, dict) else {}
 
 
 def _hardware(config: NodeConfig) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -90,12 +91,16 @@ def string_of(data: bytes) -> str | None:
         return None
 
 
-def _short(text: str) -> dict[str, str]:
-    """Return seed and version of a configuration."""
+def mapping_of(text: str) -> dict[str, Any]:
+    """Return the mapping that a published YAML text holds; empty when it holds none."""
     try:
         document = yaml.safe_load(text)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError, RecursionError):  # a date such as 2026-13-45, 1000 brackets
         return {}
-    if not isinstance(document, dict):
-        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def _short(text: str) -> dict[str, str]:
+    """Return seed and version of a configuration."""
+    document = mapping_of(text)
     return {key: str(document[key]) for key in ("seed", "version") if key in document}

@@ -7,8 +7,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
-
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -16,6 +14,7 @@ from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.processes.process import NoiseEntry
 from stiction_ros.records.record import Record
 from stiction_ros.records.run_log import RunLog
+from stiction_ros.records.run_metadata import mapping_of
 from stiction_ros.report.scoring import Phase, Phases, phases, round_length, score
 
 TANK_UNITS = {"C": "kg/m³", "T": "°C"}
@@ -155,11 +154,8 @@ def simulated_plant(log: RunLog) -> tuple[LoopModel | None, int | None]:
 def plant_configuration(log: RunLog) -> Mapping[str, Any]:
     """Return what the node ``plant`` said on ``~/config``; empty when it was not there."""
     for config in log.configs:
-        try:
-            document = yaml.safe_load(config.text)
-        except yaml.YAMLError:
-            continue
-        node = document.get("node") if isinstance(document, dict) else None
+        document = mapping_of(config.text)
+        node = document.get("node")
         if isinstance(node, str) and node.rpartition("/")[2] == "plant":
-            return dict(document)
+            return document
     return {}

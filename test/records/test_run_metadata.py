@@ -4,7 +4,14 @@ import pytest
 from bag_making import Bag, text
 
 from stiction_ros.records.mcap_scan import McapScan
-from stiction_ros.records.run_metadata import custom_data, merged, news, run_metadata, string_of
+from stiction_ros.records.run_metadata import (
+    custom_data,
+    mapping_of,
+    merged,
+    news,
+    run_metadata,
+    string_of,
+)
 
 STRING = "std_msgs/msg/String"
 
@@ -42,6 +49,11 @@ def test_other_topics_and_types_tell_nothing() -> None:
 @pytest.mark.parametrize("said", ["seed: [", "- seed", "text"])
 def test_a_configuration_that_is_no_mapping_is_kept_as_text(said: str) -> None:
     assert news("/plant/config", STRING, text(said)) == {"config:/plant": said}
+
+
+@pytest.mark.parametrize("said", ["a: [", "2026-13-45", "[" * 2000, "- 1", "only words", ""])
+def test_a_text_that_holds_no_mapping_is_an_empty_one(said: str) -> None:
+    assert mapping_of(said) == {}
 
 
 def test_the_last_text_of_a_key_counts() -> None:
