@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate, Response
 from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.misfit import misfit
 from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, projector, whiten
 from stiction_ros.effects import Behaviour, FloatArray
 
@@ -107,9 +108,8 @@ def fit_candidate(
         centres = [np.array(inner)]
     for centre in centres:
         search.refine(centre, 0.7)
-    if candidate.dated:
-        return _dated(search)
-    return search.best()
+    found = _dated(search) if candidate.dated else search.best()
+    return dataclasses.replace(found, effect_energy=_energy(base, found))
 
 
 def _dated(search: _Search) -> CandidateFit:
@@ -231,7 +231,7 @@ class _Search:
         key = tuple(values.tolist())
         if key in self.judged:
             return self.judged[key]
-        noise, factors, energy = {}, np.zeros(0), 0.0
+        noise, factors = {}, np.zeros(0)
         gained, held = -self.candidate.count(values) * self._price(response), 0.0
         for i in response.outputs:
             shared, target = self.base.columns[i], self.gap[:, i]
@@ -248,8 +248,7 @@ class _Search:
             noise[i] = left
             gained += self.base.noise[i].bic(0) - left.bic(0)
             held += self.base.noise[i].held_minus_two_log - left.held_minus_two_log
-            energy += _energy(response, i, factors, left, self.base)
-        fit = CandidateFit(self.candidate, values, factors, noise, gained, held, energy)
+        fit = CandidateFit(self.candidate, values, factors, noise, gained, held, 0.0)
         self.judged[key] = fit
         if self.found is None or gained > self.found.delta_bic:
             self.found = fit
@@ -260,52 +259,19 @@ class _Search:
         return float(np.log(max(rows, 2)))
 
 
-def misfit(
-    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
-) -> FloatArray:
-    """Return Σ n log(sum of squared innovations) for every point of a grid under given φ."""
-    total: FloatArray | float = 0.0
-    for i in response.outputs:
-        rows = base.blocks[i].train
-        basis = projector(whiten(base.columns[i], ar[i])[rows])
-        target = gap[:, i : i + 1]
+def _energy(base: Baseline, fit: CandidateFit) -> float:
+    """Return the squared whitened response over the innovation variance, all outputs together."""
+    response = fit.candidate.respond(base.run, fit.point[None, :])
+    total = 0.0
+    for i, noise in fit.noise.items():
+        wave = np.zeros(len(base.run.runs))
         if i in response.shifts:
-            target = target - response.shifts[i]
-        left = _without(basis, whiten(target, ar[i])[rows])
-        squares = np.einsum("ng,ng->g", left, left)
+            wave = wave + response.shifts[i][:, 0]
         if i in response.sizes:
-            squares = squares - _explained(basis, left, whiten(response.sizes[i], ar[i])[rows])
-        total = total + rows.sum() * np.log(np.maximum(squares, _TINY))
-    return np.asarray(total)
-
-
-def _explained(basis: FloatArray, left: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return the sum of squares that the factors take away, shape (G,)."""
-    rows, points, count = sizes.shape
-    free = _without(basis, sizes.reshape(rows, points * count)).reshape(sizes.shape)
-    gram = np.einsum("ngs,ngt->gst", free, free)
-    if left.shape[1] == points:
-        cross = np.einsum("ngs,ng->gs", free, left)
-    else:
-        cross = np.einsum("ngs,n->gs", free, left[:, 0])
-    ridge = 1e-10 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(count)
-    solved = np.linalg.solve(gram + ridge + _TINY * np.eye(count), cross[:, :, None])[:, :, 0]
-    return np.asarray(np.einsum("gs,gs->g", solved, cross))
-
-
-def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(values - basis @ (basis.T @ values))
-
-
-def _energy(
-    response: Response, output: int, factors: FloatArray, fit: NoiseFit, base: Baseline
-) -> float:
-    wave = np.zeros(len(base.run.runs))
-    if output in response.shifts:
-        wave = wave + response.shifts[output][:, 0]
-    if output in response.sizes:
-        wave = wave + response.sizes[output][:, 0] @ factors
-    rows = base.blocks[output].train
-    basis = projector(whiten(base.columns[output], fit.ar)[rows])
-    left = _without(basis, whiten(wave, fit.ar)[rows][:, None])
-    return float(np.sum(left**2)) / max(fit.innovation_std**2, _TINY)
+            wave = wave + response.sizes[i][:, 0] @ fit.factors
+        rows = base.blocks[i].train
+        basis = projector(whiten(base.columns[i], noise.ar)[rows])
+        left = whiten(wave, noise.ar)[rows]
+        left = left - basis @ (basis.T @ left)
+        total += float(left @ left) / max(noise.innovation_std**2, _TINY)
+    return total
