@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.free_run import FreeRun, end_to_end
 from stiction_ros.discrepancy.valve_candidates import lag_axis
 from stiction_ros.effects import (
     Behaviour,
@@ -52,7 +52,9 @@ class FilterCandidate(OutputCandidate):
             values = run.forced[rows, self.output]
             step = run.runs.sample_time
             parts.append(self.kind.simulate_grid(points, values, float(values[0]), step))
-        return Response({self.output: np.vstack(parts) - run.forced[:, self.output, None]})
+        response = end_to_end(parts)
+        response -= run.forced[:, self.output, None]
+        return Response({self.output: response})
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
         return self.kind.from_mapping({self.kind.parameters()[0].key: float(point[0])})
