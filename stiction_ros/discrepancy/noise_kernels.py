@@ -44,7 +44,12 @@ def whitened_rows(values: FloatArray, ar: FloatArray, rows: BoolArray) -> FloatA
         factor = ar[lag - 1]
         for k in range(lag, len(values)):
             white[k] -= factor * values[k - lag]
-    return white[rows]
+    at = 0
+    for k in range(len(values)):
+        if rows[k]:
+            white[at] = white[k]
+            at += 1
+    return white[:at].copy()
 
 
 @compiled
@@ -79,12 +84,15 @@ def least_squares(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatA
     if rows < count:
         return False, beta
     whole, scale = np.empty((count + 1, rows)), np.empty(count)
-    order = np.arange(count)
+    order = np.empty(count, dtype=np.int64)
     for j in range(count):
+        order[j] = j
         length = np.sqrt(inner_product(columns[j], columns[j]))
         scale[j] = length if length > NOTHING else np.inf
-        whole[j] = columns[j] / scale[j]
-    whole[count] = target
+        for k in range(rows):
+            whole[j, k] = columns[j, k] / scale[j]
+    for k in range(rows):
+        whole[count, k] = target[k]
     largest, rank = 0.0, 0
     for step in range(count):
         pivot, best = step, -1.0
@@ -105,7 +113,9 @@ def least_squares(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatA
         for j in range(step + 1, rank):
             value -= whole[j, step] * beta[order[j]]
         beta[order[step]] = value / whole[step, step]
-    return True, beta / scale
+    for j in range(count):
+        beta[j] /= scale[j]
+    return True, beta
 
 
 @compiled
@@ -116,18 +126,22 @@ def _lagged_products(residual: FloatArray, rows: BoolArray, most: int) -> FloatA
     """
     count = len(residual)
     gram = np.zeros((most + 1, most + 1))
-    marked = np.where(rows, residual, 0.0)
-    after = np.append(rows[1:], False)
-    ends = np.flatnonzero(after != rows) + 1
+    marked, ends, found = np.zeros(count), np.empty(count, dtype=np.int64), 0
+    for k in range(count):
+        if rows[k]:
+            marked[k] = residual[k]
+        if rows[k] != (k + 1 < count and rows[k + 1]):
+            ends[found] = k
+            found += 1
     for lag in range(min(most, count - 1) + 1):
         value = inner_product(marked[lag:], residual[: count - lag])
         gram[0, lag] = value
         for i in range(most - lag):
-            for end in ends:
-                at = end - i - 1
+            for end in ends[:found]:
+                at = end - i
                 if at >= lag:
                     product = residual[at] * residual[at - lag]
-                    value += product if after[end - 1] else -product
+                    value += -product if rows[end] else product
             gram[i + 1, i + 1 + lag] = value
     return gram
 
@@ -139,8 +153,12 @@ def best_autoregression(residual: FloatArray, rows: BoolArray, most: int) -> Flo
     One Cholesky factor of the normal equations holds those of every lower order.
     """
     gram = _lagged_products(residual, rows, most)
-    ridge = _TRACE_SHARE * np.trace(gram) + TINY
-    count = max(int(np.sum(rows)), 2)
+    ridge, count = TINY, 0
+    for lag in range(most + 1):
+        ridge += _TRACE_SHARE * gram[lag, lag]
+    for marked in rows:
+        count += 1 if marked else 0
+    count = max(count, 2)
     factor, half = np.zeros((most, most)), np.zeros(most)
     best_order, left = 0, gram[0, 0]
     best_score = count * np.log(max(left, TINY))
@@ -197,7 +215,10 @@ def turn(
         rows: that are fitted, shape (N,).
         ar: φ, shape (p,).
     """
-    white = np.empty((len(columns), int(np.sum(rows))))
+    wanted = whitened_rows(target, ar, rows)
+    white = np.empty((len(columns), len(wanted)))
     for j in range(len(columns)):
-        white[j] = whitened_rows(columns[j], ar, rows)
-    return least_squares(white, whitened_rows(target, ar, rows))
+        column = whitened_rows(columns[j], ar, rows)
+        for n in range(len(column)):
+            white[j, n] = column[n]
+    return least_squares(white, wanted)

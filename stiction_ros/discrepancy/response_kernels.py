@@ -18,19 +18,17 @@ def add_moving_sum(total: FloatArray, taps: FloatArray, stems: FloatArray) -> No
         stems: x, shape (N, G), or (N, 1) for all columns.
     """
     count, size = total.shape
-    if stems.shape[1] == 1:
-        row = stems[:, 0] - stems[0, 0]
-        for i in np.flatnonzero(taps):
-            for k in range(i + 1, count):
-                part = taps[i] * row[k - i]
+    alone = stems.shape[1] == 1
+    for k in range(1, count):
+        for i in range(min(len(taps), k)):
+            factor = taps[i]
+            if factor == 0.0:
+                continue
+            if alone:
+                part = factor * (stems[k - i, 0] - stems[0, 0])
                 for g in range(size):
                     total[k, g] += part
-        return
-    used = np.flatnonzero(taps)
-    for k in range(1, count):
-        for i in used:
-            if k > i:
-                factor = taps[i]
+            else:
                 for g in range(size):
                     total[k, g] += factor * (stems[k - i, g] - stems[0, g])
 
