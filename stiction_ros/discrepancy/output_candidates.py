@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.free_run import FreeRun, end_to_end
 from stiction_ros.discrepancy.noise import MAX_ORDER
 from stiction_ros.discrepancy.valve_candidates import lag_axis
 from stiction_ros.effects import (
@@ -59,7 +59,9 @@ class FilterCandidate(OutputCandidate):
             step = run.runs.sample_time
             start = self.starts(points, float(values[0]))
             parts.append(self.kind.simulate_grid(points[:, :1], values, start, step))
-        return Response({self.output: np.vstack(parts) - run.forced[:, self.output, None]})
+        response = end_to_end(parts)
+        response -= run.forced[:, self.output, None]
+        return Response({self.output: response})
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         """Return what the filters rest at before the first sample, shape (G,)."""

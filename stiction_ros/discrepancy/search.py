@@ -11,7 +11,8 @@ from scipy.stats import qmc
 
 from stiction_ros.discrepancy.candidates import Candidate, Response
 from stiction_ros.discrepancy.free_run import FreeRun
-from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, projector, whiten
+from stiction_ros.discrepancy.misfit import misfit
+from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise
 from stiction_ros.effects import Behaviour, FloatArray
 
 LEADERS = 4
@@ -327,40 +328,3 @@ def settled(
         vertex = 0.5 * PROBE * (low - high) / bend
         moved[:, d] = np.clip(vertex, -1.0, 1.0) * axis.high
     return moved
-
-
-def misfit(
-    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
-) -> FloatArray:
-    """Return Σ n log(sum of squared innovations) for every point of a grid under given φ."""
-    total: FloatArray | float = 0.0
-    for i in response.outputs:
-        rows = base.blocks[i].train
-        basis = projector(whiten(base.columns[i], ar[i])[rows])
-        target = gap[:, i : i + 1]
-        if i in response.shifts:
-            target = target - response.shifts[i]
-        left = _without(basis, whiten(target, ar[i])[rows])
-        squares = np.einsum("ng,ng->g", left, left)
-        if i in response.sizes:
-            squares = squares - _explained(basis, left, whiten(response.sizes[i], ar[i])[rows])
-        total = total + rows.sum() * np.log(np.maximum(squares, _TINY))
-    return np.asarray(total)
-
-
-def _explained(basis: FloatArray, left: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return the sum of squares that the factors take away, shape (G,)."""
-    rows, points, count = sizes.shape
-    free = _without(basis, sizes.reshape(rows, points * count)).reshape(sizes.shape)
-    gram = np.einsum("ngs,ngt->gst", free, free)
-    if left.shape[1] == points:
-        cross = np.einsum("ngs,ng->gs", free, left)
-    else:
-        cross = np.einsum("ngs,n->gs", free, left[:, 0])
-    ridge = 1e-10 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(count)
-    solved = np.linalg.solve(gram + ridge + _TINY * np.eye(count), cross[:, :, None])[:, :, 0]
-    return np.asarray(np.einsum("gs,gs->g", solved, cross))
-
-
-def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(values - basis @ (basis.T @ values))

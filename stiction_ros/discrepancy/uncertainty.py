@@ -8,8 +8,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.misfit import misfit
 from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
-from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, misfit, settled
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
 
 CHI_SQUARE = 3.84  # 95 % of one degree of freedom

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Backlash,
     Behaviour,
@@ -55,7 +55,8 @@ class ValveCandidate(Candidate):
             values = run.stems[part, self.valve]
             start = self.starts(points, float(values[0]))
             parts.append(self.kind.simulate_grid(rows, values, start, run.runs.sample_time))
-        return np.clip(np.vstack(parts), low, high)
+        stems = end_to_end(parts)
+        return np.clip(stems, low, high, out=stems)
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         """Return where the stems stand before the first sample, shape (G,), %."""
@@ -63,10 +64,13 @@ class ValveCandidate(Candidate):
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         stems = self.stems(run, points)
-        shifts = {}
+        shifts, least = {}, _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9)
         for i in range(run.forced.shape[1]):
-            shift = run.drive(i, self.valve, stems) - run.forced[:, i : i + 1]
-            if np.abs(shift).max(initial=0.0) > _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9):
+            if not run.responses.reaches(i, self.valve):
+                continue
+            shift = run.drive(i, self.valve, stems)
+            shift -= run.forced[:, i : i + 1]
+            if max(float(shift.max()), -float(shift.min())) > least:
                 shifts[i] = shift
         return Response(shifts or {0: np.zeros((len(stems), len(points)))})
 
