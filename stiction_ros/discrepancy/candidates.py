@@ -113,6 +113,7 @@ class Candidate(ABC):
         factors: number of figures that least squares finds.
         twins: places and effects that no record of OP and PV tells from this one.
         dated: whether its first axis is a moment of the record.
+        contains: places and effects of the catalogue that are parts of it.
         needle: whether its optimum is narrower than any lattice is fine.
         inside: whether it belongs to the catalogue; others show only that something is amiss.
     """
@@ -124,6 +125,7 @@ class Candidate(ABC):
     twins: tuple[tuple[str, str], ...] = ()
     inside: bool = True
     dated: bool = False
+    contains: tuple[tuple[str, str], ...] = ()
     needle: bool = False
 
     @abstractmethod

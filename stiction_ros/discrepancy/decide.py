@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from stiction_ros.discrepancy.free_run import HELD_SHARE
 from stiction_ros.discrepancy.search import CandidateFit
 
-JUMP_SURE = 6.0  # BIC by which a jump is there
+JUMP_SURE = 10.0  # BIC by which a jump is there
 JUMP_ABSENT = 3.0  # BIC by which it is not
 OFTEN = 8  # departures from rest that must show no jump before it is said to be absent
 CLEAR = 40.0  # BIC below which friction is told, but not of which kind
@@ -20,6 +20,8 @@ SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
 LEAST_GAIN = 0.25
 LEAST_TRAVEL = 0.1  # of the span of OP
 DOUBTFUL = 3.0  # standard deviations
+MOMENT = 10.0  # what held-out rows may lose by an effect of one moment
+MOST_OF = 0.5
 
 
 class GapVerdict(enum.StrEnum):
@@ -86,7 +88,7 @@ def decide(
         reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
         return Decision(GapVerdict.NONE, None, (), False, reason)
     best = kept[0]
-    if stranger is not None and stranger.evidence > best.evidence:
+    if stranger is not None and stranger.evidence > best.evidence and not _part(best, stranger):
         return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
     best, family = _family(best, ranked, departures)
     rivals = [
@@ -109,14 +111,22 @@ def decide(
 
 
 def confirmed(fit: CandidateFit) -> bool:
-    """Tell whether the held-out rows bear the effect out, chance allowed for.
+    """Tell whether the held-out rows bear an effect out, chance allowed for."""
+    return borne_out(fit.delta_bic, fit.held_gain, fit.candidate.dated)
+
+
+def borne_out(delta_bic: float, held_gain: float, dated: bool) -> bool:
+    """Tell whether held-out rows bear out what the training rows gain.
 
     An effect that is there gains a third as much on the third as many rows, in the mean; the
     gain S of a known wave has the standard deviation 2 √S. Below nought, and by more than
-    three of these below what is due, the held-out rows refuse it.
+    three of these below what is due, the held-out rows refuse it. What comes at one moment
+    shows in the block of that moment, the other blocks gain nothing but chance.
     """
-    due = max(fit.delta_bic, 0.0) / (HELD_SHARE - 1)
-    return fit.held_gain > min(0.0, due - DOUBTFUL * 2.0 * math.sqrt(due))
+    if dated:
+        return held_gain > -MOMENT
+    due = max(delta_bic, 0.0) / (HELD_SHARE - 1)
+    return held_gain > min(0.0, due - DOUBTFUL * 2.0 * math.sqrt(due))
 
 
 def large_enough(fit: CandidateFit) -> bool:
@@ -144,6 +154,11 @@ def _unknown(stranger: CandidateFit, reason: str) -> Decision:
         False,
         f"{stranger.candidate.name} would explain the gap by {stranger.evidence:.0f}; {reason}",
     )
+
+
+def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
+    """Tell whether a fit is most of what a rival outside the catalogue contains."""
+    return _name(fit) in stranger.candidate.contains and fit.evidence > MOST_OF * stranger.evidence
 
 
 def _name(fit: CandidateFit) -> tuple[str, str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.catalogue_scores import all_candidates
+from stiction_ros.discrepancy.decide import borne_out
 from stiction_ros.discrepancy.free_run import FreeRun, Runs
 from stiction_ros.discrepancy.measure import OutputGap, measure_gap
 from stiction_ros.discrepancy.measured_stem import stem_misfit
@@ -90,7 +91,7 @@ def extend(
     model = with_effects(bare, worth)
     after_base = Baseline.of(run_with(bare, runs, worth))
     after = measure_gap(after_base)
-    trouble = _trouble(base, after_base) or _stem_trouble(base, after_base)
+    trouble = _trouble(base, after_base, new.fit.candidate.dated) or _stem_trouble(base, after_base)
     if trouble:
         kept = tuple(added)
         return Extension(with_effects(bare, kept), kept, base, before, before, False, trouble)
@@ -139,20 +140,18 @@ def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candid
     return None
 
 
-def _trouble(base: Baseline, after_base: Baseline) -> str:
-    """Return why the effect must go again; empty when the gap has shrunk."""
+def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:
+    """Return why the effect must go again; empty when the held-out rows bear it out."""
     held = sum(
         old.held_minus_two_log - new.held_minus_two_log
         for old, new in zip(base.noise, after_base.noise, strict=True)
     )
-    if held <= 0.0:
+    if not borne_out(base.bic - after_base.bic, held, dated):
         return "the innovations of the held-out rows do not become smaller"
-    if _moved_away(base, after_base):
-        return "the free run of the held-out rows moves away from PV"
     return ""
 
 
-def _moved_away(base: Baseline, after_base: Baseline) -> bool:
+def moved_away(base: Baseline, after_base: Baseline) -> bool:
     """Tell whether the squared error of the free run has grown by more than chance.
 
     Held-out blocks are independent witnesses: their growths, weighed by the innovations, have

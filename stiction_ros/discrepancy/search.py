@@ -147,7 +147,7 @@ def _dated(search: _Search) -> CandidateFit:
     response = search.candidate.respond(base.run, values)
     best = whole.best_of(values, response, [found.noise, base.noise])
     other = search.judge(best, search.candidate.respond(base.run, best[None, :]))
-    return max(found, other, key=lambda fit: fit.delta_bic + fit.held_gain)
+    return max(*search.judged.values(), other, key=lambda fit: fit.evidence)
 
 
 class _Search:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Axis, Candidate, Response
-from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
+from stiction_ros.discrepancy.decide import Decision, GapVerdict, borne_out, decide
 from stiction_ros.discrepancy.free_run import FreeRun
 from stiction_ros.discrepancy.search import CandidateFit
 from stiction_ros.effects import Behaviour, FloatArray
@@ -99,7 +99,7 @@ def test_a_better_rival_outside_the_catalogue_is_unknown() -> None:
 
 
 def test_a_clear_jump_is_stiction() -> None:
-    answer = said(fit("valve:V1", "stiction", 90.0), fit("valve:V1", "backlash", 80.0))
+    answer = said(fit("valve:V1", "stiction", 91.0), fit("valve:V1", "backlash", 80.0))
     assert answer.chosen is not None
     assert (answer.verdict, answer.chosen.candidate.effect) == (GapVerdict.NAMED, "stiction")
 
@@ -118,3 +118,16 @@ def test_a_doubtful_jump_names_the_family() -> None:
 def test_weak_friction_names_the_family() -> None:
     answer = said(fit("valve:V1", "backlash", 20.0), fit("valve:V1", "stiction", 14.0))
     assert answer.alternatives == (("valve:V1", "stiction"),)
+
+
+def test_a_step_is_looked_at_before_a_change_that_contains_it() -> None:
+    step = fit("disturbance:PV1", "step", 80.0)
+    change = fit("process:PV1", "gain that changes", 90.0, inside=False)
+    change.candidate.contains = (("disturbance:PV1", "step"),)
+    answer = said(step, change)
+    assert answer.chosen is step
+
+
+def test_what_comes_at_one_moment_need_not_show_on_held_out_rows() -> None:
+    assert not borne_out(700.0, -5.0, dated=False)
+    assert borne_out(700.0, -5.0, dated=True)
