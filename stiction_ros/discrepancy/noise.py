@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.noise_kernels import (
     NOTHING,
     best_autoregression,
     inner_product,
+    orthonormal,
     sums_of_squares,
     turn,
     whitened_rows,
@@ -144,11 +145,7 @@ def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
 
 def projector(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
-    if not columns.shape[1]:
-        return columns
-    scale = np.linalg.norm(columns, axis=0)
-    left, sizes, _ = np.linalg.svd(columns / np.maximum(scale, _TINY), full_matrices=False)
-    return np.ascontiguousarray(left[:, sizes > 1e-9 * max(float(sizes[0]), _TINY)])
+    return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
 
 
 def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
