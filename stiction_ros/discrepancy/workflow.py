@@ -31,6 +31,7 @@ from stiction_ros.discrepancy.uncertainty import (
     chance_threshold,
     likelihood_intervals,
 )
+from stiction_ros.discrepancy.valve_candidates import departures
 from stiction_ros.discrepancy.where import locate
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -109,7 +110,13 @@ class _Workflow:
         if not self.options.quick:
             threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
         allowed = not_contradicted(self.base.run, scores.fits)
-        decision = decide(allowed, self.options.margin, threshold)
+        run = self.base.run
+        decision = decide(
+            allowed,
+            self.options.margin,
+            threshold,
+            lambda fit: departures(run, fit.candidate, fit.point),
+        )
         testable = testable_effects(self.base, list(candidates), self.options.margin)
         where = locate(self.base)
         kept, reason = False, decision.reason
