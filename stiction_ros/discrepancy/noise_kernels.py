@@ -191,10 +191,13 @@ def _lagged_products(residual: FloatArray, rows: BoolArray, most: int) -> FloatA
 
 
 @compiled
-def best_autoregression(residual: FloatArray, rows: BoolArray, most: int) -> FloatArray:
-    """Return φ of the order of least BIC up to ``most``, least squares on the marked rows.
+def best_autoregression(
+    residual: FloatArray, rows: BoolArray, most: int
+) -> tuple[FloatArray, float]:
+    """Return φ of the order of least BIC up to ``most``, and n log Σe² + p log n.
 
-    One Cholesky factor of the normal equations holds those of every lower order.
+    Least squares on the n marked rows; one Cholesky factor of the normal equations holds those
+    of every lower order.
     """
     gram = _lagged_products(residual, rows, most)
     ridge, count = TINY, 0
@@ -230,7 +233,7 @@ def best_autoregression(residual: FloatArray, rows: BoolArray, most: int) -> Flo
         for i in range(n + 1, best_order):
             value -= factor[i, n] * phi[i]
         phi[n] = value / factor[n, n]
-    return phi
+    return phi, best_score
 
 
 @compiled
