@@ -55,6 +55,22 @@ def left_of_shifts(
 
 
 @compiled
+def whitened_shifts(shift: FloatArray, rows: IntArray, ar: FloatArray) -> FloatArray:
+    """Return the rows of whitened responses alone, shape (n, G); arguments as above."""
+    size = shift.shape[1]
+    white = np.empty((len(rows), size))
+    for n in range(len(rows)):
+        k = rows[n]
+        for g in range(size):
+            white[n, g] = shift[k, g]
+        for i in range(min(len(ar), k)):
+            factor = ar[i]
+            for g in range(size):
+                white[n, g] -= factor * shift[k - 1 - i, g]
+    return white
+
+
+@compiled
 def _whitened(
     sizes: FloatArray, point: int, rows: IntArray, basis: FloatArray, ar: FloatArray
 ) -> FloatArray:

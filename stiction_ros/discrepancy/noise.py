@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from stiction_ros.discrepancy.noise_kernels import (
     NOTHING,
     best_autoregression,
-    inner_product,
+    orthonormal,
     sums_of_squares,
     turn,
-    whitened_rows,
 )
 from stiction_ros.effects import FloatArray
 
@@ -111,8 +110,7 @@ def fit_noise(
         if not sure:
             beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
         residual = target - columns @ beta
-        fitted = autoregression(residual, train)
-        score = _criterion(residual, fitted, train)
+        fitted, score = best_autoregression(residual, train, MAX_ORDER)
         if best is not None and score >= best[0] - 1e-3:
             break
         best = (score, beta, fitted)
@@ -139,16 +137,12 @@ def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Bloc
 
 def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
     """Return φ of the order of least BIC, least squares on ``rows``, shape (p ≤ 6,)."""
-    return best_autoregression(residual, rows, MAX_ORDER)
+    return best_autoregression(residual, rows, MAX_ORDER)[0]
 
 
 def projector(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
-    if not columns.shape[1]:
-        return columns
-    scale = np.linalg.norm(columns, axis=0)
-    left, sizes, _ = np.linalg.svd(columns / np.maximum(scale, _TINY), full_matrices=False)
-    return np.ascontiguousarray(left[:, sizes > 1e-9 * max(float(sizes[0]), _TINY)])
+    return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
 
 
 def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
@@ -157,13 +151,6 @@ def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
     scale = np.linalg.norm(columns, axis=0)
     scale = np.where(scale > NOTHING, scale, np.inf)
     return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
-
-
-def _criterion(residual: FloatArray, ar: FloatArray, rows: BoolArray) -> float:
-    innovations = whitened_rows(residual, ar, rows)
-    count = max(len(innovations), 2)
-    square = max(inner_product(innovations, innovations) / count, _TINY)
-    return count * math.log(square) + len(ar) * math.log(count)
 
 
 def _gain_of_noise(ar: FloatArray) -> float:

@@ -18,6 +18,7 @@ DEPENDENT = 1e-10  # and below which the column adds nothing to the others
 NOTHING = 1e-150  # length of a column that is zero on the fitted rows
 TINY = 1e-300
 _TRACE_SHARE = 1e-12
+_NEW = 1e-9  # of a scaled column that is no sum of others
 
 
 @compiled
@@ -119,6 +120,49 @@ def least_squares(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatA
 
 
 @compiled
+def orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns, shape (r, n), those left out that depend.
+
+    Args:
+        columns: shape (q, n); used up.
+    """
+    count, rows = columns.shape
+    largest, rank = 0.0, 0
+    for j in range(count):
+        length = np.sqrt(inner_product(columns[j], columns[j]))
+        for k in range(rows):
+            columns[j, k] /= length if length > NOTHING else np.inf
+    for step in range(count):
+        pivot, best = step, -1.0
+        for j in range(step, count):
+            left = inner_product(columns[j], columns[j])
+            if left > best:
+                pivot, best = j, left
+        length = np.sqrt(best)
+        largest = max(largest, length)
+        if not length > _NEW * largest:
+            break
+        for k in range(rows):
+            value = columns[pivot, k] / length
+            columns[pivot, k] = columns[step, k]
+            columns[step, k] = value
+        for _ in range(2):  # twice is enough
+            for j in range(step):
+                share = inner_product(columns[j], columns[step])
+                for k in range(rows):
+                    columns[step, k] -= share * columns[j, k]
+        length = np.sqrt(inner_product(columns[step], columns[step]))
+        for k in range(rows):
+            columns[step, k] /= length
+        for j in range(step + 1, count):
+            share = inner_product(columns[step], columns[j])
+            for k in range(rows):
+                columns[j, k] -= share * columns[step, k]
+        rank += 1
+    return columns[:rank].copy()
+
+
+@compiled
 def _lagged_products(residual: FloatArray, rows: BoolArray, most: int) -> FloatArray:
     """Return Σ r_{k−i} r_{k−j} over the marked rows, shape (most + 1, most + 1), i ≤ j alone.
 
@@ -147,10 +191,13 @@ def _lagged_products(residual: FloatArray, rows: BoolArray, most: int) -> FloatA
 
 
 @compiled
-def best_autoregression(residual: FloatArray, rows: BoolArray, most: int) -> FloatArray:
-    """Return φ of the order of least BIC up to ``most``, least squares on the marked rows.
+def best_autoregression(
+    residual: FloatArray, rows: BoolArray, most: int
+) -> tuple[FloatArray, float]:
+    """Return φ of the order of least BIC up to ``most``, and n log Σe² + p log n.
 
-    One Cholesky factor of the normal equations holds those of every lower order.
+    Least squares on the n marked rows; one Cholesky factor of the normal equations holds those
+    of every lower order.
     """
     gram = _lagged_products(residual, rows, most)
     ridge, count = TINY, 0
@@ -186,7 +233,7 @@ def best_autoregression(residual: FloatArray, rows: BoolArray, most: int) -> Flo
         for i in range(n + 1, best_order):
             value -= factor[i, n] * phi[i]
         phi[n] = value / factor[n, n]
-    return phi
+    return phi, best_score
 
 
 @compiled

@@ -9,43 +9,32 @@ from stiction_ros.effects import FloatArray
 
 
 @compiled
-def add_moving_sum(total: FloatArray, taps: FloatArray, stems: FloatArray) -> None:
-    """Add Σ taps_i (x_{k−i} − x_0) to ``total`` in place; nothing moved before the start.
+def filtered(
+    taps: FloatArray, denominator: FloatArray, stems: FloatArray, more: FloatArray
+) -> FloatArray:
+    """Return y_k = Σ taps_i (x_{k−i} − x_0) + more_k − Σ a_i y_{k−i}, at rest before the start.
 
     Args:
-        total: shape (N, G).
         taps: shape (n,).
-        stems: x, shape (N, G), or (N, 1) for all columns.
+        denominator: 1, a_1, … a_n.
+        stems: x, shape (N, G).
+        more: shape (N,), for all columns.
     """
-    count, size = total.shape
-    alone = stems.shape[1] == 1
-    for k in range(1, count):
+    count, size = stems.shape
+    out = np.empty((count, size))
+    for k in range(count):
+        for g in range(size):
+            out[k, g] = more[k]
         for i in range(min(len(taps), k)):
             factor = taps[i]
-            if factor == 0.0:
-                continue
-            if alone:
-                part = factor * (stems[k - i, 0] - stems[0, 0])
+            if factor != 0.0:
                 for g in range(size):
-                    total[k, g] += part
-            else:
-                for g in range(size):
-                    total[k, g] += factor * (stems[k - i, g] - stems[0, g])
-
-
-@compiled
-def recurse(total: FloatArray, denominator: FloatArray) -> None:
-    """Turn x into y of y_k = x_k − Σ a_i y_{k−i} in place, columns of shape (N, G).
-
-    Args:
-        denominator: 1, a_1, … a_n.
-    """
-    count, size = total.shape
-    for k in range(1, count):
+                    out[k, g] += factor * (stems[k - i, g] - stems[0, g])
         for i in range(1, min(len(denominator), k + 1)):
             factor = denominator[i]
             for g in range(size):
-                total[k, g] -= factor * total[k - i, g]
+                out[k, g] -= factor * out[k - i, g]
+    return out
 
 
 @compiled

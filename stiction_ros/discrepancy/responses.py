@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from scipy.signal import lfilter
 
-from stiction_ros.discrepancy.response_kernels import add_moving_sum, recurse, tank_states
+from stiction_ros.discrepancy.response_kernels import filtered, tank_states
 from stiction_ros.effects import Filter, FloatArray, LinearFilter
 from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank
 
@@ -71,10 +71,16 @@ class LinearResponses(Responses):
         ]
 
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
-        total = np.zeros((len(stems[0]), max(stem.shape[1] for stem in stems)))
-        for numerator, stem in zip(self._numerators[output], stems, strict=True):
-            add_moving_sum(total, numerator, np.ascontiguousarray(stem))
-        recurse(total, self._denominators[output])
+        count, denominator = len(stems[0]), self._denominators[output]
+        pairs = list(zip(self._numerators[output], stems, strict=True))
+        many = [pair for pair in pairs if pair[1].shape[1] > 1] or pairs[:1]
+        more = np.zeros(count)
+        for numerator, stem in pairs:
+            if all(stem is not other for _, other in many):
+                more += np.convolve(numerator, stem[:, 0] - stem[0, 0])[:count]
+        total = filtered(many[0][0], denominator, np.ascontiguousarray(many[0][1]), more)
+        for numerator, stem in many[1:]:
+            total += filtered(numerator, denominator, np.ascontiguousarray(stem), np.zeros(count))
         return total
 
     def reaches(self, output: int, valve: int) -> bool:
@@ -159,13 +165,10 @@ class AlteredResponses(Responses):
         return values
 
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
-        values = self._inner.forced(output, stems)
+        values, rest = self._inner.forced(output, stems), np.zeros(len(stems[0]))
         values -= values[:1].copy()
         for numerator, denominator in self._filters[output]:
-            passed = np.zeros_like(values)
-            add_moving_sum(passed, numerator, values)  # the first row is zero
-            recurse(passed, denominator)
-            values = passed
+            values = filtered(numerator, denominator, values, rest)  # its first row is zero
         return values
 
     def reaches(self, output: int, valve: int) -> bool:

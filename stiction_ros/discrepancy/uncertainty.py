@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.misfit import misfit
+from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
 from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
@@ -125,9 +126,11 @@ def _chance_gain(
     ar, rows = base.noise[output].ar, base.blocks[output].train
     total = np.sum(drawn**2, axis=0)
     if shift is not None:
-        wave = whiten(shift, ar)[rows]
-        wave = wave - basis @ (basis.T @ wave)
-        left = total - 2.0 * wave.T @ drawn + np.sum(wave**2, axis=0)[:, None]
+        wave = whitened_shifts(np.ascontiguousarray(shift), np.flatnonzero(rows), ar)
+        wave -= basis @ (basis.T @ wave)
+        left = (-2.0 * wave.T) @ drawn
+        left += np.einsum("ng,ng->g", wave, wave)[:, None]
+        left += total
     else:
         assert sizes is not None
         count, points, factors = sizes.shape

@@ -15,9 +15,10 @@ from stiction_ros.config_files import find_config
 from stiction_ros.discrepancy.candidates import Response
 from stiction_ros.discrepancy.free_run import FreeRun, join_records
 from stiction_ros.discrepancy.misfit import misfit
-from stiction_ros.discrepancy.noise import Blocks, autoregression, fit_noise, whiten
+from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
+from stiction_ros.discrepancy.noise import Blocks, autoregression, fit_noise, projector, whiten
 from stiction_ros.discrepancy.noise_kernels import least_squares, turn
-from stiction_ros.discrepancy.response_kernels import add_moving_sum, recurse
+from stiction_ros.discrepancy.response_kernels import filtered
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel, simulate_open_loop
@@ -55,6 +56,23 @@ def test_columns_that_nearly_repeat_each_other_are_left_to_the_slow_solution() -
     matrix = drawn(1, 2, 60)
     matrix[1] = matrix[0] + 1e-9 * matrix[1]
     assert not least_squares(matrix, drawn(2, 60))[0]
+
+
+@given(SEEDS, st.integers(0, 6))
+@settings(max_examples=25, deadline=None)
+def test_a_basis_is_orthonormal_and_holds_the_columns(seed: int, count: int) -> None:
+    columns = drawn(seed, 60, count)
+    columns = np.hstack([columns, columns[:, :2] @ np.ones((min(count, 2), 1)), np.zeros((60, 1))])
+    basis = projector(columns)
+    assert basis.shape == (60, np.linalg.matrix_rank(columns))
+    assert basis.T @ basis == pytest.approx(np.eye(basis.shape[1]), abs=1e-12)
+    assert basis @ (basis.T @ columns) == pytest.approx(columns, abs=1e-12)
+
+
+def test_whitened_responses_are_those_rows_of_all() -> None:
+    shift, ar = drawn(12, COUNT, 3), np.array([0.7, -0.2])
+    found = whitened_shifts(shift, np.flatnonzero(TRAIN), ar)
+    assert found == pytest.approx(whiten(shift, ar)[TRAIN])
 
 
 def test_a_turn_is_whitened_least_squares_of_the_fitted_rows() -> None:
@@ -130,11 +148,10 @@ def test_misfits_of_sizes_are_those_of_least_squares() -> None:
 def test_a_process_filters_deviations_from_the_first_stem(points: int) -> None:
     stems, taps = 50.0 + drawn(8, COUNT, points), np.array([0.0, 0.0, 0.3, -0.1])
     denominator = np.array([1.0, -1.2, 0.3])
-    total = np.zeros((COUNT, 4))
-    add_moving_sum(total, taps, stems)
-    recurse(total, denominator)
+    more = drawn(11, COUNT)
     wanted = lfilter(taps, denominator, stems - stems[:1], axis=0)
-    assert total == pytest.approx(np.broadcast_to(wanted, (COUNT, 4)), abs=1e-9)
+    wanted += lfilter([1.0], denominator, more)[:, None]
+    assert filtered(taps, denominator, stems, more) == pytest.approx(wanted, abs=1e-9)
 
 
 def test_a_valve_of_the_tank_that_does_not_reach_an_output_leaves_it() -> None:
