@@ -27,6 +27,8 @@ THROWS = 7
 THROWN = 600
 THROW_SHRINK = 0.6
 ROUNDS = 5
+POLISHES = 8
+NEXT_TO_NOTHING = 0.02  # BIC
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
 _FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end in either
 _TINY = 1e-300
@@ -129,6 +131,7 @@ def fit_candidate(
         search.scatter()
     if candidate.dated:
         return _dated(search)
+    search.polish()
     return search.best()
 
 
@@ -200,20 +203,35 @@ class _Search:
         if not self.candidate.axes:
             self._try(self.candidate.grid())
             return
-        steps = np.array([axis.step for axis in self.candidate.axes])
-        whole = np.array([axis.whole for axis in self.candidate.axes])
-        offsets = np.array(
-            list(itertools.product(*[(0.0,) if a.linear else SIDE for a in self.candidate.axes]))
-        )
         best = self._try(np.array([centre]))
         for _ in range(ROUNDS):
-            span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
-            found = self._try(centre + offsets * span, best[1])
-            if found[1].delta_bic >= best[1].delta_bic:
-                best, centre = found, found[0]
+            best = self._around(best, size)
             size *= SHRINK
-            if whole.all() and size * steps.max() < 0.5:
-                break
+
+    def polish(self) -> None:
+        """Search on around the best point until smaller grids gain next to nothing."""
+        if not self.candidate.axes or self.best().delta_bic <= 0.0:
+            return
+        axes = zip(self.candidate.axes, self.best().point.tolist(), strict=True)
+        best = np.array([axis.inner(value) for axis, value in axes]), self.best()
+        size = 0.7 * SHRINK**ROUNDS
+        for _ in range(POLISHES):
+            better = self._around(best, size)
+            if better[1].delta_bic < best[1].delta_bic + NEXT_TO_NOTHING:
+                size *= SHRINK
+            best = better
+
+    def _around(
+        self, best: tuple[FloatArray, CandidateFit], size: float
+    ) -> tuple[FloatArray, CandidateFit]:
+        """Return the best of a grid around a point and that point, with its coordinates."""
+        axes = self.candidate.axes
+        steps = np.array([axis.step for axis in axes])
+        whole = np.array([axis.whole for axis in axes])
+        offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDE for a in axes])))
+        span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
+        found = self._try(best[0] + offsets * span, best[1])
+        return found if found[1].delta_bic >= best[1].delta_bic else best
 
     def scatter(self) -> None:
         """Search scattered points in ever smaller boxes around the best point.

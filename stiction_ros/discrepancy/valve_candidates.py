@@ -129,6 +129,16 @@ class SaturationCandidate(ValveCandidate):
         low, high = self.axes[0].low, self.axes[1].high
         return int(point[0] > low) + int(point[1] < high)
 
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        """Return the saturation; an end that OP never reaches is that of the valve."""
+        low, high = self.rows(point[None, :])[0].tolist()
+        ends = run.model.limits[self.valve].tolist()
+        if low <= self.axes[0].low:
+            low = ends[0]
+        if high >= self.axes[1].high:
+            high = ends[1]
+        return Saturation(low, high)
+
 
 def departures(run: FreeRun, candidate: Candidate, point: FloatArray) -> int:
     """Return how often a candidate's stem leaves a rest; 0 for what acts at no valve."""
