@@ -37,12 +37,17 @@ class GapFinding:
     effects: tuple[str, ...]
     document: Mapping[str, Any]
 
+    @property
+    def word(self) -> str:
+        """The verdict, or ``unusable``."""
+        return "unusable" if self.verdict is None else self.verdict.value
+
     def to_json(self) -> dict[str, Any]:
         """Return the mapping that diagnostics carry."""
         return {
             "begin": self.begin,
             "end": self.end,
-            "verdict": "unusable" if self.verdict is None else self.verdict.value,
+            "verdict": self.word,
             "text": self.text,
             "effects": list(self.effects),
             "gap": dict(self.document),

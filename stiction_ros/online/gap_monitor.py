@@ -103,8 +103,10 @@ class GapMonitor:
 
     The baseline is a stretch of signals, not a figure: another model is measured on the same
     stretch. When as many samples have passed under another model, they become the baseline if
-    their gap is smaller: a limit cycle, say, is no good yardstick. The workflow looks into the window with which the gap has grown, and into one more
-    every half window while it stays so, up to the first that lies wholly behind the alarm.
+    their gap is smaller: a limit cycle, say, is no good yardstick.
+
+    The workflow looks into the window with which the gap has grown, and into one more every
+    half window while it stays so, up to the first that lies wholly behind the alarm.
     """
 
     def __init__(
@@ -138,10 +140,10 @@ class GapMonitor:
         self._looked_into: int | None = None
 
     def retune(self, rule: MonitorRule) -> None:
-        """Change the rule from the next sample on; another length begins anew."""
-        lengths = [(r.monitor_window, r.monitor_baseline) for r in (self.rule, rule)]
+        """Change the rule from the next sample on; turned on or with other lengths, begin anew."""
+        old, new = ((r.monitor, r.monitor_window, r.monitor_baseline) for r in (self.rule, rule))
         self.rule = rule
-        if lengths[0] != lengths[1]:
+        if old != new:
             self._begin_anew()
 
     @property
@@ -161,9 +163,12 @@ class GapMonitor:
     def add(self, sample: int, op: FloatArray, pv: FloatArray) -> GapLook | None:
         """Take in one sample, OP (m,) and PV (p,); return a measurement when one is due.
 
+        Nothing is kept while the rule's ``monitor`` is false.
         No window holds a sample that is not finite: it begins anew behind it.
         """
         self._take_model(sample)
+        if not self.rule.monitor:
+            return None
         if not (np.isfinite(op).all() and np.isfinite(pv).all()):
             self.restart()
             return None

@@ -88,8 +88,7 @@ class Monitoring:
             given: the model to compare with.
             submit: runs a function with its arguments, here or in another process, in order.
 
-        Raises:
-            InputError: a given model of another loop.
+        A model of another loop shows as the failure of every measurement.
         """
         self._live, self._given, self._submit = live, given, submit
         self.monitor = GapMonitor(rule, live.loop, live.valves, live.outputs, live.sample_time)
@@ -98,7 +97,6 @@ class Monitoring:
         self.look: GapLook | None = None
         self.finding: GapFinding | None = None
         if given is not None:
-            check_model(given, live.valves, live.outputs, live.sample_time)
             published = live.published_model
             model = given if published is None else with_friction_of(given, published)
             self.monitor.use(model, 0)
@@ -112,13 +110,19 @@ class Monitoring:
     def text(self) -> str:
         """One sentence on the present state."""
         if self.look is None:
-            return "no measurement yet"
+            return "no measurement yet" if self.monitor.has_model else "no loop model yet"
         if not self.look.grown:
             return self.look.text
         found = self.finding
         if self._running or found is None:
             return f"{self.look.text}; looking for the effect"
         return f"{found.text}; {self.look.text}"
+
+    def retune(self, rule: MonitorRule) -> None:
+        """Change the rule from the next sample on; turned on again, it begins anew."""
+        if rule.monitor and not self.monitor.rule.monitor:
+            self.look = self.finding = None
+        self.monitor.retune(rule)
 
     def learn(self, update: FitUpdate) -> None:
         """Take in a fit: its loop model is in force ``fit_latency`` samples after its window."""
