@@ -71,12 +71,9 @@ class EstimatorNode(ManagedNode):
         return [monitor_status(self.monitoring, self._pairs.stamp_of)]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        keys: list[tuple[str, object]] = [
-            ("sample", self._sample),
-            ("fits", self._fits),
-            ("failed_fits", self._failed),
-        ]
-        keys += [("missed_samples", self._missed), ("running_fits", len(self._pending))]
+        keys: list[tuple[str, object]] = [("sample", self._sample), ("fits", self._fits)]
+        keys += [("failed_fits", self._failed), ("missed_samples", self._missed)]
+        keys.append(("running_fits", len(self._pending)))
         return "warn" if self._missed else "ok", self._said, keys
 
     def finish(self) -> None:

@@ -27,7 +27,8 @@ class GapFinding:
         verdict: None when the window could not be used.
         text: one sentence.
         effects: each in a few words.
-        document: the mapping of ``gap --json``; its times are seconds since ``begin``.
+        document: the mapping of ``gap --json`` without ``model_before`` and ``seconds``; its
+            times are seconds since ``begin``.
     """
 
     begin: int
@@ -69,6 +70,7 @@ def find_in_window(model: LoopModel, record: Record) -> GapFinding:
     begin = round(record.start / record.sample_time)
     document = found.to_json()
     del document["model_before"]  # known to whoever asked
+    del document["seconds"]  # another each time
     return GapFinding(
         begin, begin + len(record) - 1, found.verdict, _sentence(found, effects), effects, document
     )
