@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +21,7 @@ from stiction_ros.blind.scoring import Score, score
 from stiction_ros.blind.truth import Hidden, Regime, Truth
 from stiction_ros.effects import Behaviour, ExtraDelay, Memory, StepDisturbance
 from stiction_ros.loop import LoopModel, simulate_closed_loop
-from stiction_ros.online.gap_finding import GapFinding, find_in_window
+from stiction_ros.online.gap_finding import GapFinding, find_in_window, standing
 from stiction_ros.online.gap_monitor import GapLook, GapMonitor, MonitorRule
 from stiction_ros.records import Record
 
@@ -82,7 +83,7 @@ class Watched:
         early: measurements before the onset at which the gap counted as grown.
         delay: samples from the onset to the first alarm behind it; None without.
         findings: what was found, in order.
-        score: of the last finding; ``missed`` without alarm, ``quiet`` in a healthy loop.
+        score: of the finding that stands; ``missed`` without alarm, ``quiet`` in a healthy loop.
     """
 
     truth: Truth
@@ -178,5 +179,5 @@ def watch(loop: LateLoop, rule: MonitorRule) -> Watched:
 def _judged(loop: LateLoop, findings: list[GapFinding]) -> Score:
     if not findings:
         return Score.MISSED if loop.truth.hidden else Score.QUIET
-    answer = dict(findings[-1].document) | {"seconds": 0.0}
+    answer = dict(functools.reduce(standing, findings).document) | {"seconds": 0.0}
     return score(loop.truth, loop.model, answer, {}).score

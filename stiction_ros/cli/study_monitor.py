@@ -14,6 +14,7 @@ from rich.table import Table
 from stiction_ros.blind.late import ONSET, SAMPLES, Watched, late_loop, watch
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.online.gap_finding import standing
 from stiction_ros.online.gap_monitor import MonitorRule
 
 
@@ -70,7 +71,9 @@ def _document(one: Watched) -> dict[str, Any]:
 
 def _print(outcomes: list[Watched]) -> None:
     console = Console()
-    table = Table("seed", "process", "noise", "sets in", "early", "delay", "score", "last finding")
+    table = Table(
+        "seed", "process", "noise", "sets in", "early", "delay", "score", "finding that stands"
+    )
     for one in outcomes:
         regime = one.truth.regime
         table.add_row(
@@ -81,7 +84,7 @@ def _print(outcomes: list[Watched]) -> None:
             str(one.early),
             "–" if one.delay is None else str(one.delay),
             one.score.value,
-            one.findings[-1].text if one.findings else "",
+            functools.reduce(standing, one.findings).text if one.findings else "",
         )
     console.print(table)
     quiet = sum(one.looks[0] for one in outcomes)

@@ -76,6 +76,15 @@ def find_in_window(model: LoopModel, record: Record) -> GapFinding:
     )
 
 
+def standing(old: GapFinding | None, new: GapFinding) -> GapFinding:
+    """Return the finding that stands after one more window of the same growth.
+
+    An effect may have left the later window: one that shows nothing takes nothing back.
+    """
+    silent = new.verdict in (None, GapVerdict.NONE, GapVerdict.UNTESTABLE)
+    return old if old is not None and silent else new
+
+
 def unusable(begin: int, end: int, reason: str) -> GapFinding:
     """Return what is said of a window on which the workflow failed."""
     return GapFinding(begin, end, None, f"window not usable: {reason}", (), {})

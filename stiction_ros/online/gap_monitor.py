@@ -61,6 +61,7 @@ class GapLook:
         begin, end: first and last sample of the window.
         outputs: empty when the window could not be used.
         grown: whether the gap counts as grown now.
+        alarm: whether it has grown with this window.
         failure: why the window could not be used, or empty.
         job: model and window that the workflow is to look into, or None.
     """
@@ -69,6 +70,7 @@ class GapLook:
     end: int
     outputs: tuple[OutputLook, ...]
     grown: bool
+    alarm: bool = False
     failure: str = ""
     job: tuple[LoopModel, Record] | None = None
 
@@ -93,6 +95,7 @@ class GapLook:
             "begin": self.begin,
             "end": self.end,
             "grown": self.grown,
+            "alarm": self.alarm,
             "failure": self.failure,
             "outputs": {look.name: look.to_json() for look in self.outputs},
         }
@@ -185,7 +188,7 @@ class GapMonitor:
             return self._look(self.model, self._reference, window, sample)
         except InputError as error:
             begin = sample + 1 - self.rule.monitor_window
-            return GapLook(begin, sample, (), self._grown_since is not None, str(error))
+            return GapLook(begin, sample, (), self._grown_since is not None, failure=str(error))
 
     def _take_model(self, sample: int) -> None:
         while self._coming and self._coming[0][0] <= sample:
@@ -223,7 +226,8 @@ class GapMonitor:
             self._grown_since = None
         job = (model, record) if self._is_looked_into(sample) else None
         begin = sample + 1 - len(record)
-        return GapLook(begin, sample, outputs, self._grown_since is not None, job=job)
+        since = self._grown_since
+        return GapLook(begin, sample, outputs, since is not None, since == sample, job=job)
 
     def _replace_baseline(self, model: LoopModel, sample: int) -> None:
         """Take the first stretch under a changed model for the baseline if its gap is smaller."""

@@ -10,7 +10,7 @@ from typing import Any
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.gap_finding import GapFinding, find_in_window, unusable
+from stiction_ros.online.gap_finding import GapFinding, find_in_window, standing, unusable
 from stiction_ros.online.gap_monitor import GapLook, GapMonitor, MonitorRule
 from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator
 
@@ -71,6 +71,12 @@ class Monitoring:
     given, the loop as the first fit found it and then every loop model that is published. It
     changes ``fit_latency`` samples after the end of the window it was found in, as the
     controller does.
+
+    Attributes:
+        monitor: keeps the window.
+        looks, grown, runs: measurements so far, those with a grown gap, windows looked into.
+        look: the last measurement, or None.
+        finding: what stands of the last growth, or None.
     """
 
     def __init__(
@@ -144,6 +150,8 @@ class Monitoring:
         if look is not None:
             self.looks, self.look = self.looks + 1, look
             self.grown += look.grown
+            if look.alarm:
+                self.finding = None
             if look.job is not None:
                 self._running.append((look, self._submit(find_in_window, *look.job)))
         return look
@@ -154,12 +162,13 @@ class Monitoring:
         while self._running and self._running[0][1].done():
             look, future = self._running.popleft()
             try:
-                self.finding = future.result()
+                new: GapFinding = future.result()
             except CancelledError:
                 continue
             except Exception as error:  # one window that fails must not end the estimator
                 said = str(error) if isinstance(error, InputError) else repr(error)
-                self.finding = unusable(look.begin, look.end, said)
+                new = unusable(look.begin, look.end, said)
             self.runs += 1
-            found.append(self.finding)
+            self.finding = standing(self.finding, new)
+            found.append(new)
         return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pickle
 import sys
@@ -14,7 +15,7 @@ from monitored_loops import ONSET, loop, record, shifted, sticky
 
 from stiction_ros.discrepancy import GapVerdict
 from stiction_ros.json_values import json_text
-from stiction_ros.online.gap_finding import GapFinding, find_in_window, unusable
+from stiction_ros.online.gap_finding import GapFinding, find_in_window, standing, unusable
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +75,22 @@ def test_a_window_that_failed_says_why() -> None:
     found = unusable(3, 9, "too short")
     assert found.text == "window not usable: too short"
     assert found.to_json()["verdict"] == "unusable"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "stays"),
+    [
+        (None, True),
+        (GapVerdict.NONE, True),
+        (GapVerdict.UNTESTABLE, True),
+        (GapVerdict.UNKNOWN, False),
+        (GapVerdict.AMBIGUOUS, False),
+        (GapVerdict.NAMED, False),
+    ],
+)
+def test_only_a_window_that_shows_something_takes_a_finding_back(
+    friction: GapFinding, verdict: GapVerdict | None, stays: bool
+) -> None:
+    later = dataclasses.replace(friction, verdict=verdict, text="later")
+    assert (standing(friction, later) is friction) is stays
+    assert standing(None, later) is later
