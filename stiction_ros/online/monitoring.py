@@ -99,6 +99,7 @@ class Monitoring:
         self._live, self._given, self._submit = live, given, submit
         self.monitor = GapMonitor(rule, live.loop, live.valves, live.outputs, live.sample_time)
         self._running: deque[tuple[GapLook, Future[GapFinding]]] = deque()
+        self._refusal = ""
         self.looks = self.grown = self.runs = 0
         self.look: GapLook | None = None
         self.finding: GapFinding | None = None
@@ -116,7 +117,8 @@ class Monitoring:
     def text(self) -> str:
         """One sentence on the present state."""
         if self.look is None:
-            return "no measurement yet" if self.monitor.has_model else "no loop model yet"
+            waiting = f"no loop model yet{self._refusal}"
+            return "no measurement yet" if self.monitor.has_model else waiting
         if not self.look.grown:
             return self.look.text
         found = self.finding
@@ -136,9 +138,16 @@ class Monitoring:
         if self._given is not None:
             model = None if model is None else with_friction_of(self._given, model)
         elif model is None and not self.monitor.has_model:
-            model = self._live.describe(update)
+            model = self._first_model(update)
         if model is not None:
             self.monitor.use(model, update.end + self._live.settings.fit_latency)
+
+    def _first_model(self, update: FitUpdate) -> LoopModel | None:
+        try:
+            return self._live.describe(update)
+        except InputError as error:  # a fit without a usable process
+            self._refusal = f": {error}"
+            return None
 
     def restart(self) -> None:
         """Begin a new window, as after samples that were missed."""

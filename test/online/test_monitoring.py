@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from concurrent.futures import Future
 from pathlib import Path
@@ -155,6 +156,13 @@ def test_a_run_that_was_called_off_is_no_finding() -> None:
 )
 def test_what_is_missing_is_told(given: LoopModel | None, text: str) -> None:
     assert Monitoring(RULE, live(), given).text == text
+
+
+def test_a_fit_without_a_process_is_no_model() -> None:
+    monitoring = Monitoring(RULE, live())
+    empty = dataclasses.replace(fit(VerdictKind.HEALTHY), outputs=())
+    monitoring.learn(live().conclude(40, empty))
+    assert monitoring.text.startswith("no loop model yet: model identified for watched")
 
 
 def test_turned_on_again_it_has_found_nothing_yet() -> None:
