@@ -81,29 +81,29 @@ class OutputLook:
         return dataclasses.asdict(self)
 
 
-def begun_at_rest(model: LoopModel, record: Record, lead: int, slack: int) -> Record:
-    """Return ``record`` from where the modelled stems are nearest to OP.
+def begun_at_stems(model: LoopModel, record: Record, count: int) -> Record:
+    """Return the last ``count`` samples, the first OP replaced by the modelled stems.
 
     A free run takes a stem to be where OP is at its first sample. A sticky valve seldom is, so
-    the valves' effects are run over the whole record, and the moment is chosen at which that
-    is least wrong. With ideal valves it is sample ``lead``.
+    the valves' effects are run over all samples before. With ideal valves nothing is replaced.
 
     Args:
         model: whose valves are run.
-        record: with ``lead`` samples before the window.
-        lead: samples that come before any window.
-        slack: samples by which the window may begin later.
+        record: the window and what came before it.
+        count: samples of the window.
     """
-    apart = np.zeros(len(record))
+    first = max(len(record) - count, 0)
+    part = record.part(first, len(record))
+    op = part.op.copy()
     for valve, (low, high) in zip(model.valves, model.limits.tolist(), strict=True):
-        op = np.clip(record.op[:, record.valves.index(valve.name)], low, high)
-        stem = op
+        if not valve.effects or valve.name not in record.valves:
+            continue
+        column = record.valves.index(valve.name)
+        stem = np.clip(record.op[: first + 1, column], low, high)
         for effect in valve.effects:
             stem = effect.simulate(stem, float(stem[0]), record.sample_time)
-        apart = np.maximum(apart, np.abs(np.clip(stem, low, high) - op))
-    lead = min(lead, max(len(record) - 1, 0))
-    first = lead + int(np.argmin(apart[lead : lead + slack + 1]))
-    return record.part(first, len(record))
+        op[0, column] = min(max(float(stem[-1]), low), high)
+    return dataclasses.replace(part, op=op)
 
 
 def baseline_of(model: LoopModel, record: Record) -> tuple[OutputBaseline, ...]:

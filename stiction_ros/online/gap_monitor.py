@@ -16,11 +16,13 @@ from stiction_ros.online.gap_measure import (
     OutputBaseline,
     OutputLook,
     baseline_of,
-    begun_at_rest,
+    begun_at_stems,
     look_at,
 )
 from stiction_ros.records import Record
 from stiction_ros.settings import setting
+
+HISTORY_SAMPLES = 20_000  # from which the stems of sticky valves are known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +51,7 @@ class MonitorRule:
 
     @property
     def lead(self) -> int:
-        """Samples before a window over which the stems find their places."""
+        """Fewest samples before a window, over which the stems find their places."""
         return self.monitor_window // 2
 
 
@@ -130,6 +132,7 @@ class GapMonitor:
 
     def _begin_anew(self) -> None:
         longest = max(self.rule.monitor_window, self.rule.monitor_baseline) + self.rule.lead
+        longest = max(longest, HISTORY_SAMPLES)
         self._op: deque[FloatArray] = deque(maxlen=longest)
         self._pv: deque[FloatArray] = deque(maxlen=longest)
         self._reference: Record | None = None
@@ -197,26 +200,25 @@ class GapMonitor:
             self._forget()
 
     def _last(self, count: int, sample: int) -> Record | None:
-        """Return the last ``count`` samples and the lead before them; None when too few."""
-        count += self.rule.lead
-        if len(self._op) < count:
+        """Return all samples that are kept; None when too few for ``count`` and their lead."""
+        if len(self._op) < count + self.rule.lead:
             return None
         return Record(
             self._loop,
             self._sample_time,
             self._valves,
             self._outputs,
-            np.array(self._op)[-count:],
-            np.array(self._pv)[-count:],
-            start=(sample + 1 - count) * self._sample_time,
+            np.array(self._op),
+            np.array(self._pv),
+            start=(sample + 1 - len(self._op)) * self._sample_time,
         )
 
     def _look(self, model: LoopModel, reference: Record, window: Record, sample: int) -> GapLook:
-        lead, slack = self.rule.lead, self.rule.monitor_window // 4
+        count = self.rule.monitor_baseline
         if not self._known:
-            self._known = baseline_of(model, begun_at_rest(model, reference, lead, slack))
+            self._known = baseline_of(model, begun_at_stems(model, reference, count))
         self._replace_baseline(model, sample)
-        record = begun_at_rest(model, window, lead, slack)
+        record = begun_at_stems(model, window, self.rule.monitor_window)
         outputs = look_at(model, record, self._known, self.rule.monitor_false_alarm)
         least = 1.0 + self.rule.monitor_growth
         if self._grown_since is None:
@@ -238,8 +240,7 @@ class GapMonitor:
         if stretch is None:
             return
         self._changed = None
-        lead, slack = self.rule.lead, self.rule.monitor_window // 4
-        known = baseline_of(model, begun_at_rest(model, stretch, lead, slack))
+        known = baseline_of(model, begun_at_stems(model, stretch, count))
         if _size(known) < _size(self._known):
             self._reference, self._known = stretch, known
 

@@ -53,6 +53,7 @@ def record(plant: LoopModel, samples: int = 2000, seed: int = 1) -> Record:
     """Return a record with a set-point move every 90 samples, without stem."""
     times = np.arange(0.0, samples, 90.0)
     sizes = np.random.default_rng([seed, 5]).uniform(-8.0, 8.0, len(times))
+    sizes[0] = 0.0  # begins at rest, its stem where OP is
     points = SetPoints(("PV1",), times, 50.0 + sizes[:, None])
     controller = PiController(PiTuning(0.6, 6.0), 1.0, 50.0, (0.0, 100.0))
     run = simulate_closed_loop(plant, controller, points, samples, seed)

@@ -16,7 +16,7 @@ from monitored_loops import loop, record, sticky
 
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.gap_measure import OutputLook, baseline_of, begun_at_rest, look_at
+from stiction_ros.online.gap_measure import OutputLook, baseline_of, begun_at_stems, look_at
 from stiction_ros.records import Record
 
 HEALTHY = record(loop(), 1200)
@@ -101,19 +101,31 @@ def test_a_healthy_window_exceeds_the_limit_as_seldom_as_asked() -> None:
     assert above <= 11
 
 
-def test_a_window_with_ideal_valves_begins_behind_the_lead() -> None:
-    assert begun_at_rest(loop(), HEALTHY, 100, 50).start == 100.0
+def test_a_window_with_ideal_valves_is_left_as_it_is() -> None:
+    found = begun_at_stems(loop(), HEALTHY, 1100)
+    assert found.start == 100.0
+    assert np.array_equal(found.op, HEALTHY.op[100:])
 
 
 @pytest.mark.parametrize("seed", range(1, 5))
-def test_a_window_of_a_sticky_valve_begins_where_its_stem_is_nearest_to_op(seed: int) -> None:
+def test_the_stem_of_a_sticky_valve_is_right_from_the_first_sample(seed: int) -> None:
     model = sticky()
     recorded = record(model, 500, seed)
     stem = model.valves[0].effects[0].simulate(recorded.op[:, 0])
-    first = round(begun_at_rest(model, recorded, 100, 80).start)
-    apart = np.abs(stem - recorded.op[:, 0])
-    assert 100 <= first <= 180
-    assert apart[first] == apart[100:181].min()
+    window = begun_at_stems(model, recorded, 370)
+    again = model.valves[0].effects[0].simulate(window.op[:, 0], window.op[0, 0])
+    assert np.array_equal(again, stem[130:])
+    assert np.array_equal(window.op[1:], recorded.op[131:])
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_the_gap_of_a_sticky_loop_with_the_right_model_is_its_noise(seed: int) -> None:
+    recorded = record(sticky(), 1200, seed)
+    known = baseline_of(sticky(), begun_at_stems(sticky(), recorded.part(0, 700), 550))
+    window = begun_at_stems(sticky(), recorded, 400)
+    (found,) = look_at(sticky(), window, known, 0.01)
+    assert found.gap == pytest.approx(0.1, rel=0.15)
+    assert found.baseline == pytest.approx(0.1, rel=0.15)
 
 
 def test_a_model_that_grows_without_bound_is_one_clear_error() -> None:
