@@ -8,8 +8,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.misfit import misfit
+from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
 from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
-from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, misfit
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
 
 CHI_SQUARE = 3.84  # 95 % of one degree of freedom
@@ -124,9 +126,11 @@ def _chance_gain(
     ar, rows = base.noise[output].ar, base.blocks[output].train
     total = np.sum(drawn**2, axis=0)
     if shift is not None:
-        wave = whiten(shift, ar)[rows]
-        wave = wave - basis @ (basis.T @ wave)
-        left = total - 2.0 * wave.T @ drawn + np.sum(wave**2, axis=0)[:, None]
+        wave = whitened_shifts(np.ascontiguousarray(shift), np.flatnonzero(rows), ar)
+        wave -= basis @ (basis.T @ wave)
+        left = (-2.0 * wave.T) @ drawn
+        left += np.einsum("ng,ng->g", wave, wave)[:, None]
+        left += total
     else:
         assert sizes is not None
         count, points, factors = sizes.shape
@@ -146,7 +150,7 @@ def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
     if not axes:
         return np.zeros((1, 0))
     centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
-    free = [d for d, a in enumerate(axes) if d < 2 and a.step > 0.0]
+    free = [d for d, a in enumerate(axes) if d < 2 and a.step > 0.0 and not a.linear]
     width = np.array([0.5 if a.whole else 0.05 * a.step for a in axes])
     offsets = np.linspace(-1.0, 1.0, BOX)
     mesh = np.stack([m.ravel() for m in np.meshgrid(*[offsets] * len(free), indexing="ij")], axis=1)
@@ -155,6 +159,7 @@ def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
     for _ in range(WIDENINGS):
         grid = np.tile(centre, (len(mesh) + 1, 1))
         grid[1:, free] += mesh * width[free]
+        grid = settled(base, base.run.gap, fit.candidate, grid, ar)
         values = fit.candidate.values(grid)
         score = misfit(base, base.run.gap, fit.candidate.respond(base.run, values), ar)
         inside = score[1:] - score.min() <= CHI_SQUARE

@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, sc
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
-from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_with
+from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, moved_away, run_with
 from stiction_ros.discrepancy.free_process import score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
@@ -31,6 +31,7 @@ from stiction_ros.discrepancy.uncertainty import (
     chance_threshold,
     likelihood_intervals,
 )
+from stiction_ros.discrepancy.valve_candidates import departures
 from stiction_ros.discrepancy.where import locate
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -99,7 +100,18 @@ class _Workflow:
             self.looks.append(look)
             if not look.kept:
                 break
+        while self.added and moved_away(self.base_before, self.base):
+            self._withdraw()
         return self._result(testable)
+
+    def _withdraw(self) -> None:
+        """Take the last effect back: with it the free run is farther from PV than before."""
+        self.added = self.added[:-1]
+        self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
+        last = max(k for k, look in enumerate(self.looks) if look.kept)
+        reason = "the free run of the held-out rows moves away from PV"
+        withdrawn = dataclasses.replace(self.looks[last], kept=False, reason=reason)
+        self.looks = [*self.looks[:last], withdrawn]
 
     def _look(self, k: int) -> tuple[Look, tuple[Testable, ...]]:
         share = 1.0 / (self.options.most_effects + 1)
@@ -109,7 +121,13 @@ class _Workflow:
         if not self.options.quick:
             threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
         allowed = not_contradicted(self.base.run, scores.fits)
-        decision = decide(allowed, self.options.margin, threshold)
+        run = self.base.run
+        decision = decide(
+            allowed,
+            self.options.margin,
+            threshold,
+            lambda fit: departures(run, fit.candidate, fit.point),
+        )
         testable = testable_effects(self.base, list(candidates), self.options.margin)
         where = locate(self.base)
         kept, reason = False, decision.reason
