@@ -26,6 +26,7 @@ from stiction_ros.cli import (
     report,
     study,
     study_control,
+    study_monitor,
 )
 from stiction_ros.errors import InputError
 
@@ -44,6 +45,7 @@ COMMANDS = (
     repair,
     study,
     study_control,
+    study_monitor,
     bench,
 )
 

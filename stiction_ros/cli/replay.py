@@ -59,6 +59,12 @@ def _print(bag: str, found: Replay) -> None:
         console.print(f"swap: recorded {times[0]}, replayed {times[1]}")
         word = str(found.modes.match).replace("_", " ")
         console.print(f"changes of mode: {len(found.modes.recorded)} recorded, {word}")
+    if found.monitor is not None:
+        monitor = found.monitor
+        console.print(
+            f"monitor: {monitor.equal_looks} of {monitor.looks} measurements and "
+            f"{monitor.equal_findings} of {monitor.findings} findings are equal"
+        )
     for note in found.notes:
         console.print(f"note: {note}")
     difference = found.first_difference

@@ -32,8 +32,8 @@ def node_parameters(path: Path, directory: Path) -> dict[str, dict[str, Any]]:
     """Return the parameters of all nodes with full paths; the bag goes below ``directory``."""
     nodes = {node: dict(values) for node, values in Scenario.load(path).nodes.items()}
     for values in nodes.values():
-        for key in ("model", "set_points"):
-            if key in values:
+        for key in ("model", "set_points", "monitor_model"):
+            if values.get(key):
                 values[key] = str((path.parent / values[key]).resolve())
     nodes["recorder"]["directory"] = str((directory / "bag").resolve())
     return nodes

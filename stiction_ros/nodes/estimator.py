@@ -9,13 +9,17 @@ from typing import Any
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
-from stiction_ros.json_values import json_text
+from stiction_ros.loop import LoopModel
+from stiction_ros.nodes.estimates import figures_of, fit_status, friction_message, verdicts_of
+from stiction_ros.nodes.gap_status import finding_status, look_status, monitor_status
 from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, values_of
+from stiction_ros.nodes.messages import SECOND, to_ns, values_of
 from stiction_ros.nodes.runner import run
-from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator
+from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.pairing import PairedSample, Pairing
 from stiction_ros.online.worker import FitWorker
@@ -31,6 +35,8 @@ class EstimatorNode(ManagedNode):
 
     def configure(self) -> None:
         self.settings.options()  # refuses what no fit can use
+        name = self.settings.monitor_model
+        self._watched = LoopModel.load(find_config(name)) if name else None
         self.live: LiveEstimator | None = None
         self._valves: tuple[str, ...] = ()
         self._outputs: tuple[str, ...] = ()
@@ -47,6 +53,9 @@ class EstimatorNode(ManagedNode):
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
         self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
 
+    def configuration(self) -> dict[str, Any]:
+        return {} if self._watched is None else {"model": self._watched.to_mapping()}
+
     def hardware(self) -> str:
         return str(self.settings.loop)
 
@@ -54,14 +63,17 @@ class EstimatorNode(ManagedNode):
         settings.options()
         if self.live is not None:
             self.live.retune(settings)
+            self.monitoring.retune(settings)
+
+    def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
+        if self.live is None or not self.settings.monitor:
+            return []
+        return [monitor_status(self.monitoring, self._pairs.stamp_of)]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        keys: list[tuple[str, object]] = [
-            ("sample", self._sample),
-            ("fits", self._fits),
-            ("failed_fits", self._failed),
-        ]
-        keys += [("missed_samples", self._missed), ("running_fits", len(self._pending))]
+        keys: list[tuple[str, object]] = [("sample", self._sample), ("fits", self._fits)]
+        keys += [("failed_fits", self._failed), ("missed_samples", self._missed)]
+        keys.append(("running_fits", len(self._pending)))
         return "warn" if self._missed else "ok", self._said, keys
 
     def finish(self) -> None:
@@ -99,29 +111,43 @@ class EstimatorNode(ManagedNode):
                 settings = self.settings
                 names = (settings.loop, self._valves, self._outputs)
                 self.live = LiveEstimator(settings, *names, settings.sample_time)
+                self.monitoring = Monitoring(settings, self.live, self._watched, self._queue)
             if found.missed:
                 self._skip(found)
             self.stamp, self._sample = found.stamp, found.sample + 1
             record = self.live.add(found.sample, found.op, found.pv)
-            if record is not None and self._worker is not None:
-                future = self._worker.submit(record, self.live.settings.options())
+            if record is not None:
+                future = self._queue(fit, record, self.live.settings.options())
                 self._pending.append((found.sample, future))
-                future.add_done_callback(lambda _future: self._done.trigger())
+            look = self.monitoring.add(found.sample, found.op, found.pv)
+            if look is not None:
+                self.report([look_status(look, self._pairs.stamp_of)])
+
+    def _queue(self, work: Any, *arguments: Any) -> Future[Any]:
+        """Run ``work`` in the worker behind what is queued there; cancelled once that has ended."""
+        if self._worker is None:
+            future: Future[Any] = Future()
+            future.cancel()
+            return future
+        future = self._worker.call(work, *arguments)
+        future.add_done_callback(lambda _future: self._done.trigger())
+        return future
 
     def _skip(self, found: PairedSample) -> None:
         """Pass over samples that never came: no window may hold them."""
         assert self.live is not None
         self.live.restart()
+        self.monitoring.restart()
         self._missed += found.missed
         self.get_logger().warning(f"{found.missed} samples missed before sample {found.sample}")
         for sample in range(found.sample - found.missed, found.sample):
             if self.settings.due(sample):
-                self._publish(self._pairs.stamp_of(sample), [], [])
+                self._publish(self._pairs.stamp_of(sample), None)
 
     # ---- fits out --------------------------------------------------------------------------
 
     def _collect(self) -> None:
-        """Publish every fit that is done, in order."""
+        """Publish every fit that is done, in order, and what the monitor has found."""
         while self._pending and self._pending[0][1].done():
             end, future = self._pending.popleft()
             if future.cancelled() or self.live is None:
@@ -135,10 +161,15 @@ class EstimatorNode(ManagedNode):
                 if not isinstance(error, InputError):
                     self._said = f"fit failed: {error!r}"
                     self.get_logger().error(self._said)
-                self._publish(stamp, [], [])
+                self._publish(stamp, None)
                 continue
             self._fits += 1
-            self._announce(stamp, self.live.conclude(end, found))
+            update = self.live.conclude(end, found)
+            self.monitoring.learn(update)
+            self._announce(stamp, update)
+        for finding in () if self.live is None else self.monitoring.collect():
+            self.get_logger().warning(f"window to sample {finding.end}: {finding.text}")
+            self.report([finding_status(finding, self._pairs.stamp_of)])
 
     def _announce(self, stamp: int, update: FitUpdate) -> None:
         if update.loop_model is not None:
@@ -148,31 +179,14 @@ class EstimatorNode(ManagedNode):
             self._token = str(valid_from)
             text = update.loop_model.to_yaml(valid_from=valid_from)
             self._model.publish(String(data=text))
-        rows = []
-        for valve in update.identification.valves:
-            rows.append((f"{valve.name}.f_s", valve.static_friction, valve.static_interval))
-            rows.append((f"{valve.name}.f_d", valve.dynamic_friction, valve.dynamic_interval))
-        self._publish(stamp, [row[0] for row in rows], [(row[1], *row[2]) for row in rows])
-        verdicts = ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
-        self._said = f"last window: {verdicts}"
-        found = ", ".join(f"{name} {value:.3g}" for name, value, _ in rows)
-        self.get_logger().info(f"window to sample {update.end}: {verdicts}; {found}")
-        keys: list[tuple[str, object]] = [("window_end", stamp)]
-        for name, friction in update.trusted.items():
-            keys.append((f"{name}.trusted_f_s", friction.static_friction))
-            keys.append((f"{name}.trusted_f_d", friction.dynamic_friction))
-        keys.append(("identification", json_text(update.identification.to_json(), indent=None)))
-        self.report([("fit", verdicts, keys)])
+        self._publish(stamp, update.identification)
+        self._said = f"last window: {verdicts_of(update)}"
+        self.get_logger().info(f"window to sample {update.end}: {figures_of(update)}")
+        self.report([fit_status(stamp, update)])
 
-    def _publish(
-        self, stamp: int, names: list[str], values: list[tuple[float, float, float]]
-    ) -> None:
-        """Publish one fit: value, lower and upper end; empty when the window was not usable."""
-        message = joint_state(stamp, names, [value for value, _, _ in values])
-        message.velocity = [low for _, low, _ in values]
-        message.effort = [high for _, _, high in values]
-        message.header.frame_id = self._token
-        self._stiction.publish(message)
+    def _publish(self, stamp: int, found: Identification | None) -> None:
+        """Publish one fit, or None for a window that was not usable."""
+        self._stiction.publish(friction_message(stamp, self._token, found))
 
 
 def main() -> int:

@@ -281,6 +281,10 @@ class ManagedNode(LifecycleNode):
         """Return level (ok, warn, error), message and key-values of the 1 Hz status."""
         return "ok", "running", []
 
+    def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
+        """Return further 1 Hz statuses: level, task, message and key-values of each."""
+        return []
+
     def report(self, extra: Iterable[tuple[str, str, list[tuple[str, object]]]] = ()) -> None:
         """Publish the health now, and ``extra`` as further statuses (task, text, values)."""
         if not self._linked:
@@ -295,8 +299,10 @@ class ManagedNode(LifecycleNode):
         message = DiagnosticArray()
         message.header.stamp = to_stamp(self.stamp)
         message.status = [status(f"{name}: status", hardware, level, text, [*values, *counts])]
+        further = [*self.tasks(), *(("ok", *one) for one in extra)]
         message.status += [
-            status(f"{name}: {task}", hardware, "ok", said, keys) for task, said, keys in extra
+            status(f"{name}: {task}", hardware, level, said, keys)
+            for level, task, said, keys in further
         ]
         self._diagnostics.publisher.publish(message)
 

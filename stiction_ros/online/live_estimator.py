@@ -70,6 +70,11 @@ class LiveEstimator:
 
     Per sample: :meth:`add`; when it returns a record, run :func:`fit` on it and hand the
     result to :meth:`conclude`.
+
+    Attributes:
+        settings: in force.
+        loop, valves, outputs, sample_time: of the loop; seconds.
+        published_model: the loop model of the last fit that had a new one.
     """
 
     def __init__(
@@ -87,10 +92,10 @@ class LiveEstimator:
         """
         settings.options()
         self.settings = settings
-        self._loop = loop
-        self._valves, self._outputs = tuple(valves), tuple(outputs)
-        self._sample_time = sample_time
-        self._trust = Trust(self._valves, settings)
+        self.loop, self.sample_time = loop, sample_time
+        self.valves, self.outputs = tuple(valves), tuple(outputs)
+        self.published_model: LoopModel | None = None
+        self._trust = Trust(self.valves, settings)
         self._op: deque[FloatArray] = deque(maxlen=settings.window)
         self._pv: deque[FloatArray] = deque(maxlen=settings.window)
         self._published: dict[str, Any] | None = None
@@ -120,13 +125,13 @@ class LiveEstimator:
         if not self.settings.due(sample):
             return None
         return Record(
-            self._loop,
-            self._sample_time,
-            self._valves,
-            self._outputs,
-            np.array(self._op).reshape(-1, len(self._valves)),
-            np.array(self._pv).reshape(-1, len(self._outputs)),
-            start=(sample + 1 - len(self._op)) * self._sample_time,
+            self.loop,
+            self.sample_time,
+            self.valves,
+            self.outputs,
+            np.array(self._op).reshape(-1, len(self.valves)),
+            np.array(self._pv).reshape(-1, len(self.outputs)),
+            start=(sample + 1 - len(self._op)) * self.sample_time,
         )
 
     def restart(self) -> None:
@@ -140,16 +145,15 @@ class LiveEstimator:
         effects = {name: friction.behaviour().to_mapping() for name, friction in trusted.items()}
         model = None
         if effects != (self._published or {}):
-            model = self._describe(end, found, trusted)
-            self._published = effects
+            model = self.describe(FitUpdate(end, found, trusted, None))
+            self._published, self.published_model = effects, model
         return FitUpdate(end, found, trusted, model)
 
-    def _describe(
-        self, end: int, found: Identification, trusted: Mapping[str, TrustedFriction]
-    ) -> LoopModel:
-        """Return the identified loop as a :class:`LoopModel`."""
+    def describe(self, update: FitUpdate) -> LoopModel:
+        """Return the loop as a fit found it, with the friction that is trusted after it."""
+        found, trusted = update.identification, update.trusted
         valves = []
-        for name in self._valves:
+        for name in self.valves:
             friction = trusted.get(name)
             effects = [] if friction is None else [friction.behaviour().to_mapping()]
             valves.append({"name": name, "effects": effects})
@@ -168,7 +172,7 @@ class LiveEstimator:
             {
                 "valve": name,
                 "effect": "stiction",
-                "from": f"window of {found.samples} samples ending at sample {end}",
+                "from": f"window of {found.samples} samples ending at sample {update.end}",
                 "f_s_interval": list(friction.static_interval),
                 "f_d_interval": list(friction.dynamic_interval),
             }
@@ -176,11 +180,11 @@ class LiveEstimator:
         ]
         return LoopModel.from_mapping(
             {
-                "loop": self._loop,
-                "sample_time": self._sample_time,
+                "loop": self.loop,
+                "sample_time": self.sample_time,
                 "valves": valves,
                 "process": {"kind": "arx", "outputs": outputs},
                 "provenance": provenance,
             },
-            f"model identified for {self._loop}",
+            f"model identified for {self.loop}",
         )

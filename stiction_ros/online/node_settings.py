@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from stiction_ros.online.gap_monitor import MonitorRule
 from stiction_ros.online.live_controller import LiveControllerSettings
 from stiction_ros.online.live_estimator import EstimatorSettings
 from stiction_ros.settings import setting
@@ -65,11 +66,16 @@ class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
 
 
 @dataclasses.dataclass(frozen=True)
-class EstimatorNodeSettings(EstimatorSettings, NodeSettings):
-    """The live estimator's settings and what belongs to the node."""
+class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
+    """The live estimator's settings, those of the monitor, and what belongs to the node."""
 
     loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
     sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
+    monitor_model: str = setting(
+        "",
+        "loop model file the monitor compares with; empty for the loop as it is identified",
+        fixed=True,
+    )
 
 
 @dataclasses.dataclass(frozen=True)

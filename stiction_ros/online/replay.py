@@ -20,6 +20,7 @@ from stiction_ros.online.replay_controller import (
 )
 from stiction_ros.online.replay_estimator import ReplayedEstimator
 from stiction_ros.online.replay_matching import match_fit, match_modes, trust_is_known
+from stiction_ros.online.replay_monitor import match_monitor
 from stiction_ros.online.replay_result import FitMatch, Match, ModeMatch, Replay
 from stiction_ros.settings import from_mapping
 
@@ -77,6 +78,7 @@ def replay(
         modes=modes,
         op=None if control is None or not whole else control.op,
         notes=tuple(notes),
+        monitor=match_monitor(bag, estimator),
     )
 
 
@@ -97,7 +99,11 @@ def _estimate(
     bag: ReplayBag, settings: EstimatorNodeSettings, origin: int, progress: Progress | None
 ) -> ReplayedEstimator:
     told = {stamp: fit.identification for stamp, fit in bag.told_fits.items()}
-    estimator = ReplayedEstimator(settings, origin, told)
+    watched: LoopModel | None = None
+    if settings.monitor and bag.estimator is not None and bag.estimator.model is not None:
+        where = f"{bag.estimator.node}/config: model"
+        watched = LoopModel.from_mapping(dict(bag.estimator.model), where)
+    estimator = ReplayedEstimator(settings, origin, told, watched=watched)
     signals = [signal for signal in bag.signals if signal.kind in ("pv", "op")]
     for number, signal in enumerate(signals):
         if estimator.take(signal) and progress is not None:

@@ -14,6 +14,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag_messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag_metadata import BagTopic
 from stiction_ros.records.bag_reader import JOINT_STATE
+from stiction_ros.records.gap_log import GapLog, gap_log
 from stiction_ros.records.run_log import Fit, ModeChange, fits, mode_changes
 from stiction_ros.records.run_metadata import mapping_of
 
@@ -87,6 +88,7 @@ class ReplayBag:
         estimator, controller: configurations, None when the bag has none.
         published_fits: messages of ``stiction`` by the end of their window, ns.
         told_fits: the fits in ``/diagnostics`` by the end of their window, ns.
+        told_gaps: what the monitor told in ``/diagnostics``.
         models: messages of ``loop_model`` in their order.
         modes: changes of mode in ``/diagnostics``, the first mode included.
         counted: a stamp in ns and how many samples the estimator had taken in up to it; None
@@ -101,6 +103,7 @@ class ReplayBag:
     controller: NodeConfig | None
     published_fits: Mapping[int, PublishedFit]
     told_fits: Mapping[int, Fit]
+    told_gaps: GapLog
     models: tuple[PublishedModel, ...]
     modes: tuple[ModeChange, ...]
     counted: tuple[int, int] | None
@@ -141,6 +144,7 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
         controller=configs.get("controller"),
         published_fits=dict(_published_fits(inside)),
         told_fits={fit.stamp: fit for fit in fits(diagnostics)},
+        told_gaps=gap_log(diagnostics),
         models=tuple(_models(inside)),
         modes=mode_changes(diagnostics),
         counted=_counted(diagnostics, configs.get("estimator")),
@@ -257,7 +261,7 @@ def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> di
 
 def _hardware(config: NodeConfig) -> str:
     """Return the loop that the diagnostics of a node name as their hardware."""
-    named = (config.model or {}).get("loop", config.parameters.get("loop", ""))
+    named = config.parameters.get("loop") or (config.model or {}).get("loop", "")
     return str(named)
 
 

@@ -17,7 +17,11 @@ from stiction_ros.identification import (
     ValveEstimate,
     VerdictKind,
 )
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.gap_finding import GapFinding
+from stiction_ros.online.gap_monitor import GapLook
 from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.online.pairing import PairedSample, Pairing
 from stiction_ros.online.replay_bag import Signal
@@ -67,6 +71,7 @@ class ReplayedEstimator:
         told: recorded identifications by the end of their window in ns; they stand in for
             windows that reach back before the bag, so that trust is built on all of them.
         fitter: runs one fit; the default runs it here and now.
+        watched: what the monitor compares with; None for the loop as it is identified.
     """
 
     def __init__(
@@ -75,8 +80,15 @@ class ReplayedEstimator:
         origin: int | None = None,
         told: Mapping[int, Mapping[str, Any]] | None = None,
         fitter: Callable[..., Identification] = fit,
+        *,
+        watched: LoopModel | None = None,
     ) -> None:
         self.settings = settings
+        self.step = round(settings.sample_time * SECOND)
+        self.looks: list[GapLook] = []
+        self.findings: list[GapFinding] = []
+        self._watched = watched
+        self._monitoring: Monitoring | None = None
         self.fits: list[ReplayedFit] = []
         self.first: int | None = None
         self.samples = 0
@@ -117,15 +129,23 @@ class ReplayedEstimator:
             self._live = LiveEstimator(settings, *names, settings.sample_time)
         if self.first is None:
             self.first = found.sample  # what came before it was not missed but not recorded
+            if settings.monitor and found.sample == 0:
+                self._monitoring = Monitoring(settings, self._live, self._watched)
         elif found.missed:
             self._skip(self._live, found)
         self.samples = found.sample + 1
         record = self._live.add(found.sample, found.op, found.pv)
         if record is not None:
             self._fit(self._live, found.sample, record)
+        if self._monitoring is not None:
+            look = self._monitoring.add(found.sample, found.op, found.pv)
+            self.looks += [] if look is None else [look]
+            self.findings += self._monitoring.collect()
 
     def _skip(self, live: LiveEstimator, found: PairedSample) -> None:
         live.restart()
+        if self._monitoring is not None:
+            self._monitoring.restart()
         self.missed += found.missed
         for sample in range(found.sample - found.missed, found.sample):
             if self.settings.due(sample):
@@ -157,6 +177,8 @@ class ReplayedEstimator:
     ) -> None:
         stamp = self._pairs.stamp_of(end)
         update = live.conclude(end, found)
+        if self._monitoring is not None:
+            self._monitoring.learn(update)
         text = ""
         if update.loop_model is not None:
             settings = self.settings

@@ -61,6 +61,25 @@ class ModeMatch:
 
 
 @dataclasses.dataclass(frozen=True)
+class MonitorMatch:
+    """What the monitor told, replayed and recorded.
+
+    Attributes:
+        looks, equal_looks: measurements of the gap in the bag, and how many came again.
+        findings, equal_findings: windows looked into, likewise.
+        match: equal in every bit, different, or not compared.
+        difference: the first difference, or why nothing is compared; empty when equal.
+    """
+
+    looks: int
+    equal_looks: int
+    findings: int
+    equal_findings: int
+    match: Match
+    difference: str
+
+
+@dataclasses.dataclass(frozen=True)
 class Replay:
     """A replay and its comparison with what was recorded.
 
@@ -73,6 +92,7 @@ class Replay:
         modes: None when the bag has no configuration of a controller.
         op: None likewise, and for a bag that begins later than the run.
         notes: what stands in the way of equality, one sentence each.
+        monitor: None when the estimator ran without monitor.
     """
 
     bag: ReplayBag
@@ -83,6 +103,7 @@ class Replay:
     modes: ModeMatch | None
     op: OpMatch | None
     notes: tuple[str, ...]
+    monitor: MonitorMatch | None = None
 
     @property
     def match(self) -> Match:
@@ -92,6 +113,8 @@ class Replay:
             found.append(self.modes.match)
         if self.op is not None and self.op.compared:
             found.append(Match.DIFFERENT if self.op.first_difference else Match.EQUAL)
+        if self.monitor is not None:
+            found.append(self.monitor.match)
         for match in (Match.DIFFERENT, Match.EQUAL):
             if match in found:
                 return match
@@ -99,7 +122,7 @@ class Replay:
 
     @property
     def first_difference(self) -> str:
-        """The first difference of all, in the order fits, ``op``, modes; empty for none."""
+        """The first difference: of fits, ``op``, modes, then the monitor; empty for none."""
         for fit in self.fits:
             if fit.match is Match.DIFFERENT:
                 return f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.difference}"
@@ -107,6 +130,8 @@ class Replay:
             return self.op.first_difference
         if self.modes is not None and self.modes.match is Match.DIFFERENT:
             return self.modes.difference
+        if self.monitor is not None and self.monitor.match is Match.DIFFERENT:
+            return self.monitor.difference
         return ""
 
     def seconds(self, stamp: int) -> float:
@@ -125,6 +150,7 @@ class Replay:
             "op": None if self.op is None else dataclasses.asdict(self.op),
             "modes": None if self.modes is None else self._modes(self.modes),
             "swap": None if self.modes is None else self._swap(self.modes),
+            "monitor": None if self.monitor is None else dataclasses.asdict(self.monitor),
             "notes": list(self.notes),
         }
         return dict(finite(document))

@@ -18,8 +18,11 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
 from stiction_ros.loop.reading import Section, load_yaml
+from stiction_ros.online.gap_finding import GapFinding
+from stiction_ros.online.gap_monitor import GapLook, MonitorRule
 from stiction_ros.online.live_controller import LiveController, LiveControllerSettings, ModeChange
 from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
+from stiction_ros.online.monitoring import Monitoring, check_model
 from stiction_ros.online.node_settings import (
     ControllerNodeSettings,
     EstimatorNodeSettings,
@@ -51,6 +54,8 @@ class Scenario:
         set_points: schedule.
         seed, samples: of the plant.
         controller, estimator: settings of the two.
+        monitor: rule of the estimator's monitor.
+        monitor_model: what the monitor compares with; None for the loop as it is identified.
     """
 
     name: str
@@ -63,6 +68,8 @@ class Scenario:
     samples: int
     controller: LiveControllerSettings
     estimator: EstimatorSettings
+    monitor: MonitorRule = MonitorRule()
+    monitor_model: LoopModel | None = None
 
     @classmethod
     def load(cls, path: Path | str) -> Scenario:
@@ -93,6 +100,9 @@ class Scenario:
                 where=f"{path}: controller: {controller.model}",
                 fix=f"use {', '.join(model.valve_names)} and {', '.join(model.outputs)}",
             )
+        watched: LoopModel | None = None
+        if checked["estimator"].monitor_model:
+            watched = LoopModel.load(path.parent / checked["estimator"].monitor_model)
         for key in (field.name for field in dataclasses.fields(FitSchedule)):
             told, awaited = getattr(checked["estimator"], key), getattr(controller, key)
             if told != awaited:
@@ -104,6 +114,8 @@ class Scenario:
         try:
             controller.design(process)
             checked["estimator"].options()
+            if watched is not None:
+                check_model(watched, model.valve_names, model.outputs, model.sample_time)
         except InputError as error:
             raise error.within(str(path)) from None
         return cls(
@@ -117,6 +129,8 @@ class Scenario:
             plant.samples,
             controller,
             checked["estimator"],
+            checked["estimator"],
+            watched,
         )
 
 
@@ -129,12 +143,15 @@ class LiveRun:
         stem_estimate: χ̂ of the controller in force, shape (N, m), %.
         changes: modes, the first at sample 0.
         fits: every fit in order.
+        looks, findings: what the monitor measured and found, in order.
     """
 
     run: ClosedLoopRun
     stem_estimate: FloatArray
     changes: tuple[ModeChange, ...]
     fits: tuple[FitUpdate, ...]
+    looks: tuple[GapLook, ...] = ()
+    findings: tuple[GapFinding, ...] = ()
 
     @property
     def swap(self) -> ModeChange | None:
@@ -153,6 +170,11 @@ class _Loop:
             self.estimator = LiveEstimator(
                 scenario.estimator, plant.name, plant.valve_names, plant.outputs, plant.sample_time
             )
+        self.monitoring: Monitoring | None = None
+        if self.estimator is not None and scenario.monitor.monitor:
+            self.monitoring = Monitoring(scenario.monitor, self.estimator, scenario.monitor_model)
+        self.looks: list[GapLook] = []
+        self.findings: list[GapFinding] = []
         self.fits: list[FitUpdate] = []
         self.stems: list[FloatArray] = []
         self._latency = scenario.controller.fit_latency
@@ -165,6 +187,10 @@ class _Loop:
             record = self.estimator.add(self._sample, result.op, measurement.pv)
             if record is not None:
                 self._fit(self.estimator, record)
+        if self.monitoring is not None:
+            look = self.monitoring.add(self._sample, result.op, measurement.pv)
+            self.looks += [] if look is None else [look]
+            self.findings += self.monitoring.collect()
         self._sample += 1
         return result.op
 
@@ -175,6 +201,8 @@ class _Loop:
             return  # a window that cannot be used changes nothing, as in the node
         update = estimator.conclude(self._sample, found)
         self.fits.append(update)
+        if self.monitoring is not None:
+            self.monitoring.learn(update)
         if update.loop_model is not None:
             self.controller.offer(update.loop_model, self._sample + self._latency)
 
@@ -207,4 +235,11 @@ def run_live(
         scenario.seed if seed is None else seed,
         progress,
     )
-    return LiveRun(run, np.array(loop.stems), tuple(loop.controller.changes), tuple(loop.fits))
+    return LiveRun(
+        run,
+        np.array(loop.stems),
+        tuple(loop.controller.changes),
+        tuple(loop.fits),
+        tuple(loop.looks),
+        tuple(loop.findings),
+    )

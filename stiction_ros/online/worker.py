@@ -5,14 +5,18 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
 
 from stiction_ros.identification import Identification, IdentificationOptions
 from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.online.live_estimator import fit
 from stiction_ros.orphans import die_with_parent
 from stiction_ros.records import Record
+
+T = TypeVar("T")
 
 
 class FitWorker:
@@ -39,12 +43,16 @@ class FitWorker:
 
     def submit(self, record: Record, options: IdentificationOptions) -> Future[Identification]:
         """Queue a fit; the future may hold the InputError of an unusable window."""
+        return self.call(fit, record, options)
+
+    def call(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
+        """Queue a function of a module behind the fits; the future may hold what it raised."""
         try:
-            return self._pool.submit(fit, record, options)
+            return self._pool.submit(work, *arguments)
         except BrokenProcessPool:
             self._pool.shutdown()
             self._start()
-            return self._pool.submit(fit, record, options)
+            return self._pool.submit(work, *arguments)
 
     def close(self) -> None:
         """Drop queued fits and end the process once the running one is done."""

@@ -22,6 +22,7 @@ from stiction_ros.records.bag_messages import (
 )
 from stiction_ros.records.bag_metadata import BagTopic
 from stiction_ros.records.bag_reader import JOINT_STATE, LoopSignals, is_signal
+from stiction_ros.records.gap_log import GapLog, gap_log
 from stiction_ros.records.record import Record
 
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
@@ -110,6 +111,7 @@ class RunLog:
         fits: in the order of their windows.
         stem_estimate: the controller's estimate of the stem positions at the record's
             samples, shape (N, m), %, NaN where none was published; None when there is none.
+        gaps: what the monitor told.
         wall_seconds: from the first to the last publication, on the publishers' clock.
     """
 
@@ -126,6 +128,7 @@ class RunLog:
     fits: tuple[Fit, ...] = ()
     stem_estimate: FloatArray | None = None
     wall_seconds: float = float("nan")
+    gaps: GapLog = GapLog({}, {})
 
     def seconds(self, stamp: int) -> float:
         """Return the time of a stamp in s since the first sample."""
@@ -216,6 +219,7 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         fits=fits(messages),
         stem_estimate=stem_estimate(messages, stamps.tolist(), record.valves),
         wall_seconds=(max(sent) - min(sent)) / 1e9,
+        gaps=gap_log(messages),
     )
 
 

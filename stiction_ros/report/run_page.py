@@ -8,6 +8,7 @@ from typing import Any
 from stiction_ros import __version__
 from stiction_ros.records.run_log import ModeChange
 from stiction_ros.report.drawing import Drawing
+from stiction_ros.report.monitor_section import monitor_section
 from stiction_ros.report.page import (
     Cell,
     card,
@@ -58,6 +59,7 @@ def run_page(story: Story, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
         _gain(story),
         *[embedded(drawing, png) for drawing, png in drawings],
         _fits(story),
+        monitor_section(story.log),
         process_table(story.identified.get("outputs", []), record.sample_time),
         _messages(story),
         _configuration(story),

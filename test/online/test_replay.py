@@ -248,7 +248,7 @@ def test_a_bag_without_the_estimator_s_configuration_is_one_clear_error(
 
 
 def test_a_parameter_of_another_version_is_one_clear_error(bag: Path, tmp_path: Path) -> None:
-    spoil = config(bag, lambda t: t.replace("window:", "windows:"), "/estimator/config")
+    spoil = config(bag, lambda t: t.replace(" window:", " windows:"), "/estimator/config")
     with pytest.raises(InputError, match="estimator/config: unknown key 'windows'"):
         replay(copy_bag(bag, tmp_path / "bag", spoil))
 
