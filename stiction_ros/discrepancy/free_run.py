@@ -101,6 +101,7 @@ class FreeRun:
 
     Attributes:
         model, runs: what runs, over what.
+        leads: of valves whose last effect starts with its stem that far from OP, %.
         stems: positions of the current model, shape (N, m), %.
         forced: outputs of the process, shape (N, p), but for the free columns.
         known: what disturbances and sensors of the current model add, shape (N, p).
@@ -121,7 +122,7 @@ class FreeRun:
             InputError: the model's free run is not finite.
         """
         self.model, self.runs = model, runs
-        self._leads = leads or {}
+        self.leads = dict(leads or {})
         self.responses: Responses = responses_of(model.process, model.sample_time)
         self.stems = np.column_stack(
             [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
@@ -171,7 +172,7 @@ class FreeRun:
         """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""
         low, high = self.model.limits[valve]
         stem = self.runs.op[:, valve].copy()
-        lead = self._leads.get(self.model.valves[valve].name, 0.0)
+        lead = self.leads.get(self.model.valves[valve].name, 0.0)
         for rows in self.runs.slices:
             for k, effect in enumerate(effects):
                 first = float(stem[rows.start]) + (lead if k == len(effects) - 1 else 0.0)

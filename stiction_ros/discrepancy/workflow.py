@@ -14,13 +14,17 @@ from stiction_ros.discrepancy.controller_check import ControllerCheck, check_con
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
 from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_with
-from stiction_ros.discrepancy.free_process import score_with_free_process
+from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.measured_stem import not_contradicted
 from stiction_ros.discrepancy.options import GapOptions
-from stiction_ros.discrepancy.process_refit import refit_process
+from stiction_ros.discrepancy.process_refit import (
+    longest_delay,
+    refit_process,
+    with_common_rows,
+)
 from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
 from stiction_ros.discrepancy.say import experiment_for, overall
 from stiction_ros.discrepancy.search import Baseline
@@ -84,9 +88,14 @@ class _Workflow:
         self.data: list[DataFinding] = [*([found] if found else []), *self.gate.findings]
         self.runs: Runs = corrected(runs, found)
         self.bare = add_data_effects(model, self.data)
+        self.longest = 0
         if options.free_process:
-            self.bare = refit_process(self.bare, self.runs)
-        self.base_before = Baseline.of(FreeRun(model, self.runs))
+            self.longest = longest_delay(model)
+            self.runs = with_common_rows(self.runs, model)
+            self.bare = refit_process(self.bare, self.runs, self.longest)
+        first = self.bare if options.free_process else model
+        self.base_before = Baseline.of(FreeRun(first, self.runs))
+        self.gains: dict[tuple[str, str], float] = {}  # with the process refitted
         self.looks: list[Look] = []
         self.added: tuple[AddedEffect, ...] = ()
         self.base = self.base_before
@@ -110,6 +119,8 @@ class _Workflow:
             threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
         allowed = not_contradicted(self.base.run, scores.fits)
         decision = decide(allowed, self.options.margin, threshold)
+        if self.options.free_process:
+            decision = in_doubt_of_place(self.base, decision)
         testable = testable_effects(self.base, list(candidates), self.options.margin)
         where = locate(self.base)
         kept, reason = False, decision.reason
@@ -120,6 +131,8 @@ class _Workflow:
             kept, reason = step.kept, step.reason
             if step.kept:
                 self.added, self.base, self.bare = step.added, step.base, bare
+                if models:
+                    self.gains[chosen.place, chosen.effect] = decision.chosen.delta_bic
         return Look(scores, decision, where, kept, reason), testable
 
     def _score(
@@ -128,8 +141,7 @@ class _Workflow:
         """Return the scores, and the model behind each candidate where the process is free."""
         if not self.options.free_process:
             return score_candidates(self.base, candidates, report), {}
-        model = self.base.run.model
-        found = score_with_free_process(model, self.runs, self.base, candidates, report)
+        found = score_with_free_process(self.base, candidates, self.longest, report)
         self.base = found.scores.base
         if not self.added:
             self.base_before = self.base
@@ -209,7 +221,7 @@ class _Workflow:
             effect.effect,
             values,
             self._intervals(k, effect),
-            effect.fit.delta_bic,
+            self.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
             verdict,
             effect.alternatives,
         )
