@@ -32,7 +32,7 @@ def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> 
     longest = max(records, key=len)
     options = LinearOptions(kind=LinearKind.ARX, delay=delay)
     if not _moved(longest):
-        options = LinearOptions(LinearKind.ARX, output_order=2, input_order=1, delay=delay)
+        options = LinearOptions(LinearKind.ARX, output_order=2, input_order=2, delay=delay)
     found = fit_linear(longest, options)
     return found.loop_model(longest.name.removesuffix(".csv") or "loop")
 

@@ -11,11 +11,14 @@ from scipy.signal import lfilter
 from stiction_ros.discrepancy.free_run import Runs
 from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, whiten
 from stiction_ros.effects import FloatArray
+from stiction_ros.identification.polynomials import stabilised
 
 RADIUS = 0.9995
+LARGEST_START = 0.995
 PREFILTERINGS = 3
 LARGEST = 1e3  # of the span of PV: what a free run may reach
 LEAST_GAIN = 0.1
+SHARES = (1.0, 0.4, 0.1)  # of a Gauss-Newton step
 
 
 @dataclasses.dataclass(frozen=True)
@@ -174,23 +177,27 @@ def best_fit(problem: Problem, starts: Sequence[Equation], rounds: int) -> Fitte
     return best
 
 
-def _step(problem: Problem, now: Fitted) -> FloatArray:
-    """Return the Gauss-Newton step in (a, b), the free columns solved for beside it."""
-    total = problem.y - now.noise.residual
-    columns = np.hstack([problem.sensitivities(now.equation, total), problem.free(now.equation)])
-    rows = problem.blocks.train
-    inner = whiten(columns, now.noise.ar)[rows]
+def _step(problem: Problem, now: Fitted) -> tuple[FloatArray, FloatArray]:
+    """Return the Gauss-Newton steps in (a, b) and φ, the free columns solved for beside them."""
+    ar, residual, rows = now.noise.ar, now.noise.residual, problem.blocks.train
+    driven = problem.sensitivities(now.equation, problem.y - residual)
+    columns = whiten(np.hstack([driven, problem.free(now.equation)]), ar)
+    late = [problem.late(residual, k)[:, None] for k in range(1, len(ar) + 1)]
+    inner = np.hstack([columns, *late])[rows]
     scale = np.maximum(np.linalg.norm(inner, axis=0), 1e-300)
-    target = whiten(now.noise.residual, now.noise.ar)[rows]
-    return np.asarray(np.linalg.lstsq(inner / scale, target, rcond=1e-9)[0] / scale)
+    target = whiten(residual, ar)[rows]
+    step = np.linalg.lstsq(inner / scale, target, rcond=1e-9)[0] / scale
+    return step[: driven.shape[1]], step[len(step) - len(ar) :]
 
 
-def _line_search(problem: Problem, now: Fitted, step: FloatArray) -> Fitted | None:
-    for share in (1.0, 0.4, 0.1):
-        tried = now.equation.moved(share * step)
+def _line_search(
+    problem: Problem, now: Fitted, steps: tuple[FloatArray, FloatArray]
+) -> Fitted | None:
+    for share in SHARES:
+        tried = now.equation.moved(share * steps[0])
         if not problem.bounded(tried):
             continue
-        found = problem.fit(tried, now.noise.ar)
+        found = problem.fit(tried, now.noise.ar + share * steps[1])
         if found.bic < now.bic:
             return found
     return None
@@ -215,8 +222,8 @@ def filtered_fits(problem: Problem, own: Equation) -> list[Equation]:
         scale = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
         theta = np.linalg.lstsq(whole / scale, y[rows], rcond=1e-10)[0] / scale
         equation = zero.moved(theta[:count])
-        if not equation.stable:
-            break
+        inside = stabilised(equation.denominator, LARGEST_START)
+        equation = dataclasses.replace(equation, a=inside[1:])
         found.append(equation)
         denominator = equation.denominator
     return found

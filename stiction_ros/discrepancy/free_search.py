@@ -147,7 +147,7 @@ class FreeSearch:
             late = list(self.own[i].delay)
             late[valve] = int(delays[i])
             own = self.own[i].at(late)
-            tried = [own, *filtered_fits(problem, own)[-2:]]
+            tried = [own, *filtered_fits(problem, own)]
             if starts is not None:
                 tried += [starts[i], starts[i].at(late)]
             found = best_fit(problem, tried, rounds)

@@ -95,7 +95,8 @@ def refit_output(problem: Problem, own: Equation, longest: int, rounds: int = RO
     shift = longest - max(own.delay)
     for late in range(-max(own.delay), shift + 1):
         delays = tuple(max(d + late, 0) for d in own.delay)
-        starts += filtered_fits(problem, own.at(delays))[-1:]
+        each = filtered_fits(problem, own.at(delays))
+        starts += [*each[:1], *each[1:][-1:]]
     return best_fit(problem, starts, rounds) or problem.fit(own)
 
 
