@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.decoys import Dynamics
 from stiction_ros.discrepancy.extend import same_candidate
 from stiction_ros.discrepancy.free_equation import Equation, Fitted, best_fit
 from stiction_ros.discrepancy.free_run import FreeRun
-from stiction_ros.discrepancy.free_search import FreeSearch
+from stiction_ros.discrepancy.free_search import HOPELESS, FreeSearch
 from stiction_ros.discrepancy.process_refit import (
     equations_of,
     problems_of,
@@ -75,9 +75,10 @@ def score_with_free_process(
         progress: called with the share done, 0 to 1.
     """
     told = [c for c in candidates if c.effect not in ABSORBED]
-    found = []
+    found: list[_Found] = []
     for k, candidate in enumerate(told):
-        found.append(_fit(base, candidate, longest))
+        rival = max((f.fit.delta_bic for f in found), default=0.0)
+        found.append(_fit(base, candidate, longest, max(rival, 0.0)))
         if progress is not None:
             progress((k + 1) / len(told))
     better = _shared(base, found)
@@ -111,12 +112,12 @@ def in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
     )
 
 
-def _fit(base: Baseline, candidate: Candidate, longest: int) -> _Found:
+def _fit(base: Baseline, candidate: Candidate, longest: int, rival: float) -> _Found:
     if isinstance(candidate, ValveCandidate):
-        return _fit_valve(base, candidate, longest)
+        return _fit_valve(base, candidate, longest, rival)
     first = fit_candidate(base, base.run.gap, candidate)
     best = _Found(first, tuple(equations_of(base.run.model)))
-    if not candidate.inside:
+    if not candidate.inside or first.delta_bic < rival - HOPELESS:
         return best
     for _ in range(TURNS):
         behaviour = best.fit.behaviour(base.run)
@@ -131,8 +132,8 @@ def _fit(base: Baseline, candidate: Candidate, longest: int) -> _Found:
     return best
 
 
-def _fit_valve(base: Baseline, candidate: ValveCandidate, longest: int) -> _Found:
-    best = FreeSearch(base, candidate, longest).best()
+def _fit_valve(base: Baseline, candidate: ValveCandidate, longest: int, rival: float) -> _Found:
+    best = FreeSearch(base, candidate, longest).best(rival)
     if best is None:
         first = fit_candidate(base, base.run.gap, candidate)
         return _Found(first, tuple(equations_of(base.run.model)))

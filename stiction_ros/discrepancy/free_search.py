@@ -23,7 +23,7 @@ ROUNDS = 4
 SHRINK = 0.35
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
 ROUGH, FINE = 3, 8  # rounds of Gauss-Newton
-HOPELESS = 60.0  # BIC behind the leader of the same grid beyond which no point is refined
+HOPELESS = 60.0  # BIC behind the leader beyond which no further point is refined
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,8 +58,12 @@ class FreeSearch:
         self.problems = problems_of(self.run)
         self.own = equations_of(self.run.model)
 
-    def best(self) -> Behind | None:
-        """Return the best point; None where no process behind it is stable."""
+    def best(self, rival: float = 0.0) -> Behind | None:
+        """Return the best point; None where no process behind it is stable.
+
+        Args:
+            rival: gain of another candidate; one that begins far behind it is searched less.
+        """
         grid = self._grid()
         seeds = self._seeds(grid)
         found = [f for f in (self._exact(*seed) for seed in seeds) if f is not None]
@@ -67,7 +71,8 @@ class FreeSearch:
         if not found:
             return None
         top = found[0].gain
-        near = [f for f in self._apart(found) if f.gain > top - HOPELESS]
+        near = [f for f in self._apart(found) if f.gain > max(top, rival) - HOPELESS]
+        near = near or found[:1]
         return max((self._refined(f) for f in near), key=lambda each: each.gain)
 
     def _grid(self) -> FloatArray:
@@ -147,9 +152,10 @@ class FreeSearch:
             late = list(self.own[i].delay)
             late[valve] = int(delays[i])
             own = self.own[i].at(late)
-            tried = [own, *filtered_fits(problem, own)]
-            if starts is not None:
-                tried += [starts[i], starts[i].at(late)]
+            if starts is None:
+                tried = [own, *filtered_fits(problem, own)]
+            else:
+                tried = [starts[i], starts[i].at(late)][: 1 + (tuple(late) != starts[i].delay)]
             found = best_fit(problem, tried, rounds)
             if found is None:
                 return None
