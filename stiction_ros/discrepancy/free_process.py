@@ -15,6 +15,7 @@ from stiction_ros.discrepancy.extend import same_candidate
 from stiction_ros.discrepancy.free_equation import Equation, Fitted, best_fit
 from stiction_ros.discrepancy.free_run import FreeRun
 from stiction_ros.discrepancy.free_search import HOPELESS, FreeSearch
+from stiction_ros.discrepancy.measured_stem import confirmed
 from stiction_ros.discrepancy.process_refit import (
     equations_of,
     problems_of,
@@ -96,9 +97,11 @@ def in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
     """Return the decision, a static curve of the valve left in doubt with one of the process.
 
     A free linear process behind a curve and a curved process behind a linear valve give the
-    same record, so that neither may be added.
+    same record, so that neither may be added. A recorded stem may confirm the curve.
     """
     if decision.chosen is None or decision.chosen.candidate.effect not in STATIC:
+        return decision
+    if confirmed(base.run, decision.chosen):
         return decision
     _, _, valve = decision.chosen.candidate.place.partition(":")
     names = base.run.model.outputs

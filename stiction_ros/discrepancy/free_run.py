@@ -17,6 +17,7 @@ from stiction_ros.records import Record
 
 HELD_SHARE = 4
 BLOCKS = 24
+PHASES = (0, 1, 3)  # of the held-out blocks, record by record
 SHORTEST_BLOCK = 20
 DETERMINED = ("freeze", "clip", "quantisation")  # shown by the values of PV themselves
 
@@ -147,7 +148,11 @@ class FreeRun:
             first[rows.start : rows.start + self.responses.skip + MAX_ORDER] = True
         usable = self.runs.usable[output] & ~first
         size = max(len(self.runs) // BLOCKS, SHORTEST_BLOCK)
-        kept = (np.arange(len(self.runs)) // size) % HELD_SHARE == HELD_SHARE - 2
+        kept = np.zeros(len(self.runs), dtype=bool)
+        for r, rows in enumerate(self.runs.slices):
+            # The first block of a record is fitted: nothing else holds its state at the start.
+            place = np.arange(rows.stop - rows.start) // size + PHASES[r % len(PHASES)]
+            kept[rows] = place % HELD_SHARE == HELD_SHARE - 2
         return Blocks(usable & ~kept, usable & kept)
 
     def drive(

@@ -17,6 +17,7 @@ from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_
 from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
+from stiction_ros.discrepancy.long_records import liveliest_parts
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.measured_stem import not_contradicted
 from stiction_ros.discrepancy.options import GapOptions
@@ -80,7 +81,7 @@ class _Workflow:
         self.report = progress or (lambda share: None)
         self.begun = time.perf_counter()
         self.random = np.random.default_rng(options.seed)
-        runs = join_records(model, records)
+        runs = join_records(model, liveliest_parts(records) if options.free_process else records)
         self.gate: Gate = look_at_data(model, runs)
         runs = dataclasses.replace(runs, usable=self.gate.usable)
         self.controller: ControllerCheck = check_controller(model, runs)
