@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from stiction_ros.discrepancy.free_equation import Equation, Fitted, best_fit, filtered_fits
+from stiction_ros.discrepancy.noise import NoiseFit
 from stiction_ros.discrepancy.process_refit import equations_of, problems_of
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.discrepancy.stem_scan import Prefilter, StemScan
@@ -74,6 +75,18 @@ class FreeSearch:
         near = [f for f in self._apart(found) if f.gain > max(top, rival) - HOPELESS]
         near = near or found[:1]
         return max((self._refined(f) for f in near), key=lambda each: each.gain)
+
+    def loss_near(self, coordinates: FloatArray, noise: Mapping[int, NoiseFit]) -> FloatArray:
+        """Return −2 log likelihood but for a constant, shape (G,), under a given noise.
+
+        Args:
+            coordinates: of the search, shape (G, axes).
+            noise: per output that the valve acts on.
+        """
+        filters = [
+            Prefilter.of(own, noise[i].ar if i in noise else None) for i, own in enumerate(self.own)
+        ]
+        return self._scan(self._stems(coordinates), filters, self.own)[0]
 
     def _grid(self) -> FloatArray:
         """Return the first grid in coordinates, thinned where the record is long."""

@@ -14,6 +14,7 @@ from stiction_ros.discrepancy.controller_check import ControllerCheck, check_con
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
 from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_with
+from stiction_ros.discrepancy.free_intervals import with_free_process
 from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
@@ -162,6 +163,12 @@ class _Workflow:
     def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
         others = [*self.added[:k], *self.added[k + 1 :]]
         base = Baseline.of(run_with(self.bare, self.runs, others))
+        found = self._given_process(k, effect, base)
+        if not self.options.free_process:
+            return found
+        return with_free_process(found, base, effect.fit, self.longest)
+
+    def _given_process(self, k: int, effect: AddedEffect, base: Baseline) -> Intervals:
         if self.options.quick:
             return likelihood_intervals(base, effect.fit)
         done = self.options.most_effects / (self.options.most_effects + 1)

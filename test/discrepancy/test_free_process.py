@@ -10,6 +10,7 @@ from gap_loops import loop, record, without_set_points
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.first_model import first_model
+from stiction_ros.discrepancy.free_intervals import with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, join_records
 from stiction_ros.discrepancy.long_records import liveliest_parts
 from stiction_ros.discrepancy.process_refit import (
@@ -49,6 +50,21 @@ def test_stiction_is_named_without_a_model(sticky: Discrepancy) -> None:
     assert (sticky.verdict, effect.effect) == (GapVerdict.NAMED, "stiction")
     assert effect.parameters["f_s"] == pytest.approx(4.0, abs=0.15)
     assert effect.parameters["f_d"] == pytest.approx(1.5, abs=0.15)
+
+
+def test_the_friction_lies_in_its_interval(sticky: Discrepancy) -> None:
+    (effect,) = sticky.effects
+    for key, true in (("f_s", 4.0), ("f_d", 1.5)):
+        low, high = effect.intervals[key]
+        assert low <= true <= high
+        assert high - low < 1.0
+
+
+def test_a_free_process_never_narrows_an_interval(sticky: Discrepancy) -> None:
+    base, fit = sticky.base_before, sticky.looks[0].scores.fits[0]
+    narrow = {"f_s": (3.9, 3.91), "f_d": (1.4, 1.41)}
+    wide = with_free_process(narrow, base, fit, 3)
+    assert all(wide[k][0] <= narrow[k][0] and narrow[k][1] <= wide[k][1] for k in narrow)
 
 
 def test_the_gap_closes_where_nothing_was_fitted(sticky: Discrepancy) -> None:
