@@ -36,7 +36,7 @@ def _gain(seen: BlindLoop, truth: Truth, entry: Hidden) -> float:
     base = Baseline.of(FreeRun(model, runs))
     gap = base.run.gap
     gains = [
-        fit_candidate(base, gap, candidate).delta_bic
+        fit_candidate(base, gap, candidate).evidence
         for candidate in all_candidates(base)
         if entry.name in {(candidate.place, candidate.effect), *candidate.twins}
     ]

@@ -23,6 +23,10 @@ class Axis:
         points: of the first grid.
         logarithmic: whether the points are in proportion.
         whole: whether only whole numbers count.
+        reach: half the width of the largest box around a best point, in coordinates of the
+            search; for candidates whose optimum is a needle.
+        linear: whether the response is a straight line in it, so that its best value is the
+            vertex of a parabola.
     """
 
     low: float
@@ -30,6 +34,8 @@ class Axis:
     points: int
     logarithmic: bool = False
     whole: bool = False
+    reach: float = 0.0
+    linear: bool = False
 
     def grid(self) -> FloatArray:
         """Return the first grid, in coordinates of the search."""
@@ -107,6 +113,8 @@ class Candidate(ABC):
         factors: number of figures that least squares finds.
         twins: places and effects that no record of OP and PV tells from this one.
         dated: whether its first axis is a moment of the record.
+        contains: places and effects of the catalogue that are parts of it.
+        needle: whether its optimum is narrower than any lattice is fine.
         inside: whether it belongs to the catalogue; others show only that something is amiss.
     """
 
@@ -117,6 +125,8 @@ class Candidate(ABC):
     twins: tuple[tuple[str, str], ...] = ()
     inside: bool = True
     dated: bool = False
+    contains: tuple[tuple[str, str], ...] = ()
+    needle: bool = False
 
     @abstractmethod
     def respond(self, run: FreeRun, points: FloatArray) -> Response:

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
+from stiction_ros.discrepancy.free_run import HELD_SHARE
 from stiction_ros.discrepancy.search import CandidateFit
 
-JUMP_SURE = 6.0  # BIC by which a jump is there
+JUMP_SURE = 10.0  # BIC by which a jump is there
 JUMP_ABSENT = 3.0  # BIC by which it is not
+OFTEN = 8  # departures from rest that must show no jump before it is said to be absent
 CLEAR = 40.0  # BIC below which friction is told, but not of which kind
 FRICTION = ("stiction", "backlash")
 LAGS = ("lag", "pole")
 SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
 LEAST_GAIN = 0.25
+LEAST_TRAVEL = 0.1  # of the span of OP
+DOUBTFUL = 3.0  # standard deviations
+MOMENT = 10.0  # what held-out rows may lose by an effect of one moment
+MOST_OF = 0.5
 
 
 class GapVerdict(enum.StrEnum):
@@ -52,37 +59,45 @@ class Decision:
     reason: str
 
 
-def decide(fits: Sequence[CandidateFit], margin: float, threshold: float) -> Decision:
+def decide(
+    fits: Sequence[CandidateFit],
+    margin: float,
+    threshold: float,
+    departures: Callable[[CandidateFit], int],
+) -> Decision:
     """Return what may be said.
 
     Args:
         fits: of all candidates.
-        margin: BIC by which the best must beat its rivals outside its family.
-        threshold: BIC by which it must beat the current model.
+        margin: evidence, in BIC, by which the best must beat its rivals outside its family.
+        threshold: evidence by which it must beat the current model.
+        departures: how often the stem of a fit leaves a rest.
     """
-    ranked = sorted(fits, key=lambda fit: -fit.delta_bic)
+    ranked = sorted(fits, key=lambda fit: -fit.evidence)
     passed = [
-        f for f in ranked if f.candidate.inside and f.delta_bic >= threshold and large_enough(f)
+        f for f in ranked if f.candidate.inside and f.evidence >= threshold and large_enough(f)
     ]
-    kept = [f for f in passed if f.held_gain > 0.0]
-    outside = [f for f in ranked if not f.candidate.inside and f.held_gain > 0.0]
+    kept = [f for f in passed if confirmed(f)]
+    outside = [f for f in ranked if not f.candidate.inside and confirmed(f)]
     stranger = outside[0] if outside else None
     if not kept:
-        if stranger is not None and stranger.delta_bic >= threshold + margin:
+        if stranger is not None and stranger.evidence >= threshold + margin:
             return _unknown(stranger, "nothing in the catalogue explains the gap")
-        if passed and passed[0].delta_bic >= threshold + SURE:
+        if passed and passed[0].evidence >= threshold + SURE:
             return _unknown(passed[0], "the held-out rows do not confirm it")
         reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
         return Decision(GapVerdict.NONE, None, (), False, reason)
     best = kept[0]
-    if stranger is not None and stranger.delta_bic > best.delta_bic:
+    if stranger is not None and stranger.evidence > best.evidence and not _part(best, stranger):
         return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
-    best, family = _family(best, ranked)
+    best, family = _family(best, ranked, departures)
     rivals = [
         f
-        for f in passed
-        if _name(f) != _name(best)
-        and f.delta_bic > best.delta_bic - margin
+        for f in ranked
+        if f.candidate.inside
+        and _name(f) != _name(best)
+        and f.evidence > max(best.evidence - margin, 0.0)
+        and large_enough(f)
         and not _same_family(f, best)
     ]
     names = list(dict.fromkeys([*family, *best.candidate.twins, *(_name(f) for f in rivals)]))
@@ -95,6 +110,25 @@ def decide(fits: Sequence[CandidateFit], margin: float, threshold: float) -> Dec
     return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
 
 
+def confirmed(fit: CandidateFit) -> bool:
+    """Tell whether the held-out rows bear an effect out, chance allowed for."""
+    return borne_out(fit.delta_bic, fit.held_gain, fit.candidate.dated)
+
+
+def borne_out(delta_bic: float, held_gain: float, dated: bool) -> bool:
+    """Tell whether held-out rows bear out what the training rows gain.
+
+    An effect that is there gains a third as much on the third as many rows, in the mean; the
+    gain S of a known wave has the standard deviation 2 √S. Below nought, and by more than
+    three of these below what is due, the held-out rows refuse it. What comes at one moment
+    shows in the block of that moment, the other blocks gain nothing but chance.
+    """
+    if dated:
+        return held_gain > -MOMENT
+    due = max(delta_bic, 0.0) / (HELD_SHARE - 1)
+    return held_gain > min(0.0, due - DOUBTFUL * 2.0 * math.sqrt(due))
+
+
 def large_enough(fit: CandidateFit) -> bool:
     """Tell whether an effect has an engineering size."""
     value = float(fit.point[0]) if len(fit.point) else 0.0
@@ -103,6 +137,10 @@ def large_enough(fit: CandidateFit) -> bool:
         return abs(float(fit.factors[0])) >= 0.03 and 1.0 + float(fit.factors[0]) >= LEAST_GAIN
     if fit.candidate.effect in FRICTION:
         return value >= 0.1
+    if fit.candidate.effect == "saturation":
+        # Ends that leave hardly any travel: a valve that does not move, whatever holds it.
+        span = fit.candidate.axes[1].high - fit.candidate.axes[0].low
+        return abs(float(fit.point[1] - fit.point[0])) >= LEAST_TRAVEL * span
     if fit.candidate.effect == "characteristic":
         return abs(value) >= 0.15
     return True
@@ -114,8 +152,13 @@ def _unknown(stranger: CandidateFit, reason: str) -> Decision:
         None,
         (),
         False,
-        f"{stranger.candidate.name} would explain the gap by {stranger.delta_bic:.0f}; {reason}",
+        f"{stranger.candidate.name} would explain the gap by {stranger.evidence:.0f}; {reason}",
     )
+
+
+def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
+    """Tell whether a fit is most of what a rival outside the catalogue contains."""
+    return _name(fit) in stranger.candidate.contains and fit.evidence > MOST_OF * stranger.evidence
 
 
 def _name(fit: CandidateFit) -> tuple[str, str]:
@@ -132,23 +175,25 @@ def _same_family(one: CandidateFit, other: CandidateFit) -> bool:
 
 
 def _family(
-    best: CandidateFit, ranked: Sequence[CandidateFit]
+    best: CandidateFit,
+    ranked: Sequence[CandidateFit],
+    departures: Callable[[CandidateFit], int],
 ) -> tuple[CandidateFit, tuple[tuple[str, str], ...]]:
     """Return stiction or backlash by the test of the jump, and the other one in doubt."""
     if best.candidate.effect not in FRICTION:
         return best, ()
-    rivals = [f for f in ranked if _same_family(f, best) and f.delta_bic > 0.0]
+    rivals = [f for f in ranked if _same_family(f, best) and f.evidence > 0.0]
     jumping = [f for f in rivals if f.candidate.effect == "stiction"]
     plain = [f for f in rivals if f.candidate.effect == "backlash"]
     if not jumping or not plain:
         return best, ()
-    jump = jumping[0].delta_bic - plain[0].delta_bic
-    if best.delta_bic < CLEAR:  # too little to tell whether there is a jump
+    jump = jumping[0].evidence - plain[0].evidence
+    if best.evidence < CLEAR:  # too little to tell whether there is a jump
         other = jumping[0] if best.candidate.effect == "backlash" else plain[0]
         return best, (_name(other),)
     if jump > JUMP_SURE:
         return jumping[0], ()
-    if jump < -JUMP_ABSENT:
+    if jump < -JUMP_ABSENT and departures(plain[0]) >= OFTEN:
         return plain[0], ()
     first, second = (jumping[0], plain[0]) if jump > 0.0 else (plain[0], jumping[0])
     return first, (_name(second),)

@@ -31,6 +31,7 @@ class GainChange(_Decoy):
     def __init__(self, run: FreeRun, output: int) -> None:
         """Take the output's index."""
         super().__init__(run, output, "process", "gain that changes")
+        self.contains = ((f"disturbance:{run.model.outputs[output]}", "step"),)
         last = float(run.runs.time.max())
         self.axes = (Axis(0.1 * last, 0.9 * last, 17),)
 

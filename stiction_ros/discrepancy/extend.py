@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,15 +11,16 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.catalogue_scores import all_candidates
+from stiction_ros.discrepancy.decide import borne_out
 from stiction_ros.discrepancy.free_run import FreeRun, Runs
 from stiction_ros.discrepancy.measure import OutputGap, measure_gap
 from stiction_ros.discrepancy.measured_stem import stem_misfit
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
-from stiction_ros.effects import Behaviour
+from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
 
 ROUNDS = 2
-GROWTH = 1.02  # of the free-run error that noise may bring about
+GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow
 WORTH = 10.0
 
 
@@ -89,7 +91,7 @@ def extend(
     model = with_effects(bare, worth)
     after_base = Baseline.of(run_with(bare, runs, worth))
     after = measure_gap(after_base)
-    trouble = _trouble(base, after_base, before, after) or _stem_trouble(base, after_base)
+    trouble = _trouble(base, after_base, new.fit.candidate.dated) or _stem_trouble(base, after_base)
     if trouble:
         kept = tuple(added)
         return Extension(with_effects(bare, kept), kept, base, before, before, False, trouble)
@@ -138,25 +140,37 @@ def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candid
     return None
 
 
-def _trouble(
-    base: Baseline,
-    after_base: Baseline,
-    before: tuple[OutputGap, ...],
-    after: tuple[OutputGap, ...],
-) -> str:
-    """Return why the effect must go again; empty when the gap has shrunk."""
+def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:
+    """Return why the effect must go again; empty when the held-out rows bear it out."""
     held = sum(
         old.held_minus_two_log - new.held_minus_two_log
         for old, new in zip(base.noise, after_base.noise, strict=True)
     )
-    if held <= 0.0:
+    if not borne_out(base.bic - after_base.bic, held, dated):
         return "the innovations of the held-out rows do not become smaller"
-    unit = [max(gap.floor_one_step, 1e-300) for gap in before]
-    old = np.array([g.free_run_rmse / u for g, u in zip(before, unit, strict=True)])
-    new = np.array([g.free_run_rmse / u for g, u in zip(after, unit, strict=True)])
-    if float(np.sum(new**2)) > GROWTH * float(np.sum(old**2)):
-        return "the free run of the held-out rows does not come nearer to PV"
     return ""
+
+
+def moved_away(base: Baseline, after_base: Baseline) -> bool:
+    """Tell whether the squared error of the free run has grown by more than chance.
+
+    Held-out blocks are independent witnesses: their growths, weighed by the innovations, have
+    a mean and a standard error.
+    """
+    growths: list[FloatArray] = []
+    for old, new, blocks in zip(base.noise, after_base.noise, base.blocks, strict=True):
+        unit = max(old.innovation_std, 1e-300)
+        growth = np.where(blocks.held, (new.residual / unit) ** 2 - (old.residual / unit) ** 2, 0.0)
+        begins = np.flatnonzero(np.diff(np.concatenate([[0], blocks.held.astype(int)])) == 1)
+        if len(begins):
+            growths.append(np.add.reduceat(growth, begins))
+    if not growths:
+        return False
+    blocks_of_one = min(len(each) for each in growths)
+    total = np.sum([each[:blocks_of_one] for each in growths], axis=0)
+    if blocks_of_one < 3:
+        return float(total.sum()) > 0.0
+    return float(total.mean()) > GROWN * float(total.std(ddof=1)) / math.sqrt(blocks_of_one)
 
 
 def _stem_trouble(base: Baseline, after_base: Baseline) -> str:

@@ -94,6 +94,11 @@ def _check(model: LoopModel, record: Record) -> None:
         )
 
 
+def end_to_end(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the parts of every record below each other; one alone is not copied."""
+    return parts[0] if len(parts) == 1 else np.vstack(parts)
+
+
 class FreeRun:
     """The current model under the recorded OP, and what small changes of it would give.
 
@@ -171,7 +176,7 @@ class FreeRun:
             if valve is not None and stems is not None:
                 inputs[valve] = stems[rows]
             parts.append(self.responses.forced(output, inputs))
-        return np.vstack(parts)
+        return end_to_end(parts)
 
     def valve_chain(self, valve: int, effects: Sequence[Behaviour]) -> FloatArray:
         """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""

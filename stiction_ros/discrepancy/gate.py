@@ -8,12 +8,13 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.free_run import Runs
-from stiction_ros.discrepancy.noise import BoolArray
+from stiction_ros.discrepancy.noise import MAX_ORDER, BoolArray, autoregression, whiten
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.loop import LoopModel
 
 LONGEST_REST = 12
 ENDS = 6
+COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,19 +64,21 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
     for i, name in enumerate(model.outputs):
         quantum = quantum_of(runs.pv[:, i])
         quanta.append(quantum)
+        rounded = _rounded(runs, i, name, quantum)
         for r, rows in enumerate(runs.slices):
             values = runs.pv[rows, i]
-            frozen = _frozen(values, name, r, runs.sample_time)
-            clipped = _clipped(values, name, r, quantum)
-            for finding, where in (*frozen, *clipped):
-                usable[i, rows] &= ~where
-                findings.append(finding)
+            if not rounded:  # values on a coarse lattice rest, and meet at its ends, anyway
+                frozen = _frozen(values, name, r, runs.sample_time)
+                clipped = _clipped(values, name, r, quantum)
+                for finding, where in (*frozen, *clipped):
+                    usable[i, rows] &= ~where
+                    findings.append(finding)
             if _compressed(values):
                 notes.append(
                     f"{name} lies on straight lines: a historian has thinned it out, small "
                     "effects are lost"
                 )
-        findings += _rounded(runs.pv[:, i], name, quantum)
+        findings += rounded
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
             notes.append(f"OP of {valve} never moves: nothing can be said of that valve")
@@ -164,16 +167,27 @@ def _clipped(
     return [(DataFinding(f"sensor:{name}", "clip", behaviour, gain, record), where)]
 
 
-def _rounded(values: FloatArray, name: str, quantum: float) -> list[DataFinding]:
-    """Return a quantum that is coarse against the moves of PV from sample to sample."""
-    moves = np.abs(np.diff(values))
-    if quantum <= 0.0 or float(np.mean(moves**2)) ** 0.5 > 2.5 * quantum:
+def _rounded(runs: Runs, output: int, name: str, quantum: float) -> list[DataFinding]:
+    """Return a quantum that is coarse against what PV does not tell beforehand."""
+    values = runs.pv[:, output]
+    if quantum <= 0.0 or _surprise(runs, output) > COARSE * quantum:
         return []
     levels = len(np.unique(values))
     gain = 2.0 * len(values) * math.log(max(len(values) / levels, 1.0)) - math.log(len(values))
     if levels < 4 or gain <= 0.0:
         return []
     return [DataFinding(f"sensor:{name}", "quantisation", Quantisation(quantum), gain)]
+
+
+def _surprise(runs: Runs, output: int) -> float:
+    """Return the standard deviation of PV's innovations under an autoregression of its own."""
+    values = runs.pv[:, output] - runs.pv[:, output].mean()
+    rows = np.ones(len(values), dtype=bool)
+    for part in runs.slices:
+        rows[part.start : part.start + MAX_ORDER] = False
+    if not rows.any():
+        return math.inf
+    return float(np.std(whiten(values, autoregression(values, rows))[rows]))
 
 
 def _compressed(values: FloatArray) -> bool:

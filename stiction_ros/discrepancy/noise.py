@@ -8,6 +8,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction_ros.discrepancy.noise_kernels import (
+    NOTHING,
+    best_autoregression,
+    orthonormal,
+    sums_of_squares,
+    turn,
+)
 from stiction_ros.effects import FloatArray
 
 MAX_ORDER = 6
@@ -94,14 +101,16 @@ def fit_noise(
     Returns:
         The best of the turns; the order p is the one of least BIC.
     """
-    train = blocks.train
+    train, target = blocks.train, np.ascontiguousarray(target)
+    rows = np.ascontiguousarray(columns.T)
     ar = np.zeros(0) if start is None else start
     best: tuple[float, FloatArray, FloatArray] | None = None
     for _ in range(ROUNDS):
-        beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
+        sure, beta = turn(rows, target, train, ar)
+        if not sure:
+            beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
         residual = target - columns @ beta
-        fitted = autoregression(residual, train)
-        score = _criterion(residual, fitted, train)
+        fitted, score = best_autoregression(residual, train, MAX_ORDER)
         if best is not None and score >= best[0] - 1e-3:
             break
         best = (score, beta, fitted)
@@ -111,10 +120,8 @@ def fit_noise(
 
 
 def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:
-    innovations = whiten(residual, ar)
-    inside, outside = innovations[blocks.train], innovations[blocks.held]
-    rows, held = len(inside), len(outside)
-    variance = max(float(inside @ inside) / max(rows, 1), _TINY)
+    rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held)
+    variance = max(inside / max(rows, 1), _TINY)
     log = math.log(2.0 * math.pi * variance)
     return NoiseFit(
         ar,
@@ -123,54 +130,27 @@ def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Bloc
         residual,
         rows * (log + 1.0),
         rows,
-        held * log + float(outside @ outside) / variance,
+        held * log + outside / variance,
         held,
     )
 
 
 def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
     """Return φ of the order of least BIC, least squares on ``rows``, shape (p ≤ 6,)."""
-    lagged = np.empty((len(residual), MAX_ORDER + 1))
-    for lag in range(MAX_ORDER + 1):
-        lagged[:lag, lag] = 0.0
-        lagged[lag:, lag] = residual[: len(residual) - lag]
-    lagged = lagged[rows]
-    gram = lagged.T @ lagged
-    count = max(len(lagged), 2)
-    best: FloatArray = np.zeros(0)
-    best_score = count * math.log(max(gram[0, 0], _TINY))
-    for order in range(1, MAX_ORDER + 1):
-        inner = slice(1, order + 1)
-        ridge = 1e-12 * float(np.trace(gram)) * np.eye(order)
-        phi = np.linalg.solve(gram[inner, inner] + ridge + _TINY * np.eye(order), gram[inner, 0])
-        left = float(gram[0, 0] - phi @ gram[inner, 0])
-        score = count * math.log(max(left, _TINY)) + order * math.log(count)
-        if score < best_score:
-            best, best_score = np.asarray(phi, dtype=np.float64), score
-    return best
+    return best_autoregression(residual, rows, MAX_ORDER)[0]
 
 
 def projector(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
-    if not columns.shape[1]:
-        return columns
-    scale = np.linalg.norm(columns, axis=0)
-    left, sizes, _ = np.linalg.svd(columns / np.maximum(scale, _TINY), full_matrices=False)
-    return np.ascontiguousarray(left[:, sizes > 1e-9 * max(float(sizes[0]), _TINY)])
+    return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
 
 
 def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
     if not columns.shape[1]:
         return np.zeros(0)
-    scale = np.maximum(np.linalg.norm(columns, axis=0), _TINY)
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > NOTHING, scale, np.inf)
     return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
-
-
-def _criterion(residual: FloatArray, ar: FloatArray, rows: BoolArray) -> float:
-    innovations = whiten(residual, ar)[rows]
-    count = max(len(innovations), 2)
-    square = max(float(innovations @ innovations) / count, _TINY)
-    return count * math.log(square) + len(ar) * math.log(count)
 
 
 def _gain_of_noise(ar: FloatArray) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.free_run import FreeRun, end_to_end
+from stiction_ros.discrepancy.noise import MAX_ORDER
 from stiction_ros.discrepancy.valve_candidates import lag_axis
 from stiction_ros.effects import (
     Behaviour,
@@ -18,9 +21,12 @@ from stiction_ros.effects import (
     SineDisturbance,
     StepDisturbance,
 )
+from stiction_ros.processes import Process
 
 LONGEST_DELAY = 20
 PEAKS = 6
+SURPRISES = 12
+INTEGRATES = 0.05  # of the record: a process with a longer time constant may leak
 
 
 class OutputCandidate(Candidate):
@@ -51,11 +57,34 @@ class FilterCandidate(OutputCandidate):
         for rows in run.runs.slices:
             values = run.forced[rows, self.output]
             step = run.runs.sample_time
-            parts.append(self.kind.simulate_grid(points, values, float(values[0]), step))
-        return Response({self.output: np.vstack(parts) - run.forced[:, self.output, None]})
+            start = self.starts(points, float(values[0]))
+            parts.append(self.kind.simulate_grid(points[:, :1], values, start, step))
+        response = end_to_end(parts)
+        response -= run.forced[:, self.output, None]
+        return Response({self.output: response})
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        """Return what the filters rest at before the first sample, shape (G,)."""
+        return np.full(len(points), first)
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
         return self.kind.from_mapping({self.kind.parameters()[0].key: float(point[0])})
+
+
+class PoleCandidate(FilterCandidate):
+    """One more lag of the output, by its time constant and where it begins."""
+
+    def __init__(self, run: FreeRun, output: int) -> None:
+        """Take the output's index."""
+        super().__init__(run, output, ExtraPole, lag_axis(run))
+        span = float(np.ptp(run.forced[:, output]))
+        self.axes = (*self.axes, Axis(-span, span, 1, linear=True))
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        return first + points[:, 1]
+
+    def count(self, point: FloatArray) -> int:
+        return 1
 
 
 class GainCandidate(OutputCandidate):
@@ -80,13 +109,19 @@ class StepCandidate(OutputCandidate):
     factors = 1
     dated = True
 
-    def __init__(self, run: FreeRun, output: int) -> None:
-        """Take the output's index."""
+    def __init__(self, run: FreeRun, output: int, moments: FloatArray) -> None:
+        """Take the output's index and moments, seconds, at which PV surprises most."""
         super().__init__(run, output, "disturbance", "step")
+        self._moments = moments
         self.twin(run, "sensor", "bias_step")
         step, last = run.runs.sample_time, float(run.runs.time.max())
         self.axes = (Axis(0.02 * last, 0.98 * last, 60),)
         self._step = step
+
+    def grid(self) -> FloatArray:
+        axis = self.axes[0]
+        moments = np.clip(self._moments, axis.low, axis.high)
+        return np.unique(np.concatenate([axis.grid(), moments]))[:, None]
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         wave = run.runs.time[:, None] >= points[:, 0] - 1e-9
@@ -143,6 +178,26 @@ class SineCandidate(OutputCandidate):
         )
 
 
+def slowest(process: Process, sample_time: float) -> float:
+    """Return the longest time constant of a process, samples; inf where it integrates."""
+    poles = np.abs(np.linalg.eigvals(process.linear(sample_time).a))
+    largest = float(poles.max(initial=0.0))
+    if largest >= 1.0 - 1e-9:
+        return math.inf
+    return -1.0 / math.log(largest) if largest > 0.0 else 0.0
+
+
+def surprises(run: FreeRun, innovations: FloatArray) -> FloatArray:
+    """Return the moments of the largest innovations, seconds since the first sample.
+
+    Noise with a long memory takes up a step but for the sample at which it comes.
+    """
+    sizes = np.abs(innovations)
+    for rows in run.runs.slices:
+        sizes[rows.start : rows.start + run.responses.skip + MAX_ORDER] = 0.0
+    return np.asarray(run.runs.time[np.argsort(-sizes)[:SURPRISES]])
+
+
 def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:
     """Return the strongest lines of a gap, raw and whitened, in cycles per sample."""
     found: list[float] = []
@@ -167,20 +222,27 @@ def output_candidates(run: FreeRun, gap: FloatArray, whitened: list[FloatArray])
     """
     found: list[Candidate] = []
     longest = max(rows.stop - rows.start for rows in run.runs.slices)
+    step = run.runs.sample_time
+    memory = slowest(run.model.process, step)
     for i in range(gap.shape[1]):
         moves = float(np.ptp(run.forced[:, i])) > 0.0
         if moves:
-            duration = longest * run.runs.sample_time
-            rates = Axis(0.3 / duration, 0.3 / run.runs.sample_time, 18, logarithmic=True)
             found += [
                 GainCandidate(run, i),
-                FilterCandidate(run, i, ExtraPole, lag_axis(run)).twin(run, "sensor", "lag"),
+                PoleCandidate(run, i).twin(run, "sensor", "lag"),
                 FilterCandidate(
                     run, i, ExtraDelay, Axis(1.0, LONGEST_DELAY, LONGEST_DELAY, whole=True)
                 ),
-                FilterCandidate(run, i, Leak, rates),
             ]
+            if memory > INTEGRATES * longest:
+                lowest = max(0.3 / longest, 0.5 / memory) / step
+                rates = Axis(lowest, 0.3 / step, 18, logarithmic=True)
+                found.append(FilterCandidate(run, i, Leak, rates))
         part = run.runs.slices[int(np.argmax([r.stop - r.start for r in run.runs.slices]))]
         lines = spectral_lines([gap[part, i], whitened[i][part]], 3.0 / longest)
-        found += [StepCandidate(run, i), DriftCandidate(run, i), SineCandidate(run, i, lines)]
+        found += [
+            StepCandidate(run, i, surprises(run, whitened[i])),
+            DriftCandidate(run, i),
+            SineCandidate(run, i, lines),
+        ]
     return found

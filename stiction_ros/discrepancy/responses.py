@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from scipy.signal import lfilter
 
+from stiction_ros.discrepancy.response_kernels import filtered, tank_states
 from stiction_ros.effects import Filter, FloatArray, LinearFilter
 from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank
 
@@ -28,6 +29,10 @@ class Responses(ABC):
             output: its index.
             stems: per valve positions in %, shape (N, G) or (N, 1).
         """
+
+    @abstractmethod
+    def reaches(self, output: int, valve: int) -> bool:
+        """Return whether a valve moves an output."""
 
     @abstractmethod
     def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
@@ -66,12 +71,20 @@ class LinearResponses(Responses):
         ]
 
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
-        total: FloatArray | None = None
-        for numerator, stem in zip(self._numerators[output], stems, strict=True):
-            part = lfilter(numerator, self._denominators[output], stem - stem[:1], axis=0)
-            total = part if total is None else total + part
-        assert total is not None
-        return np.asarray(total)
+        count, denominator = len(stems[0]), self._denominators[output]
+        pairs = list(zip(self._numerators[output], stems, strict=True))
+        many = [pair for pair in pairs if pair[1].shape[1] > 1] or pairs[:1]
+        more = np.zeros(count)
+        for numerator, stem in pairs:
+            if all(stem is not other for _, other in many):
+                more += np.convolve(numerator, stem[:, 0] - stem[0, 0])[:count]
+        total = filtered(many[0][0], denominator, np.ascontiguousarray(many[0][1]), more)
+        for numerator, stem in many[1:]:
+            total += filtered(numerator, denominator, np.ascontiguousarray(stem), np.zeros(count))
+        return total
+
+    def reaches(self, output: int, valve: int) -> bool:
+        return bool(self._numerators[output][valve].any())
 
     def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
         count = len(stems[0])
@@ -104,35 +117,28 @@ class TankResponses(Responses):
         """Take the tank's own parameters and step."""
         self.tank = tank
 
-    def _steps(self, output: int, stems: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-        p = self.tank.parameters
-        flow_a = p.flow_a_max * stems[0] / 100.0
-        if output == 0:
-            inlet = flow_a * p.concentration_a + p.flow_b * p.concentration_b
-        else:
-            steam = p.steam_max * stems[1] / 100.0
-            inlet = flow_a * p.temperature_a + p.flow_b * p.temperature_b
-            inlet = inlet + steam * p.latent_heat / (p.density * p.heat_capacity)
-        return self._affine(flow_a + p.flow_b, inlet)
-
-    def _affine(self, out: FloatArray, inlet: FloatArray) -> tuple[FloatArray, FloatArray]:
-        h = self.tank.sample_time / 60.0
-        z = -out * h / self.tank.parameters.volume
-        tail = 1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0
-        return 1.0 + z * tail, h / self.tank.parameters.volume * inlet * tail
+        p = tank.parameters
+        self._share = tank.sample_time / 60.0 / p.volume
+        self._flow = np.array([p.flow_b, p.flow_a_max / 100.0])
+        heat = p.latent_heat / (p.density * p.heat_capacity)
+        of_a, of_b = p.flow_a_max / 100.0, p.flow_b
+        self._inlets = (
+            np.array([of_b * p.concentration_b, of_a * p.concentration_a, 0.0]),
+            np.array([of_b * p.temperature_b, of_a * p.temperature_a, p.steam_max / 100.0 * heat]),
+        )
 
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
-        ratio, source = self._steps(output, stems)
-        ratio, source = np.broadcast_arrays(ratio, source)
-        state = source[0] / (1.0 - ratio[0])
-        out = np.empty(source.shape)
-        for k in range(len(out)):
-            out[k] = state
-            state = ratio[k] * state + source[k]
-        return out
+        first, second = (np.ascontiguousarray(stem) for stem in stems)
+        if not self.reaches(output, 1):
+            second = second[:, :1].copy()
+        return tank_states(first, second, self._flow, self._inlets[output], self._share)
+
+    def reaches(self, output: int, valve: int) -> bool:
+        return bool(valve == 0 or self._inlets[output][2] != 0.0)
 
     def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
-        ratio = self._steps(output, [stem[:, :1] for stem in stems])[0][:, 0]
+        z = -self._share * (self._flow[0] + self._flow[1] * stems[0][:, 0])
+        ratio = 1.0 + z * (1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0)
         start = np.concatenate([[1.0], np.cumprod(ratio)[:-1]])
         return np.column_stack([start, np.ones(len(ratio))])
 
@@ -153,13 +159,20 @@ class AlteredResponses(Responses):
         ]
 
     def _pass(self, output: int, values: FloatArray) -> FloatArray:
+        """Return what the effects make of values that were zero before the start."""
         for numerator, denominator in self._filters[output]:
             values = lfilter(numerator, denominator, values, axis=0)
         return values
 
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
-        inner = self._inner.forced(output, stems)
-        return self._pass(output, inner - inner[:1])
+        values, rest = self._inner.forced(output, stems), np.zeros(len(stems[0]))
+        values -= values[:1].copy()
+        for numerator, denominator in self._filters[output]:
+            values = filtered(numerator, denominator, values, rest)  # its first row is zero
+        return values
+
+    def reaches(self, output: int, valve: int) -> bool:
+        return self._inner.reaches(output, valve)
 
     def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
         columns = [self._pass(output, self._inner.free(output, stems))]

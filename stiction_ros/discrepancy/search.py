@@ -7,10 +7,12 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.stats import qmc
 
 from stiction_ros.discrepancy.candidates import Candidate, Response
 from stiction_ros.discrepancy.free_run import FreeRun
-from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, projector, whiten
+from stiction_ros.discrepancy.misfit import misfit
+from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise
 from stiction_ros.effects import Behaviour, FloatArray
 
 LEADERS = 4
@@ -20,8 +22,15 @@ REACH = 4.0  # points of the first grid, wider than a held-out block
 MOST = 200
 SLOW = np.array([0.8])
 SHRINK = 0.4
+PROBE = 0.1  # of a linear axis, at which its parabola is taken
+THROWS = 7
+THROWN = 600
+THROW_SHRINK = 0.6
 ROUNDS = 5
+POLISHES = 8
+NEXT_TO_NOTHING = 0.02  # BIC
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
+_FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end in either
 _TINY = 1e-300
 
 
@@ -52,7 +61,13 @@ class Baseline:
         gap = run.gap if gap is None else gap
         shared = tuple(run.free if columns is None else columns)
         blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
-        noise = tuple(fit_noise(gap[:, i], shared[i], blocks[i]) for i in range(gap.shape[1]))
+        noise = tuple(
+            min(
+                (fit_noise(gap[:, i], shared[i], blocks[i], start) for start in _FIRST_GUESSES),
+                key=lambda fit: fit.bic(0),
+            )
+            for i in range(gap.shape[1])
+        )
         return cls(run, shared, blocks, noise)
 
     @property
@@ -70,9 +85,10 @@ class CandidateFit:
         point: searched figures, shape (axes,).
         factors: figures found by least squares, shape (s,).
         noise: per output that it touches, the noise that is left.
-        delta_bic: by how much it beats the current model alone; negative when it does not.
-        held_gain: −2 log likelihood that it gains on the held-out rows.
-        effect_energy: squared whitened response over the innovation variance.
+        delta_bic: by how much it beats the current model alone on the training rows; negative
+            when it does not.
+        held_gain: −2 log likelihood that it gains on the held-out rows, with the figures of
+            the training rows.
     """
 
     candidate: Candidate
@@ -81,7 +97,11 @@ class CandidateFit:
     noise: Mapping[int, NoiseFit]
     delta_bic: float
     held_gain: float
-    effect_energy: float
+
+    @property
+    def evidence(self) -> float:
+        """By how much it beats the current model on all rows: fitted ones and foretold ones."""
+        return self.delta_bic + self.held_gain
 
     def behaviour(self, run: FreeRun) -> Behaviour | None:
         """Return the effect with its figures; None outside the catalogue."""
@@ -107,8 +127,11 @@ def fit_candidate(
         centres = [np.array(inner)]
     for centre in centres:
         search.refine(centre, 0.7)
+    if candidate.needle and around is None and search.best().delta_bic > 0.0:
+        search.scatter()
     if candidate.dated:
         return _dated(search)
+    search.polish()
     return search.best()
 
 
@@ -127,7 +150,7 @@ def _dated(search: _Search) -> CandidateFit:
     response = search.candidate.respond(base.run, values)
     best = whole.best_of(values, response, [found.noise, base.noise])
     other = search.judge(best, search.candidate.respond(base.run, best[None, :]))
-    return max(found, other, key=lambda fit: fit.delta_bic + fit.held_gain)
+    return max(*search.judged.values(), other, key=lambda fit: fit.evidence)
 
 
 class _Search:
@@ -180,18 +203,55 @@ class _Search:
         if not self.candidate.axes:
             self._try(self.candidate.grid())
             return
-        steps = np.array([axis.step for axis in self.candidate.axes])
-        whole = np.array([axis.whole for axis in self.candidate.axes])
         best = self._try(np.array([centre]))
         for _ in range(ROUNDS):
-            span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
-            offsets = np.array(list(itertools.product(SIDE, repeat=len(steps))))
-            found = self._try(centre + offsets * span, best[1])
-            if found[1].delta_bic >= best[1].delta_bic:
-                best, centre = found, found[0]
+            best = self._around(best, size)
             size *= SHRINK
-            if whole.all() and size * steps.max() < 0.5:
-                break
+
+    def polish(self) -> None:
+        """Search on around the best point until smaller grids gain next to nothing."""
+        if not self.candidate.axes or self.best().delta_bic <= 0.0:
+            return
+        axes = zip(self.candidate.axes, self.best().point.tolist(), strict=True)
+        best = np.array([axis.inner(value) for axis, value in axes]), self.best()
+        size = 0.7 * SHRINK**ROUNDS
+        for _ in range(POLISHES):
+            better = self._around(best, size)
+            if better[1].delta_bic < best[1].delta_bic + NEXT_TO_NOTHING:
+                size *= SHRINK
+            best = better
+
+    def _around(
+        self, best: tuple[FloatArray, CandidateFit], size: float
+    ) -> tuple[FloatArray, CandidateFit]:
+        """Return the best of a grid around a point and that point, with its coordinates."""
+        axes = self.candidate.axes
+        steps = np.array([axis.step for axis in axes])
+        whole = np.array([axis.whole for axis in axes])
+        offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDE for a in axes])))
+        span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
+        found = self._try(best[0] + offsets * span, best[1])
+        return found if found[1].delta_bic >= best[1].delta_bic else best
+
+    def scatter(self) -> None:
+        """Search scattered points in ever smaller boxes around the best point.
+
+        The optimum of He's law is a needle in a valley: stems that differ in one slip differ
+        for long. Points of a lattice miss it however fine they are along the valley.
+        """
+        axes = self.candidate.axes
+        halton = qmc.Halton(len(axes), seed=0)
+        size = 1.0
+        for _ in range(THROWS):
+            best = self.best()
+            centre = np.array([a.inner(v) for a, v in zip(axes, best.point.tolist(), strict=True)])
+            reach = np.array([a.reach for a in axes]) * size
+            thrown = centre + reach * (2.0 * halton.random(THROWN) - 1.0)
+            values = self.candidate.values(thrown)
+            response = self.candidate.respond(self.base.run, values)
+            self.best_of(values, response, [best.noise, self.base.noise])
+            self._judge_best(values, response, dict.fromkeys(response.outputs, np.zeros(0)))
+            size *= THROW_SHRINK
 
     def best(self) -> CandidateFit:
         """Return the best fit that was seen."""
@@ -205,24 +265,28 @@ class _Search:
         guesses: Sequence[Mapping[int, NoiseFit] | Sequence[NoiseFit]],
     ) -> FloatArray:
         """Return the best of several points, each the best one under one guess of the noise."""
-        fits = []
-        for noise in guesses:
-            ar = {i: noise[i].ar for i in response.outputs}
-            best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
-            fits.append(self.judge(values[best], response.pick(best)))
+        fits = [
+            self._judge_best(values, response, {i: noise[i].ar for i in response.outputs})
+            for noise in guesses
+        ]
         return max(fits, key=lambda fit: fit.delta_bic).point
+
+    def _judge_best(
+        self, values: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+    ) -> CandidateFit:
+        best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        return self.judge(values[best], response.pick(best))
 
     def _try(
         self, coordinates: FloatArray, like: CandidateFit | None = None
     ) -> tuple[FloatArray, CandidateFit]:
         """Judge the point of a grid that is best under the noise of another fit."""
+        ar = {i: noise.ar for i, noise in enumerate(self.base.noise)}
+        if like is not None:
+            ar |= {i: noise.ar for i, noise in like.noise.items()}
+        coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)
-        noise = self.base.noise if like is None else like.noise
-        ar = {
-            i: (noise[i] if like is None or i in like.noise else self.base.noise[i]).ar
-            for i in response.outputs
-        }
         best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
         return coordinates[best], self.judge(values[best], response.pick(best))
 
@@ -231,7 +295,7 @@ class _Search:
         key = tuple(values.tolist())
         if key in self.judged:
             return self.judged[key]
-        noise, factors, energy = {}, np.zeros(0), 0.0
+        noise, factors = {}, np.zeros(0)
         gained, held = -self.candidate.count(values) * self._price(response), 0.0
         for i in response.outputs:
             shared, target = self.base.columns[i], self.gap[:, i]
@@ -248,8 +312,7 @@ class _Search:
             noise[i] = left
             gained += self.base.noise[i].bic(0) - left.bic(0)
             held += self.base.noise[i].held_minus_two_log - left.held_minus_two_log
-            energy += _energy(response, i, factors, left, self.base)
-        fit = CandidateFit(self.candidate, values, factors, noise, gained, held, energy)
+        fit = CandidateFit(self.candidate, values, factors, noise, gained, held)
         self.judged[key] = fit
         if self.found is None or gained > self.found.delta_bic:
             self.found = fit
@@ -260,52 +323,26 @@ class _Search:
         return float(np.log(max(rows, 2)))
 
 
-def misfit(
-    base: Baseline, gap: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+def settled(
+    base: Baseline,
+    gap: FloatArray,
+    candidate: Candidate,
+    coordinates: FloatArray,
+    ar: Mapping[int, FloatArray],
 ) -> FloatArray:
-    """Return Σ n log(sum of squared innovations) for every point of a grid under given φ."""
-    total: FloatArray | float = 0.0
-    for i in response.outputs:
-        rows = base.blocks[i].train
-        basis = projector(whiten(base.columns[i], ar[i])[rows])
-        target = gap[:, i : i + 1]
-        if i in response.shifts:
-            target = target - response.shifts[i]
-        left = _without(basis, whiten(target, ar[i])[rows])
-        squares = np.einsum("ng,ng->g", left, left)
-        if i in response.sizes:
-            squares = squares - _explained(basis, left, whiten(response.sizes[i], ar[i])[rows])
-        total = total + rows.sum() * np.log(np.maximum(squares, _TINY))
-    return np.asarray(total)
-
-
-def _explained(basis: FloatArray, left: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return the sum of squares that the factors take away, shape (G,)."""
-    rows, points, count = sizes.shape
-    free = _without(basis, sizes.reshape(rows, points * count)).reshape(sizes.shape)
-    gram = np.einsum("ngs,ngt->gst", free, free)
-    if left.shape[1] == points:
-        cross = np.einsum("ngs,ng->gs", free, left)
-    else:
-        cross = np.einsum("ngs,n->gs", free, left[:, 0])
-    ridge = 1e-10 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(count)
-    solved = np.linalg.solve(gram + ridge + _TINY * np.eye(count), cross[:, :, None])[:, :, 0]
-    return np.asarray(np.einsum("gs,gs->g", solved, cross))
-
-
-def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(values - basis @ (basis.T @ values))
-
-
-def _energy(
-    response: Response, output: int, factors: FloatArray, fit: NoiseFit, base: Baseline
-) -> float:
-    wave = np.zeros(len(base.run.runs))
-    if output in response.shifts:
-        wave = wave + response.shifts[output][:, 0]
-    if output in response.sizes:
-        wave = wave + response.sizes[output][:, 0] @ factors
-    rows = base.blocks[output].train
-    basis = projector(whiten(base.columns[output], fit.ar)[rows])
-    left = _without(basis, whiten(wave, fit.ar)[rows][:, None])
-    return float(np.sum(left**2)) / max(fit.innovation_std**2, _TINY)
+    """Return points with their linear figures at their best under given φ, shape (G, axes)."""
+    moved = coordinates.copy()
+    for d, axis in enumerate(candidate.axes):
+        if not axis.linear:
+            continue
+        scores = []
+        for side in (-1.0, 0.0, 1.0):
+            moved[:, d] = side * PROBE * axis.high
+            response = candidate.respond(base.run, candidate.values(moved))
+            scores.append(misfit(base, gap, response, ar))
+        rows = sum(int(base.blocks[i].train.sum()) for i in response.outputs)
+        low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
+        bend = np.maximum(low - 2.0 * middle + high, _TINY)
+        vertex = 0.5 * PROBE * (low - high) / bend
+        moved[:, d] = np.clip(vertex, -1.0, 1.0) * axis.high
+    return moved

@@ -101,8 +101,8 @@ def reference_point(base: Baseline, candidate: Candidate) -> FloatArray:
     sizes = {
         "stiction": (1.0, 0.5, 0.0),
         "backlash": (1.0, 0.0),
-        "lag": (3.0 * step,),
-        "pole": (3.0 * step,),
+        "lag": (3.0 * step, 0.0),
+        "pole": (3.0 * step, 0.0),
         "delay": (2.0,),
         "characteristic": (1.0,),
         "leak": (10.0 / length,),

@@ -6,16 +6,21 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.signal import lfilter
+from scipy.stats import qmc
 
 from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.misfit import misfit
+from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
 from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
-from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, misfit
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
 
 CHI_SQUARE = 3.84  # 95 % of one degree of freedom
 NORMAL = 1.96
-BOX = 9
-WIDENINGS = 14
+FIRST_BOX = 0.05  # of a step of the first grid
+BOXES = 10
+SCATTERED = 300
+SHOWN = 20
 BLOCK = 25
 DRAWS = 200
 
@@ -25,7 +30,7 @@ Intervals = dict[str, tuple[float, float]]
 def likelihood_intervals(base: Baseline, fit: CandidateFit) -> Intervals:
     """Return 95 % of each parameter by the likelihood, noise held at its best.
 
-    The region within 3.84 of the least −2 log likelihood is searched on boxes that grow or
+    The region within 3.84 of the least −2 log likelihood is searched in boxes that grow or
     shrink to it; factors of least squares add 1.96 standard errors.
     """
     found: list[tuple[FloatArray, FloatArray]] = []
@@ -124,9 +129,11 @@ def _chance_gain(
     ar, rows = base.noise[output].ar, base.blocks[output].train
     total = np.sum(drawn**2, axis=0)
     if shift is not None:
-        wave = whiten(shift, ar)[rows]
-        wave = wave - basis @ (basis.T @ wave)
-        left = total - 2.0 * wave.T @ drawn + np.sum(wave**2, axis=0)[:, None]
+        wave = whitened_shifts(np.ascontiguousarray(shift), np.flatnonzero(rows), ar)
+        wave -= basis @ (basis.T @ wave)
+        left = (-2.0 * wave.T) @ drawn
+        left += np.einsum("ng,ng->g", wave, wave)[:, None]
+        left += total
     else:
         assert sizes is not None
         count, points, factors = sizes.shape
@@ -141,31 +148,48 @@ def _chance_gain(
 
 
 def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
-    """Return searched points that the likelihood does not reject, shape (K, axes)."""
+    """Return searched points that the likelihood does not reject, shape (K, axes).
+
+    Points are scattered in boxes that follow what is not rejected, as the likelihood of stems
+    that rest and slip has many narrow peaks.
+    """
     axes = fit.candidate.axes
     if not axes:
         return np.zeros((1, 0))
     centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
-    free = [d for d, a in enumerate(axes) if d < 2 and a.step > 0.0]
-    width = np.array([0.5 if a.whole else 0.05 * a.step for a in axes])
-    offsets = np.linspace(-1.0, 1.0, BOX)
-    mesh = np.stack([m.ravel() for m in np.meshgrid(*[offsets] * len(free), indexing="ij")], axis=1)
-    kept = fit.candidate.values(centre[None, :])
+    free = [d for d, a in enumerate(axes) if a.step > 0.0 and not a.linear]
+    if not free:
+        return fit.candidate.values(centre[None, :])
+    least = np.array([1.0 if axes[d].whole else 0.0 for d in free])
+    width = np.maximum([FIRST_BOX * axes[d].step for d in free], least)
+    halton = qmc.Halton(len(free), seed=0)
+    points, scores = np.zeros((0, len(axes))), np.zeros(0)
+    for _ in range(BOXES):
+        thrown = np.tile(centre, (SCATTERED + 1, 1))
+        thrown[1:, free] += width * (2.0 * halton.random(SCATTERED) - 1.0)
+        tried = _scored(base, fit, thrown)
+        points, scores = np.vstack([points, tried[0]]), np.concatenate([scores, tried[1]])
+        kept = points[scores - scores.min() <= CHI_SQUARE]
+        reach = np.abs(kept[:, free] - centre[free]).max(axis=0, initial=0.0)
+        width = np.maximum(np.clip(1.5 * reach, 0.3 * width, 3.0 * width), least)
+    return fit.candidate.values(np.vstack([centre, _spread(kept)]))
+
+
+def _scored(
+    base: Baseline, fit: CandidateFit, coordinates: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates, linear figures at their best, and the misfit there."""
     ar = {i: noise.ar for i, noise in fit.noise.items()}
-    for _ in range(WIDENINGS):
-        grid = np.tile(centre, (len(mesh) + 1, 1))
-        grid[1:, free] += mesh * width[free]
-        values = fit.candidate.values(grid)
-        score = misfit(base, base.run.gap, fit.candidate.respond(base.run, values), ar)
-        inside = score[1:] - score.min() <= CHI_SQUARE
-        kept = np.vstack([kept[:1], values[1:][inside]])
-        wide = [bool(np.any(np.abs(mesh[inside, k]) > 0.8)) for k in range(len(free))]
-        thin = [not np.any(np.abs(mesh[inside, k]) > 0.3) for k in range(len(free))]
-        if not any(wide) and not all(thin):
-            break
-        for k, d in enumerate(free):
-            width[d] *= 2.0 if wide[k] else 0.5 if thin[k] and not axes[d].whole else 1.0
-    return kept
+    points = settled(base, base.run.gap, fit.candidate, coordinates, ar)
+    response = fit.candidate.respond(base.run, fit.candidate.values(points))
+    return points, misfit(base, base.run.gap, response, ar)
+
+
+def _spread(points: FloatArray) -> FloatArray:
+    """Return the points that are extreme in one coordinate, and some between."""
+    ends = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
+    between = np.linspace(0, len(points) - 1, SHOWN).astype(int)
+    return np.asarray(points[np.unique(np.concatenate([ends, between]))])
 
 
 def _factor_errors(base: Baseline, fit: CandidateFit) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Axis, Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Backlash,
     Behaviour,
@@ -28,8 +28,8 @@ _NEGLIGIBLE = 1e-9
 class ValveCandidate(Candidate):
     """A behaviour at the end of a valve's chain.
 
-    Its stems start at rest at the first OP; stiction and backlash have one more figure, where
-    the stem stood within the band.
+    Its stems start at rest at the first OP; stiction, backlash and a lag have one more figure,
+    where the stem stood then.
     """
 
     def __init__(
@@ -40,6 +40,7 @@ class ValveCandidate(Candidate):
         self.place = f"valve:{run.model.valves[valve].name}"
         self.effect = kind.effect
         self.twins = ()
+        self.needle = kind is HeStiction
 
     def rows(self, points: FloatArray) -> FloatArray:
         """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
@@ -54,7 +55,8 @@ class ValveCandidate(Candidate):
             values = run.stems[part, self.valve]
             start = self.starts(points, float(values[0]))
             parts.append(self.kind.simulate_grid(rows, values, start, run.runs.sample_time))
-        return np.clip(np.vstack(parts), low, high)
+        stems = end_to_end(parts)
+        return np.clip(stems, low, high, out=stems)
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         """Return where the stems stand before the first sample, shape (G,), %."""
@@ -62,10 +64,13 @@ class ValveCandidate(Candidate):
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         stems = self.stems(run, points)
-        shifts = {}
+        shifts, least = {}, _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9)
         for i in range(run.forced.shape[1]):
-            shift = run.drive(i, self.valve, stems) - run.forced[:, i : i + 1]
-            if np.abs(shift).max(initial=0.0) > _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9):
+            if not run.responses.reaches(i, self.valve):
+                continue
+            shift = run.drive(i, self.valve, stems)
+            shift -= run.forced[:, i : i + 1]
+            if max(float(shift.max()), -float(shift.min())) > least:
                 shifts[i] = shift
         return Response(shifts or {0: np.zeros((len(stems), len(points)))})
 
@@ -101,6 +106,19 @@ class BacklashCandidate(ValveCandidate):
         return 1
 
 
+class LagCandidate(ValveCandidate):
+    """A lag by its time constant and the place of the stem at the start."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return points[:, :1]
+
+    def lead(self, point: FloatArray) -> float:
+        return float(point[1])
+
+    def count(self, point: FloatArray) -> int:
+        return 1
+
+
 class SaturationCandidate(ValveCandidate):
     """A stem that stops short of what OP asks, at one end or both."""
 
@@ -110,6 +128,25 @@ class SaturationCandidate(ValveCandidate):
     def count(self, point: FloatArray) -> int:
         low, high = self.axes[0].low, self.axes[1].high
         return int(point[0] > low) + int(point[1] < high)
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        """Return the saturation; an end that OP never reaches is that of the valve."""
+        low, high = self.rows(point[None, :])[0].tolist()
+        ends = run.model.limits[self.valve].tolist()
+        if low <= self.axes[0].low:
+            low = ends[0]
+        if high >= self.axes[1].high:
+            high = ends[1]
+        return Saturation(low, high)
+
+
+def departures(run: FreeRun, candidate: Candidate, point: FloatArray) -> int:
+    """Return how often a candidate's stem leaves a rest; 0 for what acts at no valve."""
+    if not isinstance(candidate, ValveCandidate):
+        return 0
+    stems = candidate.stems(run, point[None, :])[:, 0]
+    moving = [np.diff(stems[rows]) != 0.0 for rows in run.runs.slices]
+    return sum(int((each[1:] & ~each[:-1]).sum()) for each in moving)
 
 
 def valve_candidates(run: FreeRun) -> list[Candidate]:
@@ -130,11 +167,15 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     low, high = float(op.min()), float(op.max())
     lower, upper = np.quantile(op, [0.6, 0.4]).tolist()
     # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
-    fine = (Axis(0.01 * span, LARGEST * span, 160, logarithmic=True), Axis(0.0, 1.0, 17))
+    fine = (
+        Axis(0.01 * span, LARGEST * span, 160, logarithmic=True, reach=0.25),
+        Axis(0.0, 1.0, 17, reach=0.25),
+        Axis(-1.0, 1.0, 1, reach=1.0),
+    )
     rough = (Axis(0.01 * span, LARGEST * span, 50, logarithmic=True), Axis(0.0, 1.0, 9))
     start = Axis(-1.0, 1.0, 1)
     return [
-        StictionCandidate(run, j, HeStiction, (*fine, start)),
+        StictionCandidate(run, j, HeStiction, fine),
         StictionCandidate(run, j, XchStiction, (*rough, start)),
         BacklashCandidate(
             run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True), start)
@@ -142,7 +183,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         ValveCandidate(
             run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
         ),
-        ValveCandidate(run, j, Lag, (lag_axis(run),)),
+        LagCandidate(run, j, Lag, (lag_axis(run), Axis(-span, span, 1, linear=True))),
         SaturationCandidate(run, j, Saturation, (Axis(low, lower, 10), Axis(upper, high, 10))),
         ValveCandidate(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
     ]

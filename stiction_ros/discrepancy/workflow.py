@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, sc
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
-from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, run_with
+from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, moved_away, run_with
 from stiction_ros.discrepancy.free_intervals import with_free_process
 from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
@@ -37,6 +37,7 @@ from stiction_ros.discrepancy.uncertainty import (
     chance_threshold,
     likelihood_intervals,
 )
+from stiction_ros.discrepancy.valve_candidates import departures
 from stiction_ros.discrepancy.where import locate
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -97,6 +98,7 @@ class _Workflow:
             self.bare = refit_process(self.bare, self.runs, self.longest)
         first = self.bare if options.free_process else model
         self.base_before = Baseline.of(FreeRun(first, self.runs))
+        self.earlier: list[LoopModel] = []  # without effects, before each that was added
         self.gains: dict[tuple[str, str], float] = {}  # with the process refitted
         self.looks: list[Look] = []
         self.added: tuple[AddedEffect, ...] = ()
@@ -110,7 +112,18 @@ class _Workflow:
             self.looks.append(look)
             if not look.kept:
                 break
+        while self.added and moved_away(self.base_before, self.base):
+            self._withdraw()
         return self._result(testable)
+
+    def _withdraw(self) -> None:
+        """Take the last effect back: with it the free run is farther from PV than before."""
+        self.added, self.bare = self.added[:-1], self.earlier.pop()
+        self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
+        last = max(k for k, look in enumerate(self.looks) if look.kept)
+        reason = "the free run of the held-out rows moves away from PV"
+        withdrawn = dataclasses.replace(self.looks[last], kept=False, reason=reason)
+        self.looks = [*self.looks[:last], withdrawn]
 
     def _look(self, k: int) -> tuple[Look, tuple[Testable, ...]]:
         share = 1.0 / (self.options.most_effects + 1)
@@ -120,7 +133,13 @@ class _Workflow:
         if not self.options.quick:
             threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
         allowed = not_contradicted(self.base.run, scores.fits)
-        decision = decide(allowed, self.options.margin, threshold)
+        run = self.base.run
+        decision = decide(
+            allowed,
+            self.options.margin,
+            threshold,
+            lambda fit: departures(run, fit.candidate, fit.point),
+        )
         if self.options.free_process:
             decision = in_doubt_of_place(self.base, decision)
         testable = testable_effects(self.base, list(candidates), self.options.margin)
@@ -132,6 +151,7 @@ class _Workflow:
             step = self._extend(decision, bare)
             kept, reason = step.kept, step.reason
             if step.kept:
+                self.earlier.append(self.bare)
                 self.added, self.base, self.bare = step.added, step.base, bare
                 if models:
                     self.gains[chosen.place, chosen.effect] = decision.chosen.delta_bic

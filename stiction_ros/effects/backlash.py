@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter
+from stiction_ros.effects.behaviour import Behaviour, FloatArray, Memory, parameter, starts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,10 +50,7 @@ class Backlash(Behaviour):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for rows (band,)."""
+        from stiction_ros.effects.grid_kernels import playing  # compiled: slow to import
+
         half = grid[:, 0] / 2.0
-        stem = np.broadcast_to(np.asarray(start, dtype=float), half.shape)
-        out = np.empty((len(values), len(half)))
-        for k, value in enumerate(values.tolist()):
-            stem = np.minimum(np.maximum(stem, value - half), value + half)
-            out[k] = stem
-        return out
+        return playing(half, np.asarray(values, dtype=float), starts(start, len(half)))

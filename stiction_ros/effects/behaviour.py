@@ -22,6 +22,11 @@ Memory = float | tuple[float, ...]
 NO_SAMPLE = -1.0  # in a memory that holds the time of the last sample: there was none
 
 
+def starts(start: FloatArray | float, points: int) -> FloatArray:
+    """Return where each point of a grid had rested, shape (G,), from one value or one each."""
+    return np.broadcast_to(np.asarray(start, dtype=float), points).copy()
+
+
 def elapsed(before: float, now: float) -> float:
     """Return the seconds since the last sample; none for the first one."""
     return 0.0 if before == NO_SAMPLE else now - before

@@ -16,6 +16,7 @@ from stiction_ros.effects.behaviour import (
     Memory,
     elapsed,
     parameter,
+    starts,
 )
 
 
@@ -66,14 +67,10 @@ class Lag(Behaviour):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (tau,)."""
+        from stiction_ros.effects.grid_kernels import lagged  # compiled: slow to import
+
         share = np.array([-math.expm1(-_ratio(sample_time, tau)) for tau in grid[:, 0].tolist()])
-        last = np.broadcast_to(np.asarray(start, dtype=float), share.shape)
-        out = np.empty((len(values), len(share)))
-        out[:1] = last
-        for k, value in enumerate(values[1:].tolist(), start=1):
-            last = np.where(share == 1.0, value, last + share * (value - last))
-            out[k] = last
-        return out
+        return lagged(share, np.asarray(values, dtype=float), starts(start, len(share)))
 
     def filter(self, sample_time: float) -> Filter:
         """Return the lag with z_k = y_{k−1}."""

@@ -16,6 +16,7 @@ from stiction_ros.effects.behaviour import (
     Memory,
     elapsed,
     parameter,
+    starts,
 )
 
 
@@ -65,13 +66,10 @@ class Leak(Behaviour):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return outputs, shape (N, G), for rows (rate,)."""
+        from stiction_ros.effects.grid_kernels import leaking  # compiled: slow to import
+
         keep = np.exp(-grid[:, 0] * sample_time)
-        start = np.broadcast_to(np.asarray(start, dtype=float), keep.shape)
-        out = np.empty((len(values), len(keep)))
-        out[:1] = start + (values[:1, None] - start)
-        for k, move in enumerate(np.diff(values).tolist(), start=1):
-            out[k] = keep * out[k - 1] + move
-        return out
+        return leaking(keep, np.asarray(values, dtype=float), starts(start, len(keep)))
 
     def filter(self, sample_time: float) -> Filter:
         """Return the leak with z_k = e^{−λT} y_{k−1} − x_{k−1}."""

@@ -14,6 +14,7 @@ from stiction_ros.effects.behaviour import (
     Memory,
     elapsed,
     parameter,
+    starts,
 )
 
 
@@ -59,11 +60,7 @@ class Slew(Behaviour):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for rows (rate,)."""
+        from stiction_ros.effects.grid_kernels import slewing  # compiled: slow to import
+
         reach = grid[:, 0] * sample_time
-        stem = np.broadcast_to(np.asarray(start, dtype=float), reach.shape)
-        out = np.empty((len(values), len(reach)))
-        out[:1] = stem
-        for k, value in enumerate(values[1:].tolist(), start=1):
-            stem = np.minimum(np.maximum(value, stem - reach), stem + reach)
-            out[k] = stem
-        return out
+        return slewing(reach, np.asarray(values, dtype=float), starts(start, len(reach)))

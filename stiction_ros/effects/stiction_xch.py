@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.behaviour import FloatArray, Memory, starts
 from stiction_ros.effects.friction_parameters import FrictionPair
 
 
@@ -68,15 +68,8 @@ class XchStiction(FrictionPair):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
+        from stiction_ros.effects.grid_kernels import xch_stems  # compiled: slow to import
+
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        stem = np.broadcast_to(np.asarray(start, dtype=float), static.shape).copy()
-        last, direction = stem.copy(), np.zeros_like(stem)
-        out = np.empty((len(values), len(static)))
-        for k, value in enumerate(values.tolist()):
-            error = value - stem
-            slip = np.where(np.abs(error) > static, np.sign(error), 0.0)
-            direction = np.where(direction * (value - last) > 0.0, direction, slip)
-            np.copyto(stem, value - direction * dynamic, where=direction != 0.0)
-            last = np.full_like(stem, value)
-            out[k] = stem
-        return out
+        rest = starts(start, len(static))
+        return xch_stems(static, dynamic, np.asarray(values, dtype=float), rest)

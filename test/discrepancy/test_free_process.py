@@ -102,13 +102,13 @@ def test_a_curve_may_be_the_process_s() -> None:
     assert {("valve:V1", "characteristic"), ("process:PV1", "gain")} <= set(answer.alternatives)
 
 
-@pytest.mark.parametrize(("share", "effects"), [(1.0, ["characteristic"]), (0.2, [])])
-def test_a_recorded_stem_tells_whose_the_curve_is(share: float, effects: list[str]) -> None:
+@pytest.mark.parametrize(("share", "told"), [(1.0, True), (0.2, False)])
+def test_a_recorded_stem_tells_whose_the_curve_is(share: float, told: bool) -> None:
     data = record(loop().with_effect("valve:V1", Characteristic(4.0)), samples=700, stem=True)
     assert data.stem is not None
     stem = data.op + share * (data.stem - data.op)
     answer = found(dataclasses.replace(without_set_points(data), stem=stem))
-    assert [effect.effect for effect in answer.effects] == effects
+    assert ("characteristic" in {effect.effect for effect in answer.effects}) == told
 
 
 def test_several_records_are_fitted_together() -> None:

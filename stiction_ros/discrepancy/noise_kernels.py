@@ -1,0 +1,271 @@
+"""Whitening, least squares and autoregression of one gap, compiled.
+
+Columns are rows of their arrays here, so that inner loops run over samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.compiled import compiled
+from stiction_ros.effects import FloatArray
+
+BoolArray = NDArray[np.bool_]
+
+DOUBTFUL = 1e-8  # pivot of a scaled column below which the fast solution is not trusted,
+DEPENDENT = 1e-10  # and below which the column adds nothing to the others
+NOTHING = 1e-150  # length of a column that is zero on the fitted rows
+TINY = 1e-300
+_TRACE_SHARE = 1e-12
+_NEW = 1e-9  # of a scaled column that is no sum of others
+
+
+@compiled
+def inner_product(first: FloatArray, second: FloatArray) -> float:
+    """Return Σ first second, in four interleaved sums."""
+    count = len(first)
+    a = b = c = d = 0.0
+    whole = count - count % 4
+    for k in range(0, whole, 4):
+        a += first[k] * second[k]
+        b += first[k + 1] * second[k + 1]
+        c += first[k + 2] * second[k + 2]
+        d += first[k + 3] * second[k + 3]
+    for k in range(whole, count):
+        a += first[k] * second[k]
+    return (a + b) + (c + d)
+
+
+@compiled
+def whitened_rows(values: FloatArray, ar: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return values_k − Σ φ_i values_{k−i} at the marked rows alone, zeros before the start."""
+    white = values.copy()
+    for lag in range(1, min(len(ar), len(values)) + 1):
+        factor = ar[lag - 1]
+        for k in range(lag, len(values)):
+            white[k] -= factor * values[k - lag]
+    at = 0
+    for k in range(len(values)):
+        if rows[k]:
+            white[at] = white[k]
+            at += 1
+    return white[:at].copy()
+
+
+@compiled
+def _reflect(whole: FloatArray, step: int, pivot: int) -> None:
+    """Put the pivot, which is not zero, in its place and eliminate what lies below it."""
+    for k in range(whole.shape[1]):
+        whole[step, k], whole[pivot, k] = whole[pivot, k], whole[step, k]
+    vector = whole[step, step:].copy()
+    length = np.sqrt(inner_product(vector, vector))
+    length = -length if vector[0] > 0.0 else length
+    vector[0] -= length
+    half = inner_product(vector, vector) / 2.0
+    for j in range(step, len(whole)):
+        share = inner_product(vector, whole[j, step:]) / half
+        for k in range(len(vector)):
+            whole[j, step + k] -= share * vector[k]
+
+
+@compiled
+def least_squares(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatArray]:
+    """Return whether the solution can be trusted, and the coefficients of least squares.
+
+    Householder's reflections with pivoting, columns scaled to one; columns that depend on
+    others have a coefficient of zero.
+
+    Args:
+        columns: shape (q, n).
+        target: shape (n,).
+    """
+    count, rows = columns.shape
+    beta = np.zeros(count)
+    if rows < count:
+        return False, beta
+    whole, scale = np.empty((count + 1, rows)), np.empty(count)
+    order = np.empty(count, dtype=np.int64)
+    for j in range(count):
+        order[j] = j
+        length = np.sqrt(inner_product(columns[j], columns[j]))
+        scale[j] = length if length > NOTHING else np.inf
+        for k in range(rows):
+            whole[j, k] = columns[j, k] / scale[j]
+    for k in range(rows):
+        whole[count, k] = target[k]
+    largest, rank = 0.0, 0
+    for step in range(count):
+        pivot, best = step, -1.0
+        for j in range(step, count):
+            left = inner_product(whole[j, step:], whole[j, step:])
+            if left > best:
+                pivot, best = j, left
+        largest = max(largest, np.sqrt(best))
+        if not np.sqrt(best) > DEPENDENT * largest:
+            break
+        if np.sqrt(best) < DOUBTFUL * largest:
+            return False, beta
+        _reflect(whole, step, pivot)
+        order[step], order[pivot] = order[pivot], order[step]
+        rank += 1
+    for step in range(rank - 1, -1, -1):
+        value = whole[count, step]
+        for j in range(step + 1, rank):
+            value -= whole[j, step] * beta[order[j]]
+        beta[order[step]] = value / whole[step, step]
+    for j in range(count):
+        beta[j] /= scale[j]
+    return True, beta
+
+
+@compiled
+def orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns, shape (r, n), those left out that depend.
+
+    Args:
+        columns: shape (q, n); used up.
+    """
+    count, rows = columns.shape
+    largest, rank = 0.0, 0
+    for j in range(count):
+        length = np.sqrt(inner_product(columns[j], columns[j]))
+        for k in range(rows):
+            columns[j, k] /= length if length > NOTHING else np.inf
+    for step in range(count):
+        pivot, best = step, -1.0
+        for j in range(step, count):
+            left = inner_product(columns[j], columns[j])
+            if left > best:
+                pivot, best = j, left
+        length = np.sqrt(best)
+        largest = max(largest, length)
+        if not length > _NEW * largest:
+            break
+        for k in range(rows):
+            value = columns[pivot, k] / length
+            columns[pivot, k] = columns[step, k]
+            columns[step, k] = value
+        for _ in range(2):  # twice is enough
+            for j in range(step):
+                share = inner_product(columns[j], columns[step])
+                for k in range(rows):
+                    columns[step, k] -= share * columns[j, k]
+        length = np.sqrt(inner_product(columns[step], columns[step]))
+        for k in range(rows):
+            columns[step, k] /= length
+        for j in range(step + 1, count):
+            share = inner_product(columns[step], columns[j])
+            for k in range(rows):
+                columns[j, k] -= share * columns[step, k]
+        rank += 1
+    return columns[:rank].copy()
+
+
+@compiled
+def _lagged_products(residual: FloatArray, rows: BoolArray, most: int) -> FloatArray:
+    """Return Σ r_{k−i} r_{k−j} over the marked rows, shape (most + 1, most + 1), i ≤ j alone.
+
+    One sample later the sum of the same lag differs by the products at the ends of blocks.
+    """
+    count = len(residual)
+    gram = np.zeros((most + 1, most + 1))
+    marked, ends, found = np.zeros(count), np.empty(count, dtype=np.int64), 0
+    for k in range(count):
+        if rows[k]:
+            marked[k] = residual[k]
+        if rows[k] != (k + 1 < count and rows[k + 1]):
+            ends[found] = k
+            found += 1
+    for lag in range(min(most, count - 1) + 1):
+        value = inner_product(marked[lag:], residual[: count - lag])
+        gram[0, lag] = value
+        for i in range(most - lag):
+            for end in ends[:found]:
+                at = end - i
+                if at >= lag:
+                    product = residual[at] * residual[at - lag]
+                    value += -product if rows[end] else product
+            gram[i + 1, i + 1 + lag] = value
+    return gram
+
+
+@compiled
+def best_autoregression(
+    residual: FloatArray, rows: BoolArray, most: int
+) -> tuple[FloatArray, float]:
+    """Return φ of the order of least BIC up to ``most``, and n log Σe² + p log n.
+
+    Least squares on the n marked rows; one Cholesky factor of the normal equations holds those
+    of every lower order.
+    """
+    gram = _lagged_products(residual, rows, most)
+    ridge, count = TINY, 0
+    for lag in range(most + 1):
+        ridge += _TRACE_SHARE * gram[lag, lag]
+    for marked in rows:
+        count += 1 if marked else 0
+    count = max(count, 2)
+    factor, half = np.zeros((most, most)), np.zeros(most)
+    best_order, left = 0, gram[0, 0]
+    best_score = count * np.log(max(left, TINY))
+    for n in range(most):
+        for j in range(n + 1):
+            value = gram[j + 1, n + 1] + (ridge if j == n else 0.0)
+            for i in range(j):
+                value -= factor[n, i] * factor[j, i]
+            if j < n:
+                factor[n, j] = value / factor[j, j]
+        if not value > 0.0:
+            break
+        factor[n, n] = np.sqrt(value)
+        half[n] = gram[0, n + 1]
+        for i in range(n):
+            half[n] -= factor[n, i] * half[i]
+        half[n] /= factor[n, n]
+        left -= half[n] ** 2
+        score = count * np.log(max(left, TINY)) + (n + 1) * np.log(count)
+        if score < best_score:
+            best_order, best_score = n + 1, score
+    phi = np.zeros(best_order)
+    for n in range(best_order - 1, -1, -1):
+        value = half[n]
+        for i in range(n + 1, best_order):
+            value -= factor[i, n] * phi[i]
+        phi[n] = value / factor[n, n]
+    return phi, best_score
+
+
+@compiled
+def sums_of_squares(
+    residual: FloatArray, ar: FloatArray, train: BoolArray, held: BoolArray
+) -> tuple[int, float, int, float]:
+    """Return number and squared innovations of the fitted rows, then of those kept back."""
+    inside, outside = whitened_rows(residual, ar, train), whitened_rows(residual, ar, held)
+    return (
+        len(inside),
+        inner_product(inside, inside),
+        len(outside),
+        inner_product(outside, outside),
+    )
+
+
+@compiled
+def turn(
+    columns: FloatArray, target: FloatArray, rows: BoolArray, ar: FloatArray
+) -> tuple[bool, FloatArray]:
+    """Return whether it can be trusted, and the coefficients of whitened least squares.
+
+    Args:
+        columns: shape (q, N).
+        target: shape (N,).
+        rows: that are fitted, shape (N,).
+        ar: φ, shape (p,).
+    """
+    wanted = whitened_rows(target, ar, rows)
+    white = np.empty((len(columns), len(wanted)))
+    for j in range(len(columns)):
+        column = whitened_rows(columns[j], ar, rows)
+        for n in range(len(column)):
+            white[j, n] = column[n]
+    return least_squares(white, wanted)

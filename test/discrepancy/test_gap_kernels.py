@@ -1,0 +1,163 @@
+"""Compiled code gives what the plain formulas give."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from gap_loops import loop, record
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from stiction_ros.config_files import find_config
+from stiction_ros.discrepancy.candidates import Response
+from stiction_ros.discrepancy.free_run import FreeRun, join_records
+from stiction_ros.discrepancy.misfit import misfit
+from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
+from stiction_ros.discrepancy.noise import Blocks, autoregression, fit_noise, projector, whiten
+from stiction_ros.discrepancy.noise_kernels import least_squares, turn
+from stiction_ros.discrepancy.response_kernels import filtered
+from stiction_ros.discrepancy.search import Baseline
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop import LoopModel, simulate_open_loop
+
+COUNT = 400
+TRAIN = (np.arange(COUNT) % 50 < 37) & (np.arange(COUNT) >= 7)
+BLOCKS = Blocks(TRAIN, ~TRAIN & (np.arange(COUNT) >= 7))
+SEEDS = st.integers(0, 10_000)
+
+
+def drawn(seed: int, *shape: int) -> FloatArray:
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+@given(SEEDS, st.integers(0, 6), st.floats(1e-8, 1e8))
+@settings(max_examples=25, deadline=None)
+def test_least_squares_is_that_of_numpy(seed: int, columns: int, unit: float) -> None:
+    matrix, target = drawn(seed, columns, 60), drawn(seed + 1, 60)
+    matrix[:1] *= unit
+    sure, beta = least_squares(matrix, target)
+    wanted = np.linalg.lstsq(matrix.T, target, rcond=None)[0] if columns else np.zeros(0)
+    assert sure
+    assert beta == pytest.approx(wanted, rel=1e-9, abs=1e-12 / unit)
+
+
+def test_a_column_that_repeats_another_adds_nothing() -> None:
+    matrix = drawn(1, 3, 60)
+    matrix[2] = 2.0 * matrix[0] - matrix[1]
+    beta = least_squares(matrix, drawn(2, 60))[1]
+    wanted = np.linalg.lstsq(matrix.T, drawn(2, 60), rcond=1e-10)[0]
+    assert beta @ matrix == pytest.approx(wanted @ matrix)
+
+
+def test_columns_that_nearly_repeat_each_other_are_left_to_the_slow_solution() -> None:
+    matrix = drawn(1, 2, 60)
+    matrix[1] = matrix[0] + 1e-9 * matrix[1]
+    assert not least_squares(matrix, drawn(2, 60))[0]
+
+
+@given(SEEDS, st.integers(0, 6))
+@settings(max_examples=25, deadline=None)
+def test_a_basis_is_orthonormal_and_holds_the_columns(seed: int, count: int) -> None:
+    columns = drawn(seed, 60, count)
+    columns = np.hstack([columns, columns[:, :2] @ np.ones((min(count, 2), 1)), np.zeros((60, 1))])
+    basis = projector(columns)
+    assert basis.shape == (60, np.linalg.matrix_rank(columns))
+    assert basis.T @ basis == pytest.approx(np.eye(basis.shape[1]), abs=1e-12)
+    assert basis @ (basis.T @ columns) == pytest.approx(columns, abs=1e-12)
+
+
+def test_whitened_responses_are_those_rows_of_all() -> None:
+    shift, ar = drawn(12, COUNT, 3), np.array([0.7, -0.2])
+    found = whitened_shifts(shift, np.flatnonzero(TRAIN), ar)
+    assert found == pytest.approx(whiten(shift, ar)[TRAIN])
+
+
+def test_a_turn_is_whitened_least_squares_of_the_fitted_rows() -> None:
+    columns, target, ar = drawn(3, 2, COUNT), drawn(4, COUNT), np.array([0.7, -0.2])
+    white = whiten(columns.T, ar)[TRAIN]
+    wanted = np.linalg.lstsq(white, whiten(target, ar)[TRAIN], rcond=None)[0]
+    assert turn(columns, target, TRAIN, ar)[1] == pytest.approx(wanted)
+
+
+def test_a_column_that_is_zero_on_the_fitted_rows_has_no_size() -> None:
+    columns = np.column_stack([np.ones(COUNT), np.arange(COUNT) == 0, np.arange(COUNT) == 1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit = fit_noise(drawn(5, COUNT), columns.astype(float), BLOCKS)
+    assert fit.coefficients[1:].tolist() == [0.0, 0.0]
+
+
+@given(SEEDS, st.floats(-0.95, 0.95))
+@settings(max_examples=25, deadline=None)
+def test_autoregression_solves_the_normal_equations(seed: int, first: float) -> None:
+    residual = np.asarray(lfilter([1.0], [1.0, -first, 0.3], drawn(seed, COUNT)))
+    phi = autoregression(residual, TRAIN)
+    late = [np.concatenate([np.zeros(k), residual[: COUNT - k]])[TRAIN] for k in range(7)]
+    lagged = np.column_stack(late[1 : len(phi) + 1]) if len(phi) else np.zeros((TRAIN.sum(), 0))
+    wanted = np.linalg.lstsq(lagged, late[0], rcond=None)[0]
+    assert phi == pytest.approx(wanted, rel=1e-7, abs=1e-9)
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_the_order_is_the_one_of_least_bic(seed: int) -> None:
+    residual = np.asarray(lfilter([1.0], [1.0, -0.5, 0.0, 0.2], drawn(seed, COUNT)))
+    late = [np.concatenate([np.zeros(k), residual[: COUNT - k]])[TRAIN] for k in range(7)]
+    scores = []
+    for order in range(7):
+        inner = np.column_stack([np.zeros_like(late[0]), *late[1 : order + 1]])
+        left = late[0] - inner @ np.linalg.lstsq(inner, late[0], rcond=None)[0]
+        scores.append(len(left) * np.log(left @ left) + order * np.log(len(left)))
+    assert len(autoregression(residual, TRAIN)) == int(np.argmin(scores))
+
+
+def baseline() -> Baseline:
+    return Baseline.of(FreeRun(loop(), join_records(loop(), [record(loop(), samples=COUNT)])))
+
+
+def squares(base: Baseline, gap: FloatArray, columns: FloatArray, ar: FloatArray) -> float:
+    """Return Σ n log of the squares that whitened least squares of the columns leaves."""
+    rows = base.blocks[0].train
+    inner, target = whiten(columns, ar)[rows], whiten(gap, ar)[rows]
+    left = target - inner @ np.linalg.lstsq(inner, target, rcond=1e-10)[0]
+    return float(rows.sum() * np.log(left @ left))
+
+
+def test_misfits_of_shifts_are_those_of_least_squares() -> None:
+    base, ar = baseline(), np.array([0.6, 0.1])
+    shift = np.cumsum(drawn(6, COUNT, 5), axis=0)
+    found = misfit(base, base.run.gap, Response({0: shift}), {0: ar})
+    gap = base.run.gap[:, 0]
+    wanted = [squares(base, gap - shift[:, g], base.columns[0], ar) for g in range(5)]
+    assert found == pytest.approx(wanted, rel=1e-9)
+
+
+def test_misfits_of_sizes_are_those_of_least_squares() -> None:
+    base, ar = baseline(), np.array([0.6, 0.1])
+    sizes = drawn(7, COUNT, 5, 3)
+    found = misfit(base, base.run.gap, Response({}, {0: sizes}), {0: ar})
+    gap, shared = base.run.gap[:, 0], base.columns[0]
+    wanted = [squares(base, gap, np.hstack([sizes[:, g], shared]), ar) for g in range(5)]
+    assert found == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("points", [1, 4])
+def test_a_process_filters_deviations_from_the_first_stem(points: int) -> None:
+    stems, taps = 50.0 + drawn(8, COUNT, points), np.array([0.0, 0.0, 0.3, -0.1])
+    denominator = np.array([1.0, -1.2, 0.3])
+    more = drawn(11, COUNT)
+    wanted = lfilter(taps, denominator, stems - stems[:1], axis=0)
+    wanted += lfilter([1.0], denominator, more)[:, None]
+    assert filtered(taps, denominator, stems, more) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_valve_of_the_tank_that_does_not_reach_an_output_leaves_it() -> None:
+    model = LoopModel.load(find_config("tank.loop.yaml"))
+    recorded = simulate_open_loop(model, 50.0 + drawn(10, COUNT, 2), 0)
+    run = FreeRun(model, join_records(model, [recorded]))
+    moved = run.stems[:, 1:] + 10.0 * drawn(9, COUNT, 2)
+    reached = [np.ptp(run.drive(i, 1, moved) - run.forced[:, i : i + 1]) > 0.0 for i in range(2)]
+    assert reached == [run.responses.reaches(i, 1) for i in range(2)] == [False, True]
