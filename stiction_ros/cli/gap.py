@@ -47,7 +47,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--fit-linear",
         action="store_true",
-        help="there is no model yet: fit a linear one to the first record",
+        help="there is no model yet: fit a linear one to the longest record",
     )
     parser.add_argument(
         "--delay",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.long_records import liveliest_parts
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear_data import LinearKind
 from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
@@ -16,9 +17,9 @@ from stiction_ros.records import Record
 def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> LoopModel:
     """Return ARX equations fitted to the longest record, with ideal valves.
 
-    Without set-points the record is that of a loop at rest but for its own noise or cycle: a
-    model with several b could be the controller turned upside down, whose zero at one a
-    single b cannot have.
+    Without set-points the record is that of a loop at rest but for its own noise or cycle: of
+    many coefficients the model could make the controller turned upside down, so it has two a
+    and two b. The workflow fits them again and compares them with more poles.
 
     Args:
         records: one at least.
@@ -29,10 +30,10 @@ def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> 
     """
     if not records:
         raise InputError("no record", where="fit-linear")
-    longest = max(records, key=len)
+    longest = max(liveliest_parts(records), key=len)
     options = LinearOptions(kind=LinearKind.ARX, delay=delay)
     if not _moved(longest):
-        options = LinearOptions(LinearKind.ARX, output_order=2, input_order=1, delay=delay)
+        options = LinearOptions(LinearKind.ARX, output_order=2, input_order=2, delay=delay)
     found = fit_linear(longest, options)
     return found.loop_model(longest.name.removesuffix(".csv") or "loop")
 

@@ -9,19 +9,31 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates
+from stiction_ros.discrepancy.decide import Decision, GapVerdict
+from stiction_ros.discrepancy.decoys import Dynamics
 from stiction_ros.discrepancy.extend import same_candidate
-from stiction_ros.discrepancy.free_run import FreeRun, Runs
-from stiction_ros.discrepancy.process_refit import refit_process
+from stiction_ros.discrepancy.free_equation import Equation, Fitted, best_fit
+from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.free_search import HOPELESS, FreeSearch
+from stiction_ros.discrepancy.measured_stem import confirmed
+from stiction_ros.discrepancy.process_refit import (
+    equations_of,
+    problems_of,
+    refitted,
+    with_equations,
+)
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
-from stiction_ros.effects import FloatArray
+from stiction_ros.discrepancy.valve_candidates import ValveCandidate
 from stiction_ros.loop import LoopModel
 
-COARSE_ROUNDS = 3
-TURNS = 3
-WIDE = 4  # starts behind which all figures are searched again
-SPARSE = {"stiction": (9, 4, 1), "backlash": (9, 1), "slew": (7,), "saturation": (4, 4)}
+TURNS = 2
+MORE_POLES = 2
 # What another process would do as well cannot be told while the process is free.
 ABSORBED = ("lag", "pole", "delay", "gain", "leak", "other dynamics")
+# What bends the way from OP to PV may sit in the valve or in the process behind it.
+STATIC = ("characteristic", "saturation")
+
+Progress = Callable[[float], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,139 +49,172 @@ class FreeScores:
     models: Mapping[tuple[str, str], LoopModel]
 
 
+@dataclasses.dataclass(frozen=True)
+class _Found:
+    """A candidate's fit, and the equations behind it."""
+
+    fit: CandidateFit
+    equations: tuple[Equation, ...]
+
+    @property
+    def name(self) -> tuple[str, str]:
+        return self.fit.candidate.place, self.fit.candidate.effect
+
+
 def score_with_free_process(
-    model: LoopModel,
-    runs: Runs,
     base: Baseline,
     candidates: tuple[Candidate, ...],
-    progress: Callable[[float], None] | None = None,
+    longest: int,
+    progress: Progress | None = None,
 ) -> FreeScores:
     """Score every candidate against ``base``, the process fitted again with each of them.
 
     Args:
-        model: whose process has been refitted without any candidate.
-        runs: the records.
-        base: of ``model``.
+        base: of a model whose process has been refitted without any candidate.
         candidates: those that a free process takes up are left out.
+        longest: delay tried, samples.
+        progress: called with the share done, 0 to 1.
     """
     told = [c for c in candidates if c.effect not in ABSORBED]
-    fits: list[CandidateFit] = []
-    models: dict[tuple[str, str], LoopModel] = {}
+    found: list[_Found] = []
     for k, candidate in enumerate(told):
-        fit, refitted = _fit(model, runs, base, candidate)
-        name = (candidate.place, candidate.effect)
-        if name not in models or all(
-            f.delta_bic < fit.delta_bic
-            for f in fits
-            if (f.candidate.place, f.candidate.effect) == name
-        ):
-            models[name] = refitted
-        fits.append(fit)
+        rival = max((f.fit.delta_bic for f in found), default=0.0)
+        found.append(_fit(base, candidate, longest, max(rival, 0.0)))
         if progress is not None:
             progress((k + 1) / len(told))
-    base, better = _shared(model, runs, base, models)
-    gain = better - base.bic
-    fits = [dataclasses.replace(fit, delta_bic=fit.delta_bic - gain) for fit in fits]
-    fits.sort(key=lambda fit: -fit.delta_bic)
-    return FreeScores(Scores(base, tuple(told), tuple(fits)), models)
+    better = _shared(base, found)
+    found = [dataclasses.replace(f, fit=_against(f.fit, base, better)) for f in found]
+    strangers = _other_dynamics(better)
+    fits = sorted([*(f.fit for f in found), *strangers], key=lambda fit: -fit.delta_bic)
+    models: dict[tuple[str, str], LoopModel] = {}
+    for each in sorted(found, key=lambda f: -f.fit.delta_bic):
+        models.setdefault(each.name, with_equations(better.run.model, each.equations))
+    tried = (*told, *(stranger.candidate for stranger in strangers))
+    return FreeScores(Scores(better, tried, tuple(fits)), models)
 
 
-def _shared(
-    model: LoopModel,
-    runs: Runs,
-    base: Baseline,
-    models: Mapping[tuple[str, str], LoopModel],
-) -> tuple[Baseline, float]:
-    """Return the current model with the best process that any candidate led to, and its old BIC.
+def in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
+    """Return the decision, a static curve of the valve left in doubt with one of the process.
 
-    The likelihood of a free run has many optima: what helps a candidate may help without it.
+    A free linear process behind a curve and a curved process behind a linear valve give the
+    same record, so that neither may be added. A recorded stem may confirm the curve.
     """
-    before, best = base.bic, base
-    for other in {id(m): m for m in models.values() if m is not model}.values():
-        tried = Baseline.of(FreeRun(refit_process(other, runs, 8), runs))
-        if tried.bic < best.bic:
-            best = tried
-    return best, before
+    if decision.chosen is None or decision.chosen.candidate.effect not in STATIC:
+        return decision
+    if confirmed(base.run, decision.chosen):
+        return decision
+    _, _, valve = decision.chosen.candidate.place.partition(":")
+    names = base.run.model.outputs
+    curves = [(f"process:{names[i]}", "gain") for i in sorted(decision.chosen.noise)]
+    return dataclasses.replace(
+        decision,
+        verdict=GapVerdict.AMBIGUOUS,
+        alternatives=tuple(dict.fromkeys([*decision.alternatives, *curves])),
+        inseparable=False,
+        reason=f"a bend between OP of {valve} and PV may be the valve's or the process's",
+    )
 
 
-def _fit(
-    model: LoopModel, runs: Runs, base: Baseline, candidate: Candidate
-) -> tuple[CandidateFit, LoopModel]:
+def _fit(base: Baseline, candidate: Candidate, longest: int, rival: float) -> _Found:
+    if isinstance(candidate, ValveCandidate):
+        return _fit_valve(base, candidate, longest, rival)
     first = fit_candidate(base, base.run.gap, candidate)
-    if not candidate.inside:
-        return first, model
-    best = first, model
-    tried = []
-    for point in _starts(candidate, first):
-        own, behind = _behind(model, runs, base, first, point)
-        found = _rescored(behind, runs, base, candidate, own)
-        if found is not None:
-            tried.append((found, behind))
-    tried.sort(key=lambda each: -each[0].delta_bic)
-    for _, behind in tried[:WIDE]:
-        found = _rescored(behind, runs, base, candidate, None)
-        tried += [] if found is None else [(found, behind)]
-    best = max([best, *tried], key=lambda each: each[0].delta_bic)
+    best = _Found(first, tuple(equations_of(base.run.model)))
+    if not candidate.inside or first.delta_bic < rival - HOPELESS:
+        return best
     for _ in range(TURNS):
-        own, behind = _behind(best[1], runs, base, best[0], best[0].point, 8)
-        found = _rescored(behind, runs, base, candidate, None)
-        if found is None or found.delta_bic <= best[0].delta_bic + 0.1:
+        behaviour = best.fit.behaviour(base.run)
+        assert behaviour is not None
+        model = with_equations(base.run.model, best.equations)
+        run = FreeRun(model.with_effect(candidate.place, behaviour), base.run.runs, base.run.leads)
+        equations = tuple(equations_of(refitted(run, longest)))
+        again = _scored_behind(base, candidate, equations)
+        if again is None or again.fit.delta_bic <= best.fit.delta_bic + 0.1:
             break
-        best = found, behind
+        best = again
     return best
 
 
-def _starts(candidate: Candidate, first: CandidateFit) -> list[FloatArray]:
-    """Return points of a sparse grid, and the best one behind the process as it was."""
-    counts = SPARSE.get(candidate.effect)
-    if counts is None:
-        return [first.point]
-    sparse = [
-        axis.low + (axis.high - axis.low) * (np.arange(n) + 0.5) / n
-        for axis, n in zip(candidate.axes, counts, strict=True)
-    ]
-    mesh = np.stack([m.ravel() for m in np.meshgrid(*sparse, indexing="ij")], axis=1)
-    return [first.point, *mesh]
+def _fit_valve(base: Baseline, candidate: ValveCandidate, longest: int, rival: float) -> _Found:
+    best = FreeSearch(base, candidate, longest).best(rival)
+    if best is None:
+        first = fit_candidate(base, base.run.gap, candidate)
+        return _Found(first, tuple(equations_of(base.run.model)))
+    other = Baseline.of(_run_behind(base, tuple(best.equations)))
+    fit = fit_candidate(other, other.run.gap, candidate, best.point)
+    return _Found(_against(fit, other, base), tuple(best.equations))
 
 
-def _behind(
-    model: LoopModel,
-    runs: Runs,
-    base: Baseline,
-    fit: CandidateFit,
-    point: FloatArray,
-    rounds: int = COARSE_ROUNDS,
-) -> tuple[FloatArray, LoopModel]:
-    """Return the point and the model, the candidate taken out again, refitted behind it."""
-    behaviour = fit.candidate.behaviour(base.run, point, fit.factors)
-    assert behaviour is not None
-    refitted = refit_process(model.with_effect(fit.candidate.place, behaviour), runs, rounds)
-    document = model.to_mapping()
-    outputs = refitted.to_mapping()["process"]["outputs"]
-    for entry, new in zip(document["process"]["outputs"], outputs, strict=True):
-        for key in ("a", "b", "delay"):
-            entry[key] = new[key]
-    return point, LoopModel.from_mapping(document, model.name)
-
-
-def _rescored(
-    model: LoopModel, runs: Runs, base: Baseline, candidate: Candidate, point: FloatArray | None
-) -> CandidateFit | None:
-    """Return the candidate's best fit behind a refitted process, against ``base``.
-
-    With a ``point`` only figures near it are searched.
-    """
-    other = Baseline.of(FreeRun(model, runs))
+def _scored_behind(
+    base: Baseline, candidate: Candidate, equations: tuple[Equation, ...]
+) -> _Found | None:
+    """Return a candidate's best fit with these equations behind it."""
+    other = Baseline.of(_run_behind(base, equations))
     same = same_candidate(all_candidates(other), candidate)
     if same is None:
         return None
-    fit = fit_candidate(
-        other, other.run.gap, same, point if point is not None and len(point) else None
-    )
-    # The price of the process is paid by both; its worth behind this candidate is not.
-    shift = other.bic - base.bic
+    return _Found(_against(fit_candidate(other, other.run.gap, same), other, base), equations)
+
+
+def _run_behind(base: Baseline, equations: tuple[Equation, ...]) -> FreeRun:
+    return FreeRun(with_equations(base.run.model, equations), base.run.runs, base.run.leads)
+
+
+def _against(fit: CandidateFit, other: Baseline, base: Baseline) -> CandidateFit:
+    """Return a fit that was scored against ``other`` as it stands against ``base``."""
     held = sum(
         old.held_minus_two_log - new.held_minus_two_log
         for old, new in zip(other.noise, base.noise, strict=True)
     )
-    return dataclasses.replace(fit, delta_bic=fit.delta_bic - shift, held_gain=fit.held_gain - held)
+    return dataclasses.replace(
+        fit,
+        delta_bic=fit.delta_bic - (other.bic - base.bic),
+        held_gain=fit.held_gain - held,
+    )
+
+
+def _shared(base: Baseline, found: list[_Found]) -> Baseline:
+    """Return the current model with the best process that any candidate led to.
+
+    The likelihood of a free run has many optima: what helps a candidate may help without it.
+    """
+    chosen: list[Equation] = []
+    for i, (problem, own) in enumerate(
+        zip(problems_of(base.run), equations_of(base.run.model), strict=True)
+    ):
+        best = problem.fit(own)
+        for each in found:
+            tried = best_fit(problem, [each.equations[i]], 8)
+            if tried is not None and tried.bic < best.bic - 1e-6:
+                best = tried
+        chosen.append(best.equation)
+    better = Baseline.of(_run_behind(base, tuple(chosen)))
+    return better if better.bic < base.bic else base
+
+
+def _other_dynamics(base: Baseline) -> list[CandidateFit]:
+    """Return per output what more poles than the model has would gain.
+
+    A candidate that gains less than they do is no name: the first model's order is a guess.
+    """
+    found = []
+    for i, (problem, own) in enumerate(
+        zip(problems_of(base.run), equations_of(base.run.model), strict=True)
+    ):
+        now = base.noise[i]
+        rivals: list[tuple[float, Fitted]] = []
+        start: Equation | None = own
+        for poles in range(1, MORE_POLES + 1):
+            fitted = None if start is None else best_fit(problem, [start.raised(1)], 12)
+            if fitted is None:
+                break
+            price = poles * float(np.log(max(now.rows, 2)))
+            rivals.append((now.bic(0) - fitted.bic - price, fitted))
+            start = fitted.equation
+        if not rivals:
+            continue
+        gain, fitted = max(rivals, key=lambda each: each[0])
+        held = now.held_minus_two_log - fitted.noise.held_minus_two_log
+        none = np.zeros(0)
+        found.append(CandidateFit(Dynamics(base.run, i), none, none, {i: fitted.noise}, gain, held))
+    return found

@@ -17,6 +17,7 @@ from stiction_ros.records import Record
 
 HELD_SHARE = 4
 BLOCKS = 24
+PHASES = (0, 1, 3)  # of the held-out blocks, record by record
 SHORTEST_BLOCK = 20
 DETERMINED = ("freeze", "clip", "quantisation")  # shown by the values of PV themselves
 
@@ -106,6 +107,7 @@ class FreeRun:
 
     Attributes:
         model, runs: what runs, over what.
+        leads: of valves whose last effect starts with its stem that far from OP, %.
         stems: positions of the current model, shape (N, m), %.
         forced: outputs of the process, shape (N, p), but for the free columns.
         known: what disturbances and sensors of the current model add, shape (N, p).
@@ -126,7 +128,7 @@ class FreeRun:
             InputError: the model's free run is not finite.
         """
         self.model, self.runs = model, runs
-        self._leads = leads or {}
+        self.leads = dict(leads or {})
         self.responses: Responses = responses_of(model.process, model.sample_time)
         self.stems = np.column_stack(
             [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
@@ -151,7 +153,11 @@ class FreeRun:
             first[rows.start : rows.start + self.responses.skip + MAX_ORDER] = True
         usable = self.runs.usable[output] & ~first
         size = max(len(self.runs) // BLOCKS, SHORTEST_BLOCK)
-        kept = (np.arange(len(self.runs)) // size) % HELD_SHARE == HELD_SHARE - 2
+        kept = np.zeros(len(self.runs), dtype=bool)
+        for r, rows in enumerate(self.runs.slices):
+            # The first block of a record is fitted: nothing else holds its state at the start.
+            place = np.arange(rows.stop - rows.start) // size + PHASES[r % len(PHASES)]
+            kept[rows] = place % HELD_SHARE == HELD_SHARE - 2
         return Blocks(usable & ~kept, usable & kept)
 
     def drive(
@@ -176,7 +182,7 @@ class FreeRun:
         """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""
         low, high = self.model.limits[valve]
         stem = self.runs.op[:, valve].copy()
-        lead = self._leads.get(self.model.valves[valve].name, 0.0)
+        lead = self.leads.get(self.model.valves[valve].name, 0.0)
         for rows in self.runs.slices:
             for k, effect in enumerate(effects):
                 first = float(stem[rows.start]) + (lead if k == len(effects) - 1 else 0.0)

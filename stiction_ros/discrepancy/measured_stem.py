@@ -11,6 +11,8 @@ from stiction_ros.discrepancy.search import CandidateFit
 from stiction_ros.discrepancy.valve_candidates import ValveCandidate
 from stiction_ros.effects import FloatArray
 
+CONFIRMED = 0.5  # of the squared distance that may be left
+
 
 def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Return the fits but for those whose stem is further from the measured one than now."""
@@ -23,6 +25,21 @@ def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[Candida
                 continue
         kept.append(fit)
     return kept
+
+
+def confirmed(run: FreeRun, fit: CandidateFit) -> bool:
+    """Tell whether every record has a stem, and most of its distance from OP is that effect.
+
+    A stem that is merely late, or smoother than OP, comes a little nearer by any bend.
+    """
+    candidate = fit.candidate
+    if not isinstance(candidate, ValveCandidate):
+        return False
+    if any(record.stem is None for record in run.runs.records):
+        return False
+    stems = candidate.stems(run, fit.point[None, :])[:, 0]
+    now = stem_misfit(run, candidate.valve, run.stems[:, candidate.valve])
+    return stem_misfit(run, candidate.valve, stems) < CONFIRMED * now
 
 
 def stem_misfit(run: FreeRun, valve: int, stems: FloatArray) -> float:

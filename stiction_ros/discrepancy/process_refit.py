@@ -3,218 +3,138 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
+from stiction_ros.discrepancy.free_equation import (
+    Equation,
+    Fitted,
+    Problem,
+    best_fit,
+    filtered_fits,
+)
 from stiction_ros.discrepancy.free_run import FreeRun, Runs
-from stiction_ros.discrepancy.noise import Blocks, NoiseFit, fit_noise, whiten
 from stiction_ros.effects import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
 
-RADIUS = 0.9995
-PREFILTERINGS = 3
 LATER = 1  # samples beyond the model's own delays that are tried
+ROUNDS = 8
+SETTLING = 6  # rows that the noise model of highest order reaches back
 
 
-@dataclasses.dataclass(frozen=True)
-class _Equation:
-    """Coefficients of one output: a (n_a,), and per valve b and delay."""
+def longest_delay(model: LoopModel) -> int:
+    """Return the longest delay that is tried behind a candidate, samples.
 
-    a: FloatArray
-    b: tuple[FloatArray, ...]
-    delay: tuple[int, ...]
-
-    @property
-    def denominator(self) -> FloatArray:
-        return np.concatenate([[1.0], self.a])
-
-    @property
-    def stable(self) -> bool:
-        return bool(np.abs(np.roots(self.denominator)).max(initial=0.0) < RADIUS)
-
-    def moved(self, step: FloatArray) -> _Equation:
-        """Return the equation with a step in (a, b of each valve) added."""
-        first, parts = len(self.a), []
-        for b in self.b:
-            parts.append(b + step[first : first + len(b)])
-            first += len(b)
-        return dataclasses.replace(self, a=self.a + step[: len(self.a)], b=tuple(parts))
+    Raises:
+        InputError: a process that is no ARX process.
+    """
+    return max(d for equation in equations_of(model) for d in equation.delay) + LATER
 
 
-@dataclasses.dataclass(frozen=True)
-class _Problem:
-    """One output and the stems that drive it."""
-
-    y: FloatArray
-    stems: FloatArray
-    runs: Runs
-    blocks: Blocks
-
-    def each(
-        self, values: FloatArray, numerator: FloatArray, denominator: FloatArray
-    ) -> FloatArray:
-        """Return a filter's output, started anew in every record."""
-        parts = [lfilter(numerator, denominator, values[rows], axis=0) for rows in self.runs.slices]
-        return np.concatenate(parts)
-
-    def inputs(self, equation: _Equation) -> list[FloatArray]:
-        """Return per valve the delayed stems, in deviations from the first, one column per b."""
-        found = []
-        for j, b in enumerate(equation.b):
-            columns = np.zeros((len(self.y), len(b)))
-            for rows in self.runs.slices:
-                stem = self.stems[rows, j] - self.stems[rows.start, j]
-                for k in range(len(b)):
-                    late = 1 + equation.delay[j] + k
-                    columns[rows.start + late : rows.stop, k] = stem[: len(stem) - late]
-            found.append(columns)
-        return found
-
-    def free(self, equation: _Equation) -> FloatArray:
-        """Return the responses to the past and to a constant of every record."""
-        columns = []
-        for rows in self.runs.slices:
-            for k in range(len(equation.a)):
-                impulse = np.zeros(len(self.y))
-                impulse[rows.start + k] = 1.0
-                columns.append(impulse)
-            one = np.zeros(len(self.y))
-            one[rows] = 1.0
-            columns.append(one)
-        return self.each(np.column_stack(columns), np.ones(1), equation.denominator)
-
-    def forced(self, equation: _Equation) -> FloatArray:
-        total = sum(c @ b for c, b in zip(self.inputs(equation), equation.b, strict=True))
-        return self.each(np.asarray(total), np.ones(1), equation.denominator)
-
-    def fit(self, equation: _Equation, like: FloatArray | None) -> NoiseFit:
-        return fit_noise(self.y - self.forced(equation), self.free(equation), self.blocks, like)
-
-    def sensitivities(self, equation: _Equation, output: FloatArray) -> FloatArray:
-        """Return the derivatives of the free run with respect to (a, b), shape (N, n_a + Σ n_b)."""
-        columns = []
-        for k in range(1, len(equation.a) + 1):
-            late = np.zeros_like(output)
-            for rows in self.runs.slices:
-                late[rows.start + k : rows.stop] = -output[rows.start : rows.stop - k]
-            columns.append(late[:, None])
-        columns += self.inputs(equation)
-        return self.each(np.hstack(columns), np.ones(1), equation.denominator)
-
-
-def refit_process(model: LoopModel, runs: Runs, rounds: int = 8) -> LoopModel:
-    """Return the model with ARX coefficients that fit the free run best, by Gauss-Newton.
-
-    Effects, orders and delays stay. The likelihood is that of the innovations on the fitted
-    rows, as for every candidate. Starts are the model's own coefficients and those of an
-    equation-error fit that is filtered by its own denominator until it settles.
+def equations_of(model: LoopModel) -> list[Equation]:
+    """Return the equation of every output, a valve that does not act on it without b.
 
     Raises:
         InputError: a process that is no ARX process.
     """
     if not isinstance(model.process, ArxProcess):
         raise InputError("the process is no arx process", where=model.name)
-    run = FreeRun(model, runs)
-    document = model.to_mapping()
-    for i, own in enumerate(model.process.equations):
-        problem = _Problem(runs.pv[:, i] - run.known[:, i], run.stems, runs, run.blocks(i))
-        valves = model.valve_names
-        equation = _Equation(
+    return [
+        Equation(
             np.array(own.a),
-            tuple(np.array(own.b.get(v, ())) for v in valves),
-            tuple(own.delay.get(v, 0) for v in valves),
+            tuple(np.array(own.b.get(v, ())) for v in model.valve_names),
+            tuple(own.delay.get(v, 0) for v in model.valve_names),
         )
-        best = _best_fit(problem, equation, rounds)
-        entry = document["process"]["outputs"][i]
-        entry["a"] = best.a.tolist()
-        entry["b"] = {v: b.tolist() for v, b in zip(valves, best.b, strict=True) if len(b)}
-        entry["delay"] = {
-            v: d for v, b, d in zip(valves, best.b, best.delay, strict=True) if len(b)
-        }
+        for own in model.process.equations
+    ]
+
+
+def with_equations(model: LoopModel, equations: Sequence[Equation]) -> LoopModel:
+    """Return the model with other coefficients and delays."""
+    document = model.to_mapping()
+    for entry, own in zip(document["process"]["outputs"], equations, strict=True):
+        each = list(zip(model.valve_names, own.b, own.delay, strict=True))
+        entry["a"] = own.a.tolist()
+        entry["b"] = {v: b.tolist() for v, b, _ in each if len(b)}
+        entry["delay"] = {v: d for v, b, d in each if len(b)}
     return LoopModel.from_mapping(document, model.name)
 
 
-def _best_fit(problem: _Problem, own: _Equation, rounds: int) -> _Equation:
-    starts = [own]
-    longest = max(own.delay) + LATER
-    for delay in range(longest + 1):
-        shifted = tuple(max(d - longest + LATER + delay, 0) for d in own.delay)
-        starts += _filtered_fits(problem, dataclasses.replace(own, delay=shifted))[-1:]
-    fitted = [(problem.fit(start, None), start) for start in starts if _bounded(problem, start)]
-    if not fitted:
-        return own
-    fit, equation = min(fitted, key=lambda each: each[0].bic(0))
-    for _ in range(rounds):
-        total = problem.y - fit.residual
-        columns = np.hstack([problem.sensitivities(equation, total), problem.free(equation)])
-        rows = problem.blocks.train
-        inner = whiten(columns, fit.ar)[rows]
-        scale = np.maximum(np.linalg.norm(inner, axis=0), 1e-300)
-        target = whiten(fit.residual, fit.ar)[rows]
-        step = np.linalg.lstsq(inner / scale, target, rcond=1e-9)[0] / scale
-        improved = _line_search(problem, equation, fit, step)
-        if improved is None:
-            break
-        gain = fit.bic(0) - improved[0].bic(0)
-        fit, equation = improved
-        if gain < 0.1:
-            break
-    return equation
+def with_common_rows(runs: Runs, model: LoopModel) -> Runs:
+    """Return the records without the first rows that not every delay and order can score.
+
+    Criteria of models with different delays are comparable over the same rows only.
+    """
+    equations = equations_of(model)
+    reach = longest_delay(model) + 2 + max(len(b) for e in equations for b in e.b)
+    usable = runs.usable.copy()
+    for rows in runs.slices:
+        usable[:, rows.start : min(rows.start + reach + SETTLING, rows.stop)] = False
+    return dataclasses.replace(runs, usable=usable)
 
 
-def _bounded(problem: _Problem, equation: _Equation) -> bool:
-    """Tell whether an equation is stable and its free run no larger than PV by orders."""
-    if not equation.stable:
-        return False
-    return float(np.ptp(problem.forced(equation))) < 1e3 * float(np.ptp(problem.y))
+def problems_of(run: FreeRun, stems: FloatArray | None = None) -> list[Problem]:
+    """Return the fitting problem of every output; ``stems``, shape (N, m), replace the run's."""
+    moved = run.stems if stems is None else stems
+    return [
+        Problem(run.runs.pv[:, i] - run.known[:, i], moved, run.runs, run.blocks(i))
+        for i in range(len(run.model.outputs))
+    ]
 
 
-def _line_search(
-    problem: _Problem, equation: _Equation, fit: NoiseFit, step: FloatArray
-) -> tuple[NoiseFit, _Equation] | None:
-    for share in (1.0, 0.4, 0.1):
-        tried = equation.moved(share * step)
-        if not _bounded(problem, tried):
-            continue
-        found = problem.fit(tried, fit.ar)
-        if found.bic(0) < fit.bic(0):
-            return found, tried
-    return None
+def refit_output(problem: Problem, own: Equation, longest: int, rounds: int = ROUNDS) -> Fitted:
+    """Return an output's best equation of the same orders over all delays up to ``longest``.
+
+    Starts are the model's own coefficients and, per delay, those of an equation-error fit that
+    is filtered by its own denominator until it settles.
+    """
+    starts = [own, *_nested(problem, own, longest, rounds)]
+    shift = longest - max(own.delay)
+    for late in range(-max(own.delay), shift + 1):
+        delays = tuple(max(d + late, 0) for d in own.delay)
+        each = filtered_fits(problem, own.at(delays))
+        starts += [*each[:1], *each[1:][-1:]]
+    return best_fit(problem, starts, rounds) or problem.fit(own)
 
 
-def _filtered_fits(problem: _Problem, own: _Equation) -> list[_Equation]:
-    """Return equation-error fits, the data filtered by 1/A of the fit before."""
-    found, equation = [], own
-    denominator = np.ones(1)
-    for _ in range(PREFILTERINGS):
-        y = problem.each(problem.y, np.ones(1), denominator)
-        columns = []
-        for k in range(1, len(own.a) + 1):
-            late = np.zeros_like(y)
-            late[k:] = -y[:-k]
-            columns.append(late[:, None])
-        columns += [problem.each(c, np.ones(1), denominator) for c in problem.inputs(own)]
-        count = sum(c.shape[1] for c in columns)
-        ones = np.column_stack([_inside(len(y), rows) for rows in problem.runs.slices])
-        columns.append(problem.each(ones, np.ones(1), denominator))
-        whole = np.hstack(columns)[problem.blocks.train]
-        scale = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-        theta = np.linalg.lstsq(whole / scale, y[problem.blocks.train], rcond=1e-10)[0] / scale
-        zero = dataclasses.replace(
-            own, a=np.zeros_like(own.a), b=tuple(np.zeros_like(b) for b in own.b)
-        )
-        equation = zero.moved(theta[:count])
-        if not equation.stable:
-            break
-        found.append(equation)
-        denominator = equation.denominator
-    return found
+def _nested(problem: Problem, own: Equation, longest: int, rounds: int) -> list[Equation]:
+    """Return the best equation with one b less per valve, its last b 0; nothing to take: none.
+
+    So an equation with more coefficients is never fitted worse than one with fewer.
+    """
+    if max(len(b) for b in own.b) < 2:
+        return []
+    fewer = dataclasses.replace(own, b=tuple(b[:-1] if len(b) > 1 else b for b in own.b))
+    found = refit_output(problem, fewer, longest, rounds).equation
+    padded = [
+        np.concatenate([b, np.zeros(len(o) - len(b))]) for b, o in zip(found.b, own.b, strict=True)
+    ]
+    return [dataclasses.replace(found, b=tuple(padded))]
 
 
-def _inside(count: int, rows: slice) -> FloatArray:
-    column = np.zeros(count)
-    column[rows] = 1.0
-    return column
+def refit_process(model: LoopModel, runs: Runs, longest: int, rounds: int = ROUNDS) -> LoopModel:
+    """Return the model with ARX coefficients that fit the free run best, by Gauss-Newton.
+
+    Effects and orders stay. The likelihood is that of the innovations on the fitted rows, as
+    for every candidate.
+
+    Args:
+        longest: delay tried, samples.
+        rounds: of Gauss-Newton, at most.
+
+    Raises:
+        InputError: a process that is no ARX process.
+    """
+    return refitted(FreeRun(model, runs), longest, rounds)
+
+
+def refitted(run: FreeRun, longest: int, rounds: int = ROUNDS) -> LoopModel:
+    """Return the model of a free run, its process fitted again behind the run's own stems."""
+    found = [
+        refit_output(problem, own, longest, rounds).equation
+        for problem, own in zip(problems_of(run), equations_of(run.model), strict=True)
+    ]
+    return with_equations(run.model, found)

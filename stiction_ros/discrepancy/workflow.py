@@ -14,13 +14,19 @@ from stiction_ros.discrepancy.controller_check import ControllerCheck, check_con
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
 from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, moved_away, run_with
-from stiction_ros.discrepancy.free_process import score_with_free_process
+from stiction_ros.discrepancy.free_intervals import with_free_process
+from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
 from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
+from stiction_ros.discrepancy.long_records import liveliest_parts
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.measured_stem import not_contradicted
 from stiction_ros.discrepancy.options import GapOptions
-from stiction_ros.discrepancy.process_refit import refit_process
+from stiction_ros.discrepancy.process_refit import (
+    longest_delay,
+    refit_process,
+    with_common_rows,
+)
 from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
 from stiction_ros.discrepancy.say import experiment_for, overall
 from stiction_ros.discrepancy.search import Baseline
@@ -77,7 +83,7 @@ class _Workflow:
         self.report = progress or (lambda share: None)
         self.begun = time.perf_counter()
         self.random = np.random.default_rng(options.seed)
-        runs = join_records(model, records)
+        runs = join_records(model, liveliest_parts(records) if options.free_process else records)
         self.gate: Gate = look_at_data(model, runs)
         runs = dataclasses.replace(runs, usable=self.gate.usable)
         self.controller: ControllerCheck = check_controller(model, runs)
@@ -85,9 +91,15 @@ class _Workflow:
         self.data: list[DataFinding] = [*([found] if found else []), *self.gate.findings]
         self.runs: Runs = corrected(runs, found)
         self.bare = add_data_effects(model, self.data)
+        self.longest = 0
         if options.free_process:
-            self.bare = refit_process(self.bare, self.runs)
-        self.base_before = Baseline.of(FreeRun(model, self.runs))
+            self.longest = longest_delay(model)
+            self.runs = with_common_rows(self.runs, model)
+            self.bare = refit_process(self.bare, self.runs, self.longest)
+        first = self.bare if options.free_process else model
+        self.base_before = Baseline.of(FreeRun(first, self.runs))
+        self.earlier: list[LoopModel] = []  # without effects, before each that was added
+        self.gains: dict[tuple[str, str], float] = {}  # with the process refitted
         self.looks: list[Look] = []
         self.added: tuple[AddedEffect, ...] = ()
         self.base = self.base_before
@@ -106,7 +118,7 @@ class _Workflow:
 
     def _withdraw(self) -> None:
         """Take the last effect back: with it the free run is farther from PV than before."""
-        self.added = self.added[:-1]
+        self.added, self.bare = self.added[:-1], self.earlier.pop()
         self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
         last = max(k for k, look in enumerate(self.looks) if look.kept)
         reason = "the free run of the held-out rows moves away from PV"
@@ -128,6 +140,8 @@ class _Workflow:
             threshold,
             lambda fit: departures(run, fit.candidate, fit.point),
         )
+        if self.options.free_process:
+            decision = in_doubt_of_place(self.base, decision)
         testable = testable_effects(self.base, list(candidates), self.options.margin)
         where = locate(self.base)
         kept, reason = False, decision.reason
@@ -137,7 +151,10 @@ class _Workflow:
             step = self._extend(decision, bare)
             kept, reason = step.kept, step.reason
             if step.kept:
+                self.earlier.append(self.bare)
                 self.added, self.base, self.bare = step.added, step.base, bare
+                if models:
+                    self.gains[chosen.place, chosen.effect] = decision.chosen.delta_bic
         return Look(scores, decision, where, kept, reason), testable
 
     def _score(
@@ -146,8 +163,7 @@ class _Workflow:
         """Return the scores, and the model behind each candidate where the process is free."""
         if not self.options.free_process:
             return score_candidates(self.base, candidates, report), {}
-        model = self.base.run.model
-        found = score_with_free_process(model, self.runs, self.base, candidates, report)
+        found = score_with_free_process(self.base, candidates, self.longest, report)
         self.base = found.scores.base
         if not self.added:
             self.base_before = self.base
@@ -167,6 +183,12 @@ class _Workflow:
     def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
         others = [*self.added[:k], *self.added[k + 1 :]]
         base = Baseline.of(run_with(self.bare, self.runs, others))
+        found = self._given_process(k, effect, base)
+        if not self.options.free_process:
+            return found
+        return with_free_process(found, base, effect.fit, self.longest)
+
+    def _given_process(self, k: int, effect: AddedEffect, base: Baseline) -> Intervals:
         if self.options.quick:
             return likelihood_intervals(base, effect.fit)
         done = self.options.most_effects / (self.options.most_effects + 1)
@@ -227,7 +249,7 @@ class _Workflow:
             effect.effect,
             values,
             self._intervals(k, effect),
-            effect.fit.delta_bic,
+            self.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
             verdict,
             effect.alternatives,
         )
