@@ -27,7 +27,7 @@ from stiction_ros.errors import InputError
 OPTIONS: dict[str, tuple[str, ...]] = {
     "control": ("seed", "quick"),
     "identification": ("repeat", "seed", "longest", "quick"),
-    "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write"),
+    "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 

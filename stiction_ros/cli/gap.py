@@ -57,7 +57,9 @@ def add(commands: Any) -> None:
         help="delays tried by --fit-linear, samples (0:10)",
     )
     parser.add_argument(
-        "--quick", action="store_true", help="no bootstrap: margin alone, intervals by likelihood"
+        "--quick",
+        action="store_true",
+        help="no bootstrap: stored threshold, intervals by likelihood",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the bootstraps (0)")
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")

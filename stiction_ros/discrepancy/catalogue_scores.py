@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.decoys import decoys
 from stiction_ros.discrepancy.output_candidates import output_candidates
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
 from stiction_ros.discrepancy.valve_candidates import valve_candidates
+from stiction_ros.effects import FloatArray
 
 Progress = Callable[[float], None]
 
@@ -58,10 +59,20 @@ def all_candidates(base: Baseline, clock_known: bool = False) -> tuple[Candidate
 
 
 def score_candidates(
-    base: Baseline, candidates: tuple[Candidate, ...], progress: Progress | None = None
+    base: Baseline,
+    candidates: tuple[Candidate, ...],
+    progress: Progress | None = None,
+    gap: FloatArray | None = None,
 ) -> Scores:
-    """Return the best figures and the score of every candidate."""
-    gap = base.run.gap
+    """Return the best figures and the score of every candidate.
+
+    Args:
+        base: the current model.
+        candidates: what is tried.
+        progress: called with the share done.
+        gap: shape (N, p), what is to be explained; None for the recorded one.
+    """
+    gap = base.run.gap if gap is None else gap
     fits = []
     for k, candidate in enumerate(candidates):
         fits.append(fit_candidate(base, gap, candidate))

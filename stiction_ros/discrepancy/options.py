@@ -14,7 +14,7 @@ class GapOptions:
     """Options of :func:`stiction_ros.discrepancy.find_discrepancy`.
 
     Attributes:
-        quick: take the margin alone and intervals of the likelihood instead of bootstraps.
+        quick: take the stored threshold and intervals of the likelihood instead of bootstraps.
         margin: BIC by which an effect must beat no effect and its best rival.
         most_effects: how many effects are added at most.
         free_process: let the process be refitted with every candidate, as for a model that

@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, score_candidates
+from stiction_ros.discrepancy.chance import stored_threshold
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
 from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
@@ -129,9 +130,11 @@ class _Workflow:
         share = 1.0 / (self.options.most_effects + 1)
         candidates = all_candidates(self.base, self.controller.clock_known)
         scores, models = self._score(candidates, lambda done: self.report((k + 0.8 * done) * share))
-        threshold = self.options.margin
-        if not self.options.quick:
-            threshold = max(threshold, chance_threshold(self.base, candidates, self.random))
+        if self.options.quick:
+            chance = stored_threshold(sum(each.inside for each in candidates))
+        else:
+            chance = chance_threshold(self.base, candidates, self.random)
+        threshold = max(self.options.margin, chance)
         allowed = not_contradicted(self.base.run, scores.fits)
         run = self.base.run
         decision = decide(

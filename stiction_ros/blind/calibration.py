@@ -1,0 +1,69 @@
+"""How large a score chance alone brings about: the stored threshold of ``stiction gap --quick``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from stiction_ros.blind.generator import blind_loop
+from stiction_ros.discrepancy.catalogue_scores import all_candidates, score_candidates
+from stiction_ros.discrepancy.decide import confirmed, large_enough
+from stiction_ros.discrepancy.free_run import FreeRun, join_records
+from stiction_ros.discrepancy.gate import look_at_data
+from stiction_ros.discrepancy.search import Baseline
+from stiction_ros.effects import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class ChanceScore:
+    """The best score of one record in which there is nothing but noise.
+
+    Attributes:
+        seed: of the loop whose current model and noise it is drawn from.
+        candidates: of the catalogue, that were tried.
+        evidence: of the best that the held-out rows bear out and that has a size.
+    """
+
+    seed: int
+    candidates: int
+    evidence: float
+
+
+def chance_scores(seeds: Sequence[int], draws: int) -> Iterator[ChanceScore]:
+    """Yield the best scores of records drawn from the current model and its noise alone.
+
+    The whole search is run on every draw, with its fine grids and its own fits of the noise.
+
+    Args:
+        seeds: of single blind loops; whatever is hidden in them counts as noise.
+        draws: records per loop.
+    """
+    for seed in seeds:
+        seen, _ = blind_loop(seed)
+        runs = join_records(seen.model, [seen.record])
+        runs = dataclasses.replace(runs, usable=look_at_data(seen.model, runs).usable)
+        base = Baseline.of(FreeRun(seen.model, runs))
+        random = np.random.default_rng([seed, draws])
+        for _ in range(draws):
+            yield _best_of_noise(base, random, seed)
+
+
+def _best_of_noise(base: Baseline, random: np.random.Generator, seed: int) -> ChanceScore:
+    gap = _drawn(base, random)
+    drawn = Baseline.of(base.run, gap)
+    candidates = [each for each in all_candidates(drawn) if each.inside]
+    scores = score_candidates(drawn, tuple(candidates), gap=gap)
+    kept = [fit.evidence for fit in scores.fits if confirmed(fit) and large_enough(fit)]
+    return ChanceScore(seed, len(candidates), max(kept, default=0.0))
+
+
+def _drawn(base: Baseline, random: np.random.Generator) -> FloatArray:
+    """Return a gap of noise alone, shape (N, p)."""
+    columns = []
+    for noise in base.noise:
+        white = random.standard_normal(len(noise.residual)) * noise.innovation_std
+        columns.append(lfilter([1.0], np.concatenate([[1.0], -noise.ar]), white))
+    return np.column_stack(columns)
