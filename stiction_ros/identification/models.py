@@ -15,7 +15,7 @@ from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.scan import BATCH, OutputScan
-from stiction_ros.identification.stem_kernels import count_moves
+from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
@@ -199,16 +199,15 @@ def scan_criteria(
     """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
     ranges = ranges or data.delays
     scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
-    u = data.u[valve]
+    u = np.ascontiguousarray(data.u[valve])
     start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    size = max(1, BATCH // len(u))
     loss = np.zeros((len(criteria), len(grid)))
     best = np.zeros((len(criteria), len(grid), len(data.y)), dtype=int)
     moves = np.zeros(len(grid))
-    for begin in range(0, len(grid), size):
-        rows = slice(begin, begin + size)
-        stems = simulate(data.law, grid[rows], u, start[rows])
-        moves[rows] = count_moves(stems)
+    for begin in range(0, len(grid), BATCH):
+        rows = slice(begin, begin + BATCH)
+        stems = stem_steps(data.law, grid[rows], u, start[rows])
+        moves[rows] = stems.moves
         for c, outputs in enumerate(scans):
             for i, scan in enumerate(outputs):
                 energy = scan.energy(stems)
@@ -289,7 +288,7 @@ def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
         return model
     for j in range(len(data.u)):
         scans = output_scans(data, model, orders, j, Criterion.ONE_STEP, data.delays)
-        stem = model.stems[j][:, None]
+        stem = StepSignals.of(model.stems[j][:, None])
         best = [low + int(scan.energy(stem)[0].argmin()) for scan in scans]
         model = dataclasses.replace(model, delays=with_delays(model.delays, j, best))
     return model

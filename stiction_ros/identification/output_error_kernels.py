@@ -16,6 +16,9 @@ from stiction_ros.effects.behaviour import FloatArray
 
 IntArray = NDArray[np.int64]
 
+FREE_RUN_WEIGHT = 0.02
+MAX_RADIUS = 0.9995
+HARDEST = 1e6  # damping
 DEPENDENT = 1e-6  # pivot of a scaled column, as a root, below which it depends on the others
 EMPTY = 1e-12
 
@@ -65,26 +68,29 @@ class Point(NamedTuple):
 
 
 @compiled
-def _driven(x: FloatArray, a: FloatArray) -> FloatArray:
-    """Return x / A from rest, shape (N,)."""
-    out = np.empty(len(x))
+def _driven(signals: FloatArray, a: FloatArray) -> FloatArray:
+    """Return signals / A from rest, shape (s, N)."""
+    rows, count = signals.shape
+    out = np.empty((rows, count))
     order = len(a) - 1
-    for k in range(len(x)):
-        value = x[k]
-        for i in range(min(order, k), 0, -1):
-            value -= a[i] * out[k - i]
-        out[k] = value
+    for k in range(count):
+        for s in range(rows):
+            value = signals[s, k]
+            for i in range(min(order, k), 0, -1):
+                value -= a[i] * out[s, k - i]
+            out[s, k] = value
     return out
 
 
 @compiled
-def _averaged(x: FloatArray, d: FloatArray) -> FloatArray:
-    """Return D x from rest, shape (N,)."""
-    out = x.copy()
+def _averaged(x: FloatArray, d: FloatArray, begin: int) -> FloatArray:
+    """Return D x from sample ``begin`` on, x at rest before its first sample."""
+    out = x[begin:].copy()
     for i in range(1, len(d)):
-        weight = d[i]
-        for k in range(i, len(x)):
-            out[k] += weight * x[k - i]
+        weight, skip = d[i], max(i - begin, 0)
+        to, part = out[skip:], x[begin - i + skip : len(x) - i]
+        for k in range(len(to)):
+            to[k] += weight * part[k]
     return out
 
 
@@ -92,12 +98,15 @@ def _averaged(x: FloatArray, d: FloatArray) -> FloatArray:
 def _fill(rows: FloatArray, row: int, x: FloatArray, start: int, count: int) -> None:
     """Write x and its first differences, from ``start`` on, into ``count`` rows."""
     length = min(rows.shape[1], len(x) - start)
-    now = x.copy()
+    now = x[max(start - count, 0) : start + length].copy()
+    at = start - max(start - count, 0)
     for i in range(count):
-        for k in range(length):
-            rows[row + i, k] = now[start + k]
-        for k in range(len(x) - 1, 0, -1):
-            now[k] -= now[k - 1]
+        rows[row + i, :length] = now[at:]
+        if i + 1 < count:
+            before = now
+            now = before.copy()
+            for k in range(1, len(now)):
+                now[k] = before[k] - before[k - 1]
 
 
 @compiled
@@ -155,23 +164,27 @@ def evaluate(problem: Problem, a: FloatArray, noise: FloatArray, weight: float) 
     plain = np.empty((size, len(y) - begin))
     rows = np.empty((size, count + priced))
     row = 0
+    driven = _driven(problem.signals, a)
     for g in range(len(problem.groups)):
         signal, lag, number = problem.groups[g]
-        driven = _driven(problem.signals[signal], a)
-        _fill(plain, row, driven, begin - lag, number)
-        _fill(rows[:, :count], row, _averaged(driven, noise), first - lag, number)
+        _fill(plain, row, driven[signal], begin - lag, number)
+        early = max(first - lag - number, 0)
+        moving = _averaged(driven[signal], noise, early)
+        _fill(rows[:, :count], row, moving, first - lag - early, number)
         row += number
     target = np.empty(count + priced)
-    target[:count] = _averaged(y[begin:], noise)[first - begin :]
+    target[:count] = _averaged(y[begin:], noise, first - begin)
     scale = np.sqrt(weight)
     for i in range(priced):
-        price, at = scale * problem.prices[i], problem.priced[i]
-        target[count + i] = price * y[begin + at]
-        for q in range(size):
-            rows[q, count + i] = price * plain[q, at]
-    root, kept = _factor(rows @ rows.T)
-    rows = rows[kept]
-    solution = _lower_solve(root, (rows @ target).reshape(-1, 1))[:, 0].copy()
+        target[count + i] = scale * problem.prices[i] * y[begin + problem.priced[i]]
+    for q in range(size):
+        one = plain[q]
+        for i in range(priced):
+            rows[q, count + i] = scale * problem.prices[i] * one[problem.priced[i]]
+    root, kept = _factor(np.dot(rows, rows.T))
+    if len(kept) < size:
+        rows = rows[kept]
+    solution = _lower_solve(root, np.dot(rows, target).reshape(-1, 1))[:, 0].copy()
     for i in range(len(kept) - 1, -1, -1):
         for j in range(i + 1, len(kept)):
             solution[i] -= root[j, i] * solution[j]
@@ -179,7 +192,8 @@ def evaluate(problem: Problem, a: FloatArray, noise: FloatArray, weight: float) 
     theta = np.zeros(size)
     for i in range(len(kept)):
         theta[kept[i]] = solution[i]
-    return Point(a, noise, theta, rows, root, theta @ plain, target - solution @ rows, weight)
+    residual = target - np.dot(solution, rows)
+    return Point(a, noise, theta, rows, root, np.dot(theta, plain), residual, weight)
 
 
 @compiled
@@ -194,20 +208,20 @@ def normal_equations(
     order, p = len(point.a) - 1, len(point.noise) - 1
     count = len(problem.y) - problem.first
     # dŷ/da_i = −q^-i ŷ/A; what started before `begin` lies in the span of the initial terms.
-    driven = _driven(point.free_run, point.a)
+    driven = _driven(point.free_run.reshape(1, -1), point.a)[0]
     slope = np.zeros(order + len(driven))
-    slope[order:] = _averaged(driven, point.noise)
+    slope[order:] = _averaged(driven, point.noise, 0)
     jacobian = np.zeros((order + p, len(point.residual)))
     lags = np.empty((order, len(point.residual)))
     for i in range(1, order + 1):
         start = order + p - i
         lags[i - 1, :count] = slope[start : start + count]
     scale = np.sqrt(point.weight)
-    for place in range(len(point.residual) - count):
-        price, at = scale * problem.prices[place], problem.priced[place]
-        for i in range(1, order + 1):
+    for i in range(1, order + 1):
+        for place in range(len(point.residual) - count):
+            price, at = scale * problem.prices[place], problem.priced[place]
             lags[i - 1, count + place] = price * driven[at - i] if at >= i else 0.0
-    jacobian[:order] = table @ lags
+    jacobian[:order] = np.dot(table, lags)
     w = problem.y[problem.begin :] - point.free_run
     for i in range(1, p + 1):
         jacobian[order + i - 1, :count] = w[p - i : p - i + count]
@@ -231,3 +245,133 @@ def is_stable(a: FloatArray, radius: float) -> bool:
         for i in range(1, size):
             now[i] = (before[i] - last * before[size - i]) / shrunk
     return True
+
+
+@compiled
+def _definite_solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solution of a positive definite system; empty where it is not one."""
+    size = len(matrix)
+    root, out = matrix.copy(), right.copy()
+    for i in range(size):
+        for j in range(i + 1):
+            value = root[i, j]
+            for before in range(j):
+                value -= root[i, before] * root[j, before]
+            if j < i:
+                root[i, j] = value / root[j, j]
+            elif value > 0.0:
+                root[i, i] = np.sqrt(value)
+            else:
+                return np.empty(0)
+        for j in range(i):
+            out[i] -= root[i, j] * out[j]
+        out[i] /= root[i, i]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            out[i] -= root[j, i] * out[j]
+        out[i] /= root[i, i]
+    return out
+
+
+@compiled
+def energy_of_output(problem: Problem) -> float:
+    """Return Σy² over the window."""
+    y = problem.y[problem.first :]
+    return max(float(np.dot(y, y)), 1e-300)
+
+
+@compiled
+def loss_of(problem: Problem, point: Point) -> float:
+    """Return n log(Σε²/n) + n κ Σw²/Σy²."""
+    count = len(problem.y) - problem.first
+    innovations = point.residual[:count]
+    energy = max(np.dot(innovations, innovations), 1e-300)
+    w = problem.y[problem.begin :] - point.free_run
+    penalty = FREE_RUN_WEIGHT * np.dot(w, w) / energy_of_output(problem)
+    return float(count * (np.log(energy / count) + penalty))
+
+
+@compiled
+def descend(
+    problem: Problem, point: Point, table: FloatArray, most: int, least_gain: float
+) -> Point:
+    """Levenberg-Marquardt over (a, d) from ``point``, Σw² priced by its innovations.
+
+    Ends after ``most`` iterations, or when one lowers the criterion by less than ``least_gain``.
+
+    Args:
+        table: of the differences of n_a lags, see :func:`normal_equations`.
+    """
+    count, order = len(problem.y) - problem.first, len(point.a) - 1
+    innovations = point.residual[:count]
+    weight = FREE_RUN_WEIGHT * np.dot(innovations, innovations) / energy_of_output(problem)
+    damping = 1e-4
+    point = evaluate(problem, point.a, point.noise, weight)
+    energy = np.dot(point.residual, point.residual)
+    for _ in range(most):
+        gram, gradient = normal_equations(problem, point, table)
+        size, before = len(gradient), energy
+        scale = np.empty(size)
+        for i in range(size):
+            # A coefficient without influence stays where it is.
+            scale[i] = max(np.sqrt(max(gram[i, i], 0.0)), 1e-100)
+            scale[i] = 1.0 if scale[i] <= 1e-100 else scale[i]
+        gram /= np.outer(scale, scale)
+        found = False
+        while damping < HARDEST and not found:
+            damped = gram.copy()
+            for i in range(size):
+                damped[i, i] += damping
+            step = _definite_solve(damped, gradient / scale)
+            if len(step):
+                a, noise = point.a.copy(), point.noise.copy()
+                a[1:] -= np.dot(table.T, (step / scale)[:order])
+                noise[1:] -= (step / scale)[order:]
+                if is_stable(a, MAX_RADIUS):
+                    candidate = evaluate(problem, a, noise, weight)
+                    energy = np.dot(candidate.residual, candidate.residual)
+                    if energy < before:
+                        point, found = candidate, True
+            if not found:
+                damping *= 5.0
+        if not found:
+            return point
+        damping = max(damping / 10.0, 1e-9)
+        if (1.0 - energy / before) * count < least_gain and damping < 1e-5:
+            break
+    return point
+
+
+@compiled
+def arx_polynomial(problem: Problem, a: FloatArray, order: int) -> FloatArray:
+    """Return the ARX model, (15), of data filtered by 1/A: y by the differences of its lags.
+
+    Stems are replaced by their differences as well, as with the linear columns.
+    """
+    stems = len(problem.groups) - 2
+    count = len(problem.y) - problem.first
+    size = order + 1
+    for g in range(stems):
+        size += problem.groups[g, 2]
+    signals = np.empty((stems + 1, len(problem.y)))
+    signals[0], signals[1:] = problem.y, problem.signals[:stems]
+    driven = _driven(signals, a)
+    rows = np.empty((size, count))
+    _fill(rows, 0, driven[0], problem.first - 1, order)
+    row = order
+    for g in range(stems):
+        signal, lag, number = problem.groups[g]
+        _fill(rows, row, driven[signal + 1], problem.first - lag, number)
+        row += number
+    rows[row] = 1.0
+    root, kept = _factor(np.dot(rows, rows.T))
+    if len(kept) < size:
+        rows = rows[kept]
+    solution = _lower_solve(root, np.dot(rows, driven[0, problem.first :]).reshape(-1, 1))[:, 0]
+    theta = np.zeros(size)
+    for i in range(len(kept) - 1, -1, -1):
+        value = solution[i]
+        for j in range(i + 1, len(kept)):
+            value -= root[j, i] * theta[kept[j]]
+        theta[kept[i]] = value / root[i, i]
+    return theta[:order].copy()
