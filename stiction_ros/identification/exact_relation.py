@@ -29,23 +29,28 @@ def explained_stretches(
     out = np.zeros(len(starts), dtype=np.bool_)
     rows = np.empty((columns + 1, width))
     for w in range(len(starts)):
-        begin = starts[w]
+        for k in range(width):
+            for q in range(columns):
+                rows[q, k] = regressors[starts[w] + k, q]
+            rows[columns, k] = target[starts[w] + k]
         for q in range(columns):
-            for k in range(width):
-                rows[q, k] = regressors[begin + k, q]
-        rows[columns] = target[begin : begin + width]
-        for q in range(columns):
-            pivot = rows[q, q:].copy()
-            size = np.sqrt(np.dot(pivot, pivot))
-            pivot[0] += size if pivot[0] >= 0.0 else -size
-            length = np.dot(pivot, pivot)
+            length = 0.0
+            for k in range(q, width):
+                length += rows[q, k] * rows[q, k]
             if length == 0.0:
                 continue
+            size = np.sqrt(length)
+            length = 2.0 * (length + size * abs(rows[q, q]))
+            rows[q, q] += size if rows[q, q] >= 0.0 else -size
             for other in range(q + 1, columns + 1):
-                part = rows[other, q:]
-                share = 2.0 * np.dot(pivot, part) / length
-                for k in range(len(part)):
-                    part[k] -= share * pivot[k]
-        left = rows[columns, columns:]
-        out[w] = np.sqrt(np.dot(left, left)) <= 2.0 * error * np.sqrt(width)
+                share = 0.0
+                for k in range(q, width):
+                    share += rows[q, k] * rows[other, k]
+                share *= 2.0 / length
+                for k in range(q, width):
+                    rows[other, k] -= share * rows[q, k]
+        left = 0.0
+        for k in range(columns, width):
+            left += rows[columns, k] * rows[columns, k]
+        out[w] = np.sqrt(left) <= 2.0 * error * np.sqrt(width)
     return out

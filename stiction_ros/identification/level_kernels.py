@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.scan_kernels import _left_over
+from stiction_ros.identification.scan_kernels import left_over
 
 IntArray = NDArray[np.int64]
 
@@ -26,12 +26,16 @@ def pattern_energy(
         products: of base with itself, base with sign, sign with itself, shape (3, width, L).
         right: of base and sign with the rest, shape (2, L).
     """
-    mixed = products[0] - level * products[1] + level * level * products[2]
-    side = right[0] - level * right[1]
-    width = len(mixed)
+    width, lags = products.shape[1], products.shape[2]
+    mixed, side = np.empty((width, lags)), np.empty(lags)
+    for position in range(lags):
+        side[position] = right[0, position] - level * right[1, position]
+        for d in range(width):
+            now = products[0, d, position] - level * products[1, d, position]
+            mixed[d, position] = now + level * level * products[2, d, position]
     room = np.empty((width + 2, width))
     for t in range(len(out)):
-        out[t] = _left_over(mixed, side, t, rest, room)
+        out[t] = left_over(mixed, side, t, rest, room)
 
 
 @compiled
@@ -93,7 +97,9 @@ def best_levels(
             if bend < EXACT_ENOUGH:
                 break
         slope = 0.5 * (loss[middle - 1] - loss[middle + 1])
-        level[g], lowest[g], delays[g] = at[best], loss[best], now[best]
+        level[g], lowest[g] = at[best], loss[best]
+        for p in range(outputs):
+            delays[g, p] = now[best, p]
         if bend > 0.0 and abs(slope) < bend:
             shift = slope / bend
             level[g] = at[middle] + shift * step

@@ -22,6 +22,7 @@ EQUAL = 3.84
 
 
 DelayRanges = tuple[tuple[int, int], ...]
+AllDelays = tuple[tuple[int, ...], ...]
 
 
 class Criterion(enum.Enum):
@@ -273,9 +274,10 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
         delays = tuple((data.delay[0],) * m for _ in range(p))
         base = Model(zero, np.zeros(m), data.u.copy(), delays, ())
     model = refit(data, _one_step_delays(data, base, orders), orders, warm=False)
+    tried = {model.delays}
     for _ in range(3):
         before = model.loss
-        model = improve_delays(data, model, orders)
+        model = improve_delays(data, model, orders, tried)
         if model.loss > before - 1e-3:
             break
     return model
@@ -294,17 +296,25 @@ def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
     return model
 
 
-def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
-    """Scan all delays of every channel with friction fixed; keep what the exact fit favours."""
+def improve_delays(
+    data: Data, model: Model, orders: Orders, tried: set[AllDelays] | None = None
+) -> Model:
+    """Scan all delays of every channel with friction fixed; keep what the exact fit favours.
+
+    Args:
+        tried: delays whose fits are known to be no better; what is fitted here is added.
+    """
     if data.delay[0] == data.delay[1]:
         return model
+    tried = set() if tried is None else tried
     for valve in range(len(data.u)):
         for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
             friction = model.friction[valve][None, :]
             scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
-            now = [row[valve] for row in model.delays]
-            if list(scan.delays[0]) == now:
+            delays = with_delays(model.delays, valve, scan.delays[0])
+            if delays == model.delays or delays in tried:
                 continue
+            tried.add(delays)
             rival = with_valve(
                 data,
                 model,

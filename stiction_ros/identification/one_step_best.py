@@ -72,10 +72,14 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
     """
     search = _Search(record, data, orders)
     best = search.point(model.friction, model.delays)
-    for _ in range(1 if len(data.u) == 1 else SWEEPS):
+    seen: dict[int, tuple[bytes, Delays]] = {}
+    for _ in range(SWEEPS):
         before = best.error
         for valve in range(len(data.u)):
-            best = search.improved(best, valve)
+            others = _others(best, valve)
+            if seen.get(valve) != others:  # else it has been searched beside just these
+                seen[valve] = others
+                best = search.improved(best, valve)
         if best.error > before * (1.0 - 1e-9):
             break
     return SearchLog(
@@ -89,6 +93,12 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
         friction=tuple((float(f_s), float(f_d)) for f_s, f_d in best.friction),
         delays=best.delays,
     )
+
+
+def _others(point: _Point, valve: int) -> tuple[bytes, Delays]:
+    """Return the friction and the delays of all valves but one."""
+    friction = np.delete(point.friction, valve, axis=0).tobytes()
+    return friction, tuple(row[:valve] + row[valve + 1 :] for row in point.delays)
 
 
 class _Search:

@@ -101,10 +101,11 @@ def _fill(rows: FloatArray, row: int, x: FloatArray, start: int, count: int) -> 
     now = x[max(start - count, 0) : start + length].copy()
     at = start - max(start - count, 0)
     for i in range(count):
-        rows[row + i, :length] = now[at:]
+        for k in range(length):
+            rows[row + i, k] = now[at + k]
         if i + 1 < count:
-            before = now
-            now = before.copy()
+            before, now = now, np.empty_like(now)
+            now[0] = before[0]
             for k in range(1, len(now)):
                 now[k] = before[k] - before[k - 1]
 
@@ -142,13 +143,26 @@ def _factor(gram: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 @compiled
+def _rows_kept(rows: FloatArray, kept: IntArray) -> FloatArray:
+    """Return some of the rows; all of them as they are."""
+    if len(kept) == len(rows):
+        return rows
+    out = np.empty((len(kept), rows.shape[1]))
+    for i in range(len(kept)):
+        for k in range(rows.shape[1]):
+            out[i, k] = rows[kept[i], k]
+    return out
+
+
+@compiled
 def _lower_solve(root: FloatArray, right: FloatArray) -> FloatArray:
     """Return L⁻¹ R for R of shape (q, c)."""
     out = right.copy()
     for i in range(len(root)):
-        for j in range(i):
-            out[i] -= root[i, j] * out[j]
-        out[i] /= root[i, i]
+        for c in range(out.shape[1]):
+            for j in range(i):
+                out[i, c] -= root[i, j] * out[j, c]
+            out[i, c] /= root[i, i]
     return out
 
 
@@ -173,7 +187,9 @@ def evaluate(problem: Problem, a: FloatArray, noise: FloatArray, weight: float) 
         _fill(rows[:, :count], row, moving, first - lag - early, number)
         row += number
     target = np.empty(count + priced)
-    target[:count] = _averaged(y[begin:], noise, first - begin)
+    moving = _averaged(y[begin:], noise, first - begin)
+    for i in range(count):
+        target[i] = moving[i]
     scale = np.sqrt(weight)
     for i in range(priced):
         target[count + i] = scale * problem.prices[i] * y[begin + problem.priced[i]]
@@ -182,8 +198,7 @@ def evaluate(problem: Problem, a: FloatArray, noise: FloatArray, weight: float) 
         for i in range(priced):
             rows[q, count + i] = scale * problem.prices[i] * one[problem.priced[i]]
     root, kept = _factor(np.dot(rows, rows.T))
-    if len(kept) < size:
-        rows = rows[kept]
+    rows = _rows_kept(rows, kept)
     solution = _lower_solve(root, np.dot(rows, target).reshape(-1, 1))[:, 0].copy()
     for i in range(len(kept) - 1, -1, -1):
         for j in range(i + 1, len(kept)):
@@ -192,7 +207,9 @@ def evaluate(problem: Problem, a: FloatArray, noise: FloatArray, weight: float) 
     theta = np.zeros(size)
     for i in range(len(kept)):
         theta[kept[i]] = solution[i]
-    residual = target - np.dot(solution, rows)
+    residual = np.dot(solution, rows)
+    for i in range(len(residual)):
+        residual[i] = target[i] - residual[i]
     return Point(a, noise, theta, rows, root, np.dot(theta, plain), residual, weight)
 
 
@@ -210,23 +227,36 @@ def normal_equations(
     # dŷ/da_i = −q^-i ŷ/A; what started before `begin` lies in the span of the initial terms.
     driven = _driven(point.free_run.reshape(1, -1), point.a)[0]
     slope = np.zeros(order + len(driven))
-    slope[order:] = _averaged(driven, point.noise, 0)
+    moving = _averaged(driven, point.noise, 0)
+    for k in range(len(driven)):
+        slope[order + k] = moving[k]
     jacobian = np.zeros((order + p, len(point.residual)))
     lags = np.empty((order, len(point.residual)))
     for i in range(1, order + 1):
         start = order + p - i
-        lags[i - 1, :count] = slope[start : start + count]
+        for k in range(count):
+            lags[i - 1, k] = slope[start + k]
     scale = np.sqrt(point.weight)
     for i in range(1, order + 1):
         for place in range(len(point.residual) - count):
             price, at = scale * problem.prices[place], problem.priced[place]
             lags[i - 1, count + place] = price * driven[at - i] if at >= i else 0.0
-    jacobian[:order] = np.dot(table, lags)
-    w = problem.y[problem.begin :] - point.free_run
+    for i in range(order):
+        for j in range(order):
+            for k in range(len(point.residual)):
+                jacobian[i, k] += table[i, j] * lags[j, k]
+    begin = problem.begin
     for i in range(1, p + 1):
-        jacobian[order + i - 1, :count] = w[p - i : p - i + count]
-    cross = _lower_solve(point.root, point.rows @ jacobian.T)
-    return jacobian @ jacobian.T - cross.T @ cross, jacobian @ point.residual
+        for k in range(count):
+            at = p - i + k
+            jacobian[order + i - 1, k] = problem.y[begin + at] - point.free_run[at]
+    cross = _lower_solve(point.root, np.dot(point.rows, jacobian.T))
+    gram = np.dot(jacobian, jacobian.T)
+    for i in range(order + p):
+        for j in range(order + p):
+            for q in range(len(cross)):
+                gram[i, j] -= cross[q, i] * cross[q, j]
+    return gram, np.dot(jacobian, point.residual)
 
 
 @compiled
@@ -248,10 +278,27 @@ def is_stable(a: FloatArray, radius: float) -> bool:
 
 
 @compiled
-def _definite_solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the solution of a positive definite system; empty where it is not one."""
+def _balance(gram: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Scale a system so that its diagonal is one, in place; return the scales."""
+    size = len(gradient)
+    scale = np.ones(size)  # a coefficient without influence stays where it is
+    for i in range(size):
+        if gram[i, i] > 1e-200:
+            scale[i] = np.sqrt(gram[i, i])
+    for i in range(size):
+        gradient[i] /= scale[i]
+        for j in range(size):
+            gram[i, j] /= scale[i] * scale[j]
+    return scale
+
+
+@compiled
+def _definite_solve(matrix: FloatArray, damping: float, right: FloatArray) -> FloatArray:
+    """Return the solution with ``damping`` added to the diagonal; empty if not definite."""
     size = len(matrix)
     root, out = matrix.copy(), right.copy()
+    for i in range(size):
+        root[i, i] += damping
     for i in range(size):
         for j in range(i + 1):
             value = root[i, j]
@@ -305,41 +352,38 @@ def descend(
     count, order = len(problem.y) - problem.first, len(point.a) - 1
     innovations = point.residual[:count]
     weight = FREE_RUN_WEIGHT * np.dot(innovations, innovations) / energy_of_output(problem)
-    damping = 1e-4
-    point = evaluate(problem, point.a, point.noise, weight)
-    energy = np.dot(point.residual, point.residual)
-    for _ in range(most):
-        gram, gradient = normal_equations(problem, point, table)
-        size, before = len(gradient), energy
-        scale = np.empty(size)
-        for i in range(size):
-            # A coefficient without influence stays where it is.
-            scale[i] = max(np.sqrt(max(gram[i, i], 0.0)), 1e-100)
-            scale[i] = 1.0 if scale[i] <= 1e-100 else scale[i]
-        gram /= np.outer(scale, scale)
-        found = False
-        while damping < HARDEST and not found:
-            damped = gram.copy()
-            for i in range(size):
-                damped[i, i] += damping
-            step = _definite_solve(damped, gradient / scale)
-            if len(step):
-                a, noise = point.a.copy(), point.noise.copy()
-                a[1:] -= np.dot(table.T, (step / scale)[:order])
-                noise[1:] -= (step / scale)[order:]
-                if is_stable(a, MAX_RADIUS):
-                    candidate = evaluate(problem, a, noise, weight)
-                    energy = np.dot(candidate.residual, candidate.residual)
-                    if energy < before:
-                        point, found = candidate, True
-            if not found:
-                damping *= 5.0
-        if not found:
+    damping, energy, before, done = 1e-4, np.inf, np.inf, -1
+    gram, gradient, scale = np.empty((0, 0)), np.empty(0), np.empty(0)
+    a, noise = point.a, point.noise
+    while True:
+        if is_stable(a, MAX_RADIUS) or done < 0:
+            candidate = evaluate(problem, a, noise, weight)
+            energy = np.dot(candidate.residual, candidate.residual)
+            found = energy < before or done < 0
+        else:
+            found = False
+        if found:
+            point, done = candidate, done + 1
+            damping = max(damping / 10.0, 1e-9) if done else damping
+            little = (1.0 - energy / before) * count < least_gain and damping < 1e-5
+            if done == most or (done and little):
+                return point
+            gram, gradient = normal_equations(problem, point, table)
+            scale, before = _balance(gram, gradient), energy
+        else:
+            damping *= 5.0
+        step = np.empty(0)
+        while not len(step) and damping < HARDEST:
+            step = _definite_solve(gram, damping, gradient)
+            damping *= 1.0 if len(step) else 5.0
+        if not len(step):
             return point
-        damping = max(damping / 10.0, 1e-9)
-        if (1.0 - energy / before) * count < least_gain and damping < 1e-5:
-            break
-    return point
+        a, noise = point.a.copy(), point.noise.copy()
+        for i in range(order):
+            for j in range(order):
+                a[1 + j] -= table[i, j] * step[i] / scale[i]
+        for i in range(len(noise) - 1):
+            noise[1 + i] -= step[order + i] / scale[order + i]
 
 
 @compiled
@@ -354,7 +398,10 @@ def arx_polynomial(problem: Problem, a: FloatArray, order: int) -> FloatArray:
     for g in range(stems):
         size += problem.groups[g, 2]
     signals = np.empty((stems + 1, len(problem.y)))
-    signals[0], signals[1:] = problem.y, problem.signals[:stems]
+    for k in range(len(problem.y)):
+        signals[0, k] = problem.y[k]
+        for g in range(stems):
+            signals[1 + g, k] = problem.signals[g, k]
     driven = _driven(signals, a)
     rows = np.empty((size, count))
     _fill(rows, 0, driven[0], problem.first - 1, order)
@@ -363,10 +410,10 @@ def arx_polynomial(problem: Problem, a: FloatArray, order: int) -> FloatArray:
         signal, lag, number = problem.groups[g]
         _fill(rows, row, driven[signal + 1], problem.first - lag, number)
         row += number
-    rows[row] = 1.0
+    for k in range(count):
+        rows[row, k] = 1.0
     root, kept = _factor(np.dot(rows, rows.T))
-    if len(kept) < size:
-        rows = rows[kept]
+    rows = _rows_kept(rows, kept)
     solution = _lower_solve(root, np.dot(rows, driven[0, problem.first :]).reshape(-1, 1))[:, 0]
     theta = np.zeros(size)
     for i in range(len(kept) - 1, -1, -1):

@@ -152,16 +152,15 @@ class PatternSearch:
             most: largest number of cells; None comes back when there are more.
         """
         todo = self._admissible(rectangle[None, :])
-        found: list[PatternScan] = [self._nothing()]
+        met: list[Cells] = []
         count = 0
         while len(todo):
             count += len(todo)
             if count > most:
                 return None
-            cells = cells_at(self.u, begin, _points(todo), self.law)
-            found.append(self.evaluate(cells))
-            todo = self._admissible(_remainders(todo, cells.bounds))
-        return PatternScan.joined(found)
+            met.append(cells_at(self.u, begin, _points(todo), self.law))
+            todo = self._admissible(_remainders(todo, met[-1].bounds))
+        return PatternScan.joined([self._nothing(), *map(self.evaluate, met)])
 
     def _nothing(self) -> PatternScan:
         flat = np.empty(0)

@@ -12,12 +12,11 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.filter_kernels import Window
 from stiction_ros.identification.level_kernels import pattern_energy
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
-    Window,
-    orthonormal,
-    step_energy,
+    delay_energy,
     step_products,
 )
 from stiction_ros.identification.step_signals import StepSignals
@@ -85,7 +84,6 @@ class OutputScan:
             tails,
             self._numerator,
             self._denominator,
-            self.rest_energy,
         )
 
     def _filtered(self, x: FloatArray) -> FloatArray:
@@ -96,7 +94,8 @@ class OutputScan:
 
     def energy(self, stems: StepSignals) -> FloatArray:
         """Return SE, shape (G, T), for G stems and T delays."""
-        return step_energy(self._window, stems.offsets, stems.places, stems.values)
+        products, right = step_products(self._window, stems.offsets, stems.places, stems.values)
+        return delay_energy(products, right, self.rest_energy)
 
     def patterns(self, patterns: StepSignals) -> PatternEnergy:
         """Return SE of the stems base − level · sign, the two channels, by the level."""
@@ -132,3 +131,24 @@ class PatternEnergy:
                     self.products[g], self.rights[g], level, self._rest_energy, out[g, f]
                 )
         return out
+
+
+def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
+    """Return orthonormal rows that span the given rows, shape (q, n).
+
+    Rows of which those before leave less than ``tolerance`` are left out.
+    """
+    out = np.empty_like(columns)
+    kept = 0
+    for row in columns:
+        size = float(np.sqrt(row @ row))
+        if size < 1e-150:
+            continue
+        now = row / size
+        for _ in range(2 if kept else 0):  # twice is enough for orthogonality to the last digit
+            now -= (out[:kept] @ now) @ out[:kept]
+        size = float(np.sqrt(now @ now))
+        if size > tolerance:
+            out[kept] = now / size
+            kept += 1
+    return out[:kept]

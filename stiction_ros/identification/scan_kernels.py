@@ -8,13 +8,17 @@ stretches without a move where there is no prefilter, otherwise over samples.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.filter_kernels import (
+    LANES,
+    Window,
+    driving,
+    filtered_products,
+)
 
 IntArray = NDArray[np.int64]
 
@@ -22,55 +26,6 @@ DEPENDENT = 1e-13
 RIDGE = 1e-12
 SAME = 1e-9
 MOVES_APART = 20  # samples from move to move, above which stretches are added up
-LANES = 8  # signals that are filtered side by side
-
-
-class Window(NamedTuple):
-    """What of a scan is the same for all signals.
-
-    Attributes:
-        samples, first: N and the first sample of the criterion.
-        lag, lags: first lag and number of lags.
-        width: n_b, number of lags of one delay.
-        tails: what a step at each sample adds to the products with the projected columns, and
-            in the last column with the rest, at lag 0, shape (N + lag + lags, q + 1).
-        numerator, denominator: D and A of the prefilter.
-        rest: energy of the rest.
-    """
-
-    samples: int
-    first: int
-    lag: int
-    lags: int
-    width: int
-    tails: FloatArray
-    numerator: FloatArray
-    denominator: FloatArray
-    rest: float
-
-
-@compiled
-def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
-    """Return orthonormal rows that span the given rows, shape (q, n).
-
-    Rows of which those before leave less than ``tolerance`` are left out.
-    """
-    out = np.empty_like(columns)
-    kept = 0
-    for i in range(len(columns)):
-        now = columns[i].copy()
-        size = np.sqrt(np.dot(now, now))
-        if size < 1e-150:
-            continue
-        now /= size
-        for _ in range(2):  # twice is enough for orthogonality to the last digit
-            if kept:
-                now -= np.dot(np.dot(out[:kept], now), out[:kept])
-        size = np.sqrt(np.dot(now, now))
-        if size > tolerance:
-            out[kept] = now / size
-            kept += 1
-    return out[:kept].copy()
 
 
 @compiled
@@ -80,8 +35,9 @@ def _projected(
     """Write the products of a signal's lags with the columns and the rest, shape (L, q + 1)."""
     width = window.tails.shape[1]
     tails, flat = window.tails.reshape(-1), out.reshape(-1)  # lags follow each other in both
-    flat[:] = 0.0
     before = 0.0
+    for at in range(len(flat)):
+        flat[at] = 0.0
     for i in range(len(places)):
         step = values[i, channel] - before
         before = values[i, channel]
@@ -165,72 +121,6 @@ def _plain_products(
 
 
 @compiled
-def _filtered(
-    window: Window,
-    offsets: IntArray,
-    places: IntArray,
-    values: FloatArray,
-    group: int,
-    out: FloatArray,
-) -> None:
-    """Write D/A of the signals from ``group`` on side by side, shape (N, LANES).
-
-    Lane ``LANES / c · channel + i`` holds a channel of signal ``group`` + i.
-    """
-    channels = values.shape[1]
-    each = LANES // channels
-    out[:] = 0.0
-    order = len(window.numerator)
-    for i in range(min(each, len(offsets) - 1 - group)):
-        for c in range(channels):
-            before, lane = 0.0, each * c + i
-            for row in range(offsets[group + i], offsets[group + i + 1]):
-                step, at = values[row, c] - before, places[row]
-                before = values[row, c]
-                for d in range(min(order, window.samples - at)):
-                    out[at + d, lane] += step * window.numerator[d]
-    a = window.denominator
-    driving = np.zeros(LANES)
-    for k in range(window.samples):
-        for g in range(LANES):
-            driving[g] += out[k, g]
-            out[k, g] = driving[g]
-        for i in range(min(len(a) - 1, k), 0, -1):
-            weight = a[i]
-            for g in range(LANES):
-                out[k, g] -= weight * out[k - i, g]
-
-
-@compiled
-def _filtered_products(window: Window, z: FloatArray, crossed: bool, out: FloatArray) -> None:
-    """Write sums of z[k − l, g] z[k − l − d, g], shape (width, L, LANES).
-
-    Crossed, the second factor comes from the lane that is half of the lanes further.
-    """
-    lags, begin, end = window.lags, window.first - window.lag, window.samples - window.lag
-    half = LANES // 2 if crossed else 0
-    now = np.empty(LANES)
-    for d in range(min(window.width, lags)):
-        now[:] = 0.0
-        for k in range(begin, end):
-            one, two = z[k], z[k - d]
-            if crossed:
-                for g in range(LANES // 2):
-                    now[g] += one[g] * two[g + LANES // 2]
-                    now[g + LANES // 2] += one[g + LANES // 2] * two[g]
-            else:
-                for g in range(LANES):
-                    now[g] += one[g] * two[g]
-        out[d, 0] = now
-        for position in range(1, lags - d):
-            before, last = begin - position, end - position
-            for g in range(LANES):
-                other = (g + half) % LANES
-                now[g] += z[before, g] * z[before - d, other] - z[last, g] * z[last - d, other]
-            out[d, position] = now
-
-
-@compiled
 def _without_projections(products: FloatArray, one: FloatArray, two: FloatArray) -> None:
     """Subtract Σ_q one[l, q] two[l + d, q] from products[d, l], in place."""
     lags, columns = one.shape[0], one.shape[1] - 1
@@ -266,38 +156,34 @@ def step_products(
     lanes = np.zeros((2, width, lags, LANES))
     for g in range(size):
         part = slice(offsets[g], offsets[g + 1])
-        at, lane = places[part], g % each
-        if not plain and lane == 0:
-            _filtered(window, offsets, places, values, g, z)
-            _filtered_products(window, z, False, lanes[0])
-            if channels == 2:
-                _filtered_products(window, z, True, lanes[1])
+        at, of, lane = places[part], values[part], g % each
         if plain:
-            _plain_products(window, at, values[part], room, pairs)
+            _plain_products(window, at, of, room, pairs)
+        elif lane == 0:
+            driving(window, offsets, places, values, g, z)
+            filtered_products(window, z, channels == 2, lanes)
         for c in range(channels):
-            _projected(window, at, values[part], c, projected[c])
-            right[g, c] = projected[c, :, -1]
-            products = out[g, 2 * c]
-            if plain:
-                products[:] = pairs[3 * c]
-            else:
-                products[:] = lanes[0, :, :, each * c + lane]
-            products[0] *= 1.0 + DEPENDENT  # a ridge, as a stem that stands still says nothing
-            products[0] += 1e-200
-            _without_projections(products, projected[c], projected[c])
-        if channels == 2:
-            products = out[g, 1]
-            if plain:
-                products[:] = pairs[1] + pairs[2]
-            else:
-                products[:] = lanes[1, :, :, lane] + lanes[1, :, :, each + lane]
-            _without_projections(products, projected[0], projected[1])
-            _without_projections(products, projected[1], projected[0])
+            _projected(window, at, of, c, projected[c])
+            for position in range(lags):
+                right[g, c, position] = projected[c, position, -1]
+        for pair in range(channels**2):
+            one, two = pair // channels, pair % channels
+            products = out[g, one + two]
+            for d in range(width):
+                for position in range(lags):
+                    if plain:
+                        value = pairs[pair, d, position]
+                    else:
+                        value = lanes[one ^ two, d, position, each * one + lane]
+                    if d == 0 and one == two:  # as a stem that stands still says nothing
+                        value += value * DEPENDENT + 1e-200
+                    products[d, position] += value
+            _without_projections(products, projected[one], projected[two])
     return out, right
 
 
 @compiled
-def _left_over(
+def left_over(
     products: FloatArray, right: FloatArray, delay: int, rest: float, matrix: FloatArray
 ) -> float:
     """Return SE at one delay: the rest's energy less bᵀ M⁻¹ b.
@@ -337,15 +223,12 @@ def _left_over(
 
 
 @compiled
-def step_energy(
-    window: Window, offsets: IntArray, places: IntArray, values: FloatArray
-) -> FloatArray:
-    """Return SE of stems at every delay, shape (G, T)."""
-    products, right = step_products(window, offsets, places, values)
-    delays = window.lags - window.width + 1
-    room = np.empty((window.width + 2, window.width))
-    out = np.empty((len(products), delays))
-    for g in range(len(products)):
-        for t in range(delays):
-            out[g, t] = _left_over(products[g, 0], right[g, 0], t, window.rest, room)
+def delay_energy(products: FloatArray, right: FloatArray, rest: float) -> FloatArray:
+    """Return SE of stems at every delay, shape (G, T), from what :func:`step_products` gives."""
+    width, lags = products.shape[2], products.shape[3]
+    room = np.empty((width + 2, width))
+    out = np.empty((len(products), lags - width + 1))
+    for g in range(len(out)):
+        for t in range(out.shape[1]):
+            out[g, t] = left_over(products[g, 0], right[g, 0], t, rest, room)
     return out

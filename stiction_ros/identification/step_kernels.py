@@ -25,8 +25,10 @@ def _extremes(u: FloatArray) -> tuple[FloatArray, FloatArray]:
     blocks = (len(u) + BLOCK - 1) // BLOCK
     highs, lows = np.empty(blocks), np.empty(blocks)
     for b in range(blocks):
-        part = u[b * BLOCK : (b + 1) * BLOCK]
-        highs[b], lows[b] = part.max(), part.min()
+        high = low = u[b * BLOCK]
+        for k in range(b * BLOCK + 1, min((b + 1) * BLOCK, len(u))):
+            high, low = max(high, u[k]), min(low, u[k])
+        highs[b], lows[b] = high, low
     return highs, lows
 
 
@@ -39,7 +41,10 @@ def _with_room(
         return places, values
     size = 2 * len(places) + more
     wider, higher = np.empty(size, dtype=np.int64), np.empty((size, values.shape[1]))
-    wider[:total], higher[:total] = places[:total], values[:total]
+    for row in range(total):
+        wider[row] = places[row]
+        for c in range(values.shape[1]):
+            higher[row, c] = values[row, c]
     return wider, higher
 
 
@@ -63,7 +68,7 @@ def dense_steps(rows: FloatArray) -> Rows:
                     values[total, c] = rows[g, c, k]
                 total += 1
         offsets[g + 1] = total
-    return offsets, places[:total].copy(), values[:total].copy()
+    return offsets, places[:total], values[:total]
 
 
 @compiled
@@ -101,7 +106,7 @@ def he_steps(static: FloatArray, dynamic: FloatArray, u: FloatArray, start: Floa
                     places[total - 1], values[total - 1, 0] = k, moved
                     stem = moved
         offsets[g + 1] = total
-    return offsets, places[:total].copy(), values[:total].copy()
+    return offsets, places[:total], values[:total]
 
 
 @compiled
@@ -167,4 +172,4 @@ def he_pattern_steps(
                     places[total - 1], values[total - 1, 0], values[total - 1, 1] = k, base, sign
         offsets[g + 1] = total
         bounds[g, 0], bounds[g, 1], bounds[g, 2], bounds[g, 3] = j_low, j_high, s_low, s_high
-    return offsets, places[:total].copy(), values[:total].copy(), bounds
+    return offsets, places[:total], values[:total], bounds
