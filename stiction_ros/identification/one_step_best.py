@@ -57,6 +57,11 @@ class _Point:
     delays: Delays
     error: float
 
+    @property
+    def place(self) -> tuple[bytes, Delays]:
+        """What tells it from other points."""
+        return self.friction.tobytes(), self.delays
+
 
 def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> SearchLog:
     """Return the least SE and what it belongs to.
@@ -72,14 +77,15 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
     """
     search = _Search(record, data, orders)
     best = search.point(model.friction, model.delays)
-    seen: dict[int, tuple[bytes, Delays]] = {}
-    for _ in range(SWEEPS):
+    settled: dict[int, tuple[bytes, Delays]] = {}  # where a search of the valve found nothing
+    for _ in range(1 if len(data.u) == 1 else SWEEPS):
         before = best.error
         for valve in range(len(data.u)):
-            others = _others(best, valve)
-            if seen.get(valve) != others:  # else it has been searched beside just these
-                seen[valve] = others
+            at = best.place
+            if settled.get(valve) != at:
                 best = search.improved(best, valve)
+                if best.place == at:
+                    settled[valve] = at
         if best.error > before * (1.0 - 1e-9):
             break
     return SearchLog(
@@ -93,12 +99,6 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
         friction=tuple((float(f_s), float(f_d)) for f_s, f_d in best.friction),
         delays=best.delays,
     )
-
-
-def _others(point: _Point, valve: int) -> tuple[bytes, Delays]:
-    """Return the friction and the delays of all valves but one."""
-    friction = np.delete(point.friction, valve, axis=0).tobytes()
-    return friction, tuple(row[:valve] + row[valve + 1 :] for row in point.delays)
 
 
 class _Search:
