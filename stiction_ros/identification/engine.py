@@ -144,7 +144,8 @@ def linear_rivals(
             orders, output=orders.output + extra, input=orders.input + extra
         )
         own = dataclasses.replace(freed, delays=linear.delays)
-        rivals.append(refit(data, own, raised, warm=False))
+        known = raised == linear.fits[0].orders and not freed.friction.any()
+        rivals.append(linear if known else refit(data, own, raised, warm=False))
     best = min(rivals, key=lambda rival: rival.bic)
     return [*rivals, improve_delays(data, best, best.fits[0].orders)]
 

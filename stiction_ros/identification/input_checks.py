@@ -247,6 +247,9 @@ def _fit(
     They are a₁ … a_n with the sign turned, then b₀ … b_n of each other column. With the past
     alone b₀ is left out, and the relation need not be unique.
     """
+    # Compiled code takes half a second to import, which those who identify nothing save.
+    from stiction_ros.identification.exact_relation import explained_stretches
+
     count = len(own) - order
     columns = [own[order - i : order - i + count] for i in range(1, order + 1)]
     columns += [
@@ -261,6 +264,9 @@ def _fit(
     regressors, target = np.column_stack(columns) / scale, own[order:] / own.std()
     moving = target != 0.0
     starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
+    starts = starts[explained_stretches(regressors, target, starts, width, EXACT)]
+    if not len(starts):
+        return None
     rows = starts[:, None] + np.arange(width)
     left, singular, right = np.linalg.svd(regressors[rows], full_matrices=False)
     kept = singular > np.finfo(float).eps * width * singular[:, :1]

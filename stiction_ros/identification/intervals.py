@@ -131,10 +131,15 @@ def _deadbands(limit: float) -> FloatArray:
 def _without_standstill(
     data: Data, model: Model, orders: Orders, valve: int, scan: PatternScan, threshold: float
 ) -> PatternScan:
-    """Drop patterns in which the stem hardly moves unless the exact fit does not reject them."""
+    """Drop patterns in which the stem hardly moves unless the record does not reject them.
+
+    They are judged by the scan and, where that does not reject them, by the exact fit.
+    """
     still = (scan.moves < data.min_moves) & (np.arange(len(scan.loss)) > 0)
     if not still.any():
         return scan
+    if scan.loss[still].min() > scan.loss[~still].min() + threshold:
+        return dataclasses.replace(scan, loss=np.where(still, np.inf, scan.loss))
     index = int(np.where(still, scan.loss, np.inf).argmin())
     exact = with_valve(
         data,

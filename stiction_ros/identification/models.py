@@ -15,13 +15,14 @@ from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.scan import BATCH, OutputScan
-from stiction_ros.identification.stem_kernels import count_moves
+from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
 
 
 DelayRanges = tuple[tuple[int, int], ...]
+AllDelays = tuple[tuple[int, ...], ...]
 
 
 class Criterion(enum.Enum):
@@ -199,16 +200,15 @@ def scan_criteria(
     """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
     ranges = ranges or data.delays
     scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
-    u = data.u[valve]
+    u = np.ascontiguousarray(data.u[valve])
     start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    size = max(1, BATCH // len(u))
     loss = np.zeros((len(criteria), len(grid)))
     best = np.zeros((len(criteria), len(grid), len(data.y)), dtype=int)
     moves = np.zeros(len(grid))
-    for begin in range(0, len(grid), size):
-        rows = slice(begin, begin + size)
-        stems = simulate(data.law, grid[rows], u, start[rows])
-        moves[rows] = count_moves(stems)
+    for begin in range(0, len(grid), BATCH):
+        rows = slice(begin, begin + BATCH)
+        stems = stem_steps(data.law, grid[rows], u, start[rows])
+        moves[rows] = stems.moves
         for c, outputs in enumerate(scans):
             for i, scan in enumerate(outputs):
                 energy = scan.energy(stems)
@@ -274,9 +274,10 @@ def linear_model(data: Data, orders: Orders, base: Model | None = None) -> Model
         delays = tuple((data.delay[0],) * m for _ in range(p))
         base = Model(zero, np.zeros(m), data.u.copy(), delays, ())
     model = refit(data, _one_step_delays(data, base, orders), orders, warm=False)
+    tried = {model.delays}
     for _ in range(3):
         before = model.loss
-        model = improve_delays(data, model, orders)
+        model = improve_delays(data, model, orders, tried)
         if model.loss > before - 1e-3:
             break
     return model
@@ -289,23 +290,31 @@ def _one_step_delays(data: Data, model: Model, orders: Orders) -> Model:
         return model
     for j in range(len(data.u)):
         scans = output_scans(data, model, orders, j, Criterion.ONE_STEP, data.delays)
-        stem = model.stems[j][:, None]
+        stem = StepSignals.of(model.stems[j][:, None])
         best = [low + int(scan.energy(stem)[0].argmin()) for scan in scans]
         model = dataclasses.replace(model, delays=with_delays(model.delays, j, best))
     return model
 
 
-def improve_delays(data: Data, model: Model, orders: Orders) -> Model:
-    """Scan all delays of every channel with friction fixed; keep what the exact fit favours."""
+def improve_delays(
+    data: Data, model: Model, orders: Orders, tried: set[AllDelays] | None = None
+) -> Model:
+    """Scan all delays of every channel with friction fixed; keep what the exact fit favours.
+
+    Args:
+        tried: delays whose fits are known to be no better; what is fitted here is added.
+    """
     if data.delay[0] == data.delay[1]:
         return model
+    tried = set() if tried is None else tried
     for valve in range(len(data.u)):
         for criterion in (Criterion.FREE_RUN, Criterion.INNOVATIONS):
             friction = model.friction[valve][None, :]
             scan = scan_valve(data, model, orders, valve, friction, model.start[valve], criterion)
-            now = [row[valve] for row in model.delays]
-            if list(scan.delays[0]) == now:
+            delays = with_delays(model.delays, valve, scan.delays[0])
+            if delays == model.delays or delays in tried:
                 continue
+            tried.add(delays)
             rival = with_valve(
                 data,
                 model,

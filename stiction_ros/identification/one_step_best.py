@@ -33,8 +33,10 @@ from stiction_ros.identification.pattern_scan import PatternScan
 from stiction_ros.identification.pattern_search import (
     CELL_SAMPLES,
     SAMPLES,
+    PatternMap,
     PatternSearch,
     neighbourhood,
+    points_of,
 )
 from stiction_ros.identification.patterns import Beginning, beginning_of
 from stiction_ros.identification.search import zoom
@@ -55,6 +57,11 @@ class _Point:
     delays: Delays
     error: float
 
+    @property
+    def place(self) -> tuple[bytes, Delays]:
+        """What tells it from other points."""
+        return self.friction.tobytes(), self.delays
+
 
 def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> SearchLog:
     """Return the least SE and what it belongs to.
@@ -70,10 +77,15 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
     """
     search = _Search(record, data, orders)
     best = search.point(model.friction, model.delays)
+    settled: dict[int, tuple[bytes, Delays]] = {}  # where a search of the valve found nothing
     for _ in range(1 if len(data.u) == 1 else SWEEPS):
         before = best.error
         for valve in range(len(data.u)):
-            best = search.improved(best, valve)
+            at = best.place
+            if settled.get(valve) != at:
+                best = search.improved(best, valve)
+                if best.place == at:
+                    settled[valve] = at
         if best.error > before * (1.0 - 1e-9):
             break
     return SearchLog(
@@ -138,27 +150,34 @@ class _Search:
         scan = scan_valve(self.data, model, self.orders, valve, rows, 0.0, criterion, ranges)
         self.points += len(rows)
         search = PatternSearch(self.data, model, self.orders, valve, ranges, criterion=criterion)
+        enumerated: list[tuple[Beginning, PatternMap]] = []
         for index in scan.best(2, 0, 2.0 * step):
             friction = scan.grid[index]
             for begin in _beginnings(u, friction, 0.003 * limit):
-                best = self._in_cells(best, search, valve, friction, begin)
+                if not any(_holds(known, begin, friction) for known in enumerated):
+                    near = self._neighbourhood(search, friction, begin)
+                    enumerated.append((begin, near))
+                    best = self._in_cells(best, search, valve, near.scan, begin)
         return best
+
+    def _neighbourhood(
+        self, search: PatternSearch, friction: FloatArray, begin: Beginning
+    ) -> PatternMap:
+        most = min(MOST_CELLS, int(0.5 * CELL_SAMPLES / len(search.u)))
+        near = neighbourhood(search, begin, friction, 0.0, most)
+        self.points += near.patterns
+        return near
 
     def _in_cells(
         self,
         best: _Point,
         search: PatternSearch,
         valve: int,
-        friction: FloatArray,
+        scan: PatternScan,
         begin: Beginning,
     ) -> _Point:
-        """Return the best point of the switching patterns round ``friction``."""
+        """Return the best point of the switching patterns of ``scan``."""
         u = search.u
-        if begin.first == len(u):
-            return best
-        most = min(MOST_CELLS, int(0.5 * CELL_SAMPLES / len(u)))
-        scan = neighbourhood(search, begin, friction, 0.0, most).scan
-        self.points += len(scan.loss)
         error = np.abs(u[: begin.first + 1] - u[0])
         band = (float(error[:-1].max(initial=0.0)), float(error[-1]))
         polished = 0
@@ -222,7 +241,17 @@ def _beginnings(u: FloatArray, friction: FloatArray, reach: float) -> list[Begin
         beginning_of(u, float(u[0]), max(float(friction[0]) + shift, 0.0))
         for shift in (0.0, -reach, reach)
     ]
+    found = [begin for begin in found if begin.first < len(u)]
     return list({begin.first: begin for begin in reversed(found)}.values())
+
+
+def _holds(known: tuple[Beginning, PatternMap], begin: Beginning, friction: FloatArray) -> bool:
+    """Return whether a friction lies where all patterns of its beginning are known."""
+    before, near = known
+    jl, jh, sl, sh = near.rectangle
+    jump, reverse = points_of(friction[None, :])[0]
+    same = (before.first, before.direction) == (begin.first, begin.direction)
+    return bool(near.closed and same and jl <= jump <= jh and sl <= reverse <= sh)
 
 
 def _small(limit: float) -> FloatArray:

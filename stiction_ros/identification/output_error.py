@@ -19,22 +19,21 @@ import math
 
 import numpy as np
 from scipy.linalg import lapack
-from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.output_error_kernels import (
     Point,
     Problem,
+    arx_polynomial,
+    descend,
     evaluate,
     is_stable,
-    normal_equations,
+    loss_of,
 )
 from stiction_ros.identification.polynomials import stabilised
 
-FREE_RUN_WEIGHT = 0.02
 THIN = 4
-MAX_RADIUS = 0.9995
-HARDEST = 1e6  # damping
+START_RADIUS = 0.99
 ROUGH_GAIN = 0.3
 FINE_GAIN = 1e-3
 
@@ -97,17 +96,11 @@ class OutputFit:
         return self.loss + self.parameters * float(np.log(self.count))
 
 
-def equation_error_start(
-    y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders
-) -> FloatArray:
-    """Return A of the least-squares ARX model, (15), made stable; shape (n_a + 1,)."""
-    first, count = orders.first, len(y)
-    columns = [-y[first - i : count - i] for i in range(1, orders.output + 1)]
-    for stem, delay in zip(stems, delays, strict=True):
-        columns += [stem[first - delay - i : count - delay - i] for i in range(1, orders.input + 1)]
-    columns.append(np.ones(count - first))
-    theta = np.linalg.lstsq(np.stack(columns, axis=1), y[first:], rcond=1e-10)[0]
-    return stabilised(np.concatenate([[1.0], theta[: orders.output]]))
+def _equation_error_start(problem: Problem, a: FloatArray, order: int) -> FloatArray:
+    """Return A of the least-squares ARX model of data filtered by 1/A, (15), made stable."""
+    lags = -_difference_table(order).T @ arx_polynomial(problem, a, order)
+    a = np.concatenate([[1.0], lags])
+    return a if is_stable(a, START_RADIUS) else stabilised(a, START_RADIUS)
 
 
 def _problem(y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders) -> Problem:
@@ -148,12 +141,6 @@ def _innovations(problem: Problem, point: Point) -> FloatArray:
     return point.residual[: len(problem.y) - problem.first]
 
 
-def _energy_of_output(problem: Problem) -> float:
-    """Return Σy² over the window."""
-    y = problem.y[problem.first :]
-    return max(float(y @ y), 1e-300)
-
-
 @functools.cache
 def _difference_table(count: int) -> FloatArray:
     """Return T with differences = T · lags, shape (count, count)."""
@@ -178,43 +165,6 @@ def ar_fit(w: FloatArray, order: int) -> FloatArray:
     return np.concatenate([[1.0], -solution])
 
 
-def _descend(problem: Problem, point: Point, most: int, least_gain: float) -> Point:
-    """Levenberg-Marquardt over (a, d) from ``point``, Σw² priced by its innovations.
-
-    Ends after ``most`` iterations, or when one lowers the criterion by less than ``least_gain``.
-    """
-    innovations = _innovations(problem, point)
-    count, order = len(innovations), len(point.a) - 1
-    weight = FREE_RUN_WEIGHT * float(innovations @ innovations) / _energy_of_output(problem)
-    table, damping = _difference_table(order), 1e-4
-    point = evaluate(problem, point.a, point.noise, weight)
-    energy = float(point.residual @ point.residual)
-    for _ in range(most):
-        gram, gradient = normal_equations(problem, point, table)
-        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-        scale[scale < 1e-100] = 1.0  # a coefficient without influence stays where it is
-        gram /= np.outer(scale, scale)
-        gradient /= scale
-        before = energy
-        while damping < HARDEST:
-            step = -np.linalg.solve(gram + damping * np.eye(len(gram)), gradient) / scale
-            a, noise = point.a.copy(), point.noise.copy()
-            a[1:] += table.T @ step[:order]
-            noise[1:] += step[order:]
-            if is_stable(a, MAX_RADIUS):
-                candidate = evaluate(problem, a, noise, weight)
-                energy = float(candidate.residual @ candidate.residual)
-                if energy < before:
-                    break
-            damping *= 5.0
-        else:
-            return point
-        point, damping = candidate, max(damping / 10.0, 1e-9)
-        if (1.0 - energy / before) * count < least_gain and damping < 1e-5:
-            break
-    return point
-
-
 def fit_output(
     y: FloatArray,
     stems: FloatArray,
@@ -234,47 +184,37 @@ def fit_output(
             model with both noise placements and keeps the better.
     """
     problem = _problem(y, stems, delays, orders)
+    table = _difference_table(orders.output)
     if start is not None:
         starts = [evaluate(problem, start.a, start.noise, 0.0)]
     else:
-        a = equation_error_start(y, stems, delays, orders)
+        a = _equation_error_start(problem, np.ones(1), orders.output)
         padded = np.zeros(orders.noise + 1)
         short = min(len(a), len(padded))
         padded[:short] = a[:short]
         white = evaluate(problem, a, np.eye(1, orders.noise + 1)[0], 0.0)
-        refined = _steiglitz_mcbride(problem, delays, orders, white)
+        refined = _steiglitz_mcbride(problem, white)
         noise = ar_fit(y[problem.begin :] - refined.free_run, orders.noise)
         starts = [evaluate(problem, a, padded, 0.0), evaluate(problem, refined.a, noise, 0.0)]
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
-    rough = [_descend(problem, point, max_iterations, ROUGH_GAIN) for point in starts]
-    best = min(rough, key=lambda point: _loss(problem, point))
-    return _finished(problem, delays, orders, _descend(problem, best, max_iterations, FINE_GAIN))
+    rough = [descend(problem, point, table, max_iterations, ROUGH_GAIN) for point in starts]
+    best = min(rough, key=lambda point: loss_of(problem, point))
+    return _finished(
+        problem, delays, orders, descend(problem, best, table, max_iterations, FINE_GAIN)
+    )
 
 
-def _steiglitz_mcbride(
-    problem: Problem, delays: tuple[int, ...], orders: Orders, point: Point, iterations: int = 4
-) -> Point:
+def _steiglitz_mcbride(problem: Problem, point: Point, iterations: int = 4) -> Point:
     """Return a better white-noise start: ARX of data filtered by 1/A, repeated."""
     best, energy = point, float(point.residual @ point.residual)
     for _ in range(iterations):
-        driving = np.vstack([problem.y, problem.signals[:-2]])
-        filtered = lfilter([1.0], point.a, driving, axis=1)
-        a = equation_error_start(filtered[0], filtered[1:], delays, orders)
+        a = _equation_error_start(problem, point.a, len(point.a) - 1)
         point = evaluate(problem, a, point.noise, 0.0)
         reached = float(point.residual @ point.residual)
         if reached < energy:
             best, energy = point, reached
     return best
-
-
-def _loss(problem: Problem, point: Point) -> float:
-    """Return n log(Σε²/n) + n κ Σw²/Σy²."""
-    innovations = _innovations(problem, point)
-    count, energy = len(innovations), max(float(innovations @ innovations), 1e-300)
-    w = problem.y[problem.begin :] - point.free_run
-    penalty = FREE_RUN_WEIGHT * float(w @ w) / _energy_of_output(problem)
-    return count * (float(np.log(energy / count)) + penalty)
 
 
 def _finished(problem: Problem, delays: tuple[int, ...], orders: Orders, point: Point) -> OutputFit:
@@ -288,7 +228,7 @@ def _finished(problem: Problem, delays: tuple[int, ...], orders: Orders, point: 
         b=theta[: valves * orders.input].reshape(valves, orders.input),
         constant=float(theta[valves * orders.input]),
         noise=point.noise,
-        loss=_loss(problem, point),
+        loss=loss_of(problem, point),
         energy=max(float(innovations @ innovations), 1e-300),
         count=len(innovations),
         free_run=point.free_run,

@@ -13,6 +13,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.level_kernels import best_levels
 from stiction_ros.identification.models import (
     Criterion,
     Data,
@@ -33,8 +34,7 @@ from stiction_ros.identification.patterns import (
     levels_of,
     resting_cells,
 )
-from stiction_ros.identification.scan import BATCH, PatternEnergy
-from stiction_ros.identification.stem_kernels import count_moves
+from stiction_ros.identification.step_signals import StepSignals
 
 MOST_CELLS = 3000
 CELL_SAMPLES = 3e7
@@ -42,7 +42,6 @@ SAMPLES = 6000  # up to which neighbourhoods are of full size
 REJECTED = 1.0
 GROWTHS = 14
 MARGIN = 6.0
-ZOOMS = 16
 ROUNDS = 4
 MOST_LEVELS = 30
 LEAST_GAIN = 0.3
@@ -70,18 +69,10 @@ class PatternSearch:
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D."""
-        size = max(1, BATCH // len(self.u))
-        parts = [
-            self._evaluate(cells.part(slice(i, i + size)))
-            for i in range(0, len(cells.bounds), size)
-        ]
-        return PatternScan.joined(parts)
-
-    def _evaluate(self, cells: Cells) -> PatternScan:
         dynamic = cells.dynamic
         dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
-        level, curvature, loss, delays = self.minimised(cells.bases, cells.signs, dynamic)
-        moves = count_moves(np.ascontiguousarray(cells.bases)).astype(float)
+        level, curvature, loss, delays = self._minimised(cells.steps, dynamic)
+        moves = cells.steps.moves.astype(float)
         return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
 
     def best_level(self, friction: FloatArray) -> float:
@@ -135,38 +126,24 @@ class PatternSearch:
         Returns:
             Best level (G,), second derivative (G,), loss (G,), delays (G, p).
         """
-        energies = [scan.patterns(bases, signs) for scan in self.scans]
-        low, high = ranges[:, 0], ranges[:, 1]
-        rows = np.arange(bases.shape[1])
-        for _ in range(ZOOMS):
-            levels = low[:, None] + np.linspace(0.0, 1.0, 5) * (high - low)[:, None]
-            loss, delays = self._loss_at(energies, levels)
-            best = loss.argmin(axis=1)
-            middle = np.clip(best, 1, 3)
-            left, centre, right = (loss[rows, middle + i] for i in (-1, 0, 1))
-            step = np.maximum(0.25 * (high - low), 1e-300)
-            low, high = levels[rows, middle - 1], levels[rows, middle + 1]
-            second = np.maximum(left - 2.0 * centre + right, 0.0)
-            if second.max() < 1.0:  # the parabola through three points is exact enough
-                break
-        slope = 0.5 * (left - right)
-        shift = slope / np.maximum(second, 1e-300)
-        inside = (np.abs(shift) < 1.0) & (second > 0.0)
-        level = levels[rows, best]
-        level = np.where(inside, levels[rows, middle] + shift * step, level)
-        lowest = np.where(inside, centre - 0.5 * slope * shift, loss[rows, best])
-        return level, second / step**2, lowest, delays[rows, best]
+        return self._minimised(StepSignals.of(bases, signs), ranges)
 
-    def _loss_at(
-        self, energies: list[PatternEnergy], levels: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return loss (G, F) and best delays (G, F, p) at levels (G, F)."""
-        loss, delays = np.zeros(levels.shape), []
-        for scan, energy, delay in zip(self.scans, energies, self.ranges, strict=True):
-            values = energy(levels)
-            delays.append(values.argmin(axis=2) + delay[0])
-            loss += self.criterion.loss(values.min(axis=2), scan.count)
-        return loss, np.stack(delays, axis=2)
+    def _minimised(
+        self, patterns: StepSignals, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Minimise as :meth:`minimised` does, of base and sign as two channels."""
+        energies = [scan.patterns(patterns) for scan in self.scans]
+        widest = max(energies, key=lambda energy: energy.delays)
+        products = np.zeros((patterns.size, len(energies), *widest.products.shape[1:]))
+        rights = np.zeros((patterns.size, len(energies), *widest.rights.shape[1:]))
+        scales = np.zeros((len(energies), 3))
+        for i, (scan, energy) in enumerate(zip(self.scans, energies, strict=True)):
+            lags = energy.rights.shape[2]
+            products[:, i, :, :, :lags], rights[:, i, :, :lags] = energy.products, energy.rights
+            counted = 0 if self.criterion is Criterion.SQUARED_ERROR else scan.count
+            scales[i] = scan.rest_energy, counted, energy.delays
+        levels, second, loss, delays = best_levels(products, rights, scales, ranges)
+        return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
 
     def enumerate(self, begin: Beginning, rectangle: FloatArray, most: int) -> PatternScan | None:
         """Return all cells that meet the rectangle (J low, J high, S low, S high).
@@ -175,16 +152,15 @@ class PatternSearch:
             most: largest number of cells; None comes back when there are more.
         """
         todo = self._admissible(rectangle[None, :])
-        found: list[PatternScan] = [self._nothing()]
+        met: list[Cells] = []
         count = 0
         while len(todo):
             count += len(todo)
             if count > most:
                 return None
-            cells = cells_at(self.u, begin, _points(todo), self.law)
-            found.append(self.evaluate(cells))
-            todo = self._admissible(_remainders(todo, cells.bounds))
-        return PatternScan.joined(found)
+            met.append(cells_at(self.u, begin, _points(todo), self.law))
+            todo = self._admissible(_remainders(todo, met[-1].bounds))
+        return PatternScan.joined([self._nothing(), *map(self.evaluate, met)])
 
     def _nothing(self) -> PatternScan:
         flat = np.empty(0)

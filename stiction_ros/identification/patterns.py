@@ -24,7 +24,8 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.moving_patterns import RULES
-from stiction_ros.identification.stem_kernels import cell_bounds, he_patterns
+from stiction_ros.identification.step_kernels import he_pattern_steps
+from stiction_ros.identification.step_signals import StepSignals
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,13 +49,21 @@ class Cells:
 
     Attributes:
         bounds: rows (J low, J high, S low, S high), %, shape (G, 4).
-        bases: u at the last slip, before the first slip the stem's level, shape (N, G).
-        signs: direction of the last slip, 0 before the first, shape (N, G).
+        steps: base and sign as two channels.
     """
 
     bounds: FloatArray
-    bases: FloatArray
-    signs: FloatArray
+    steps: StepSignals
+
+    @property
+    def bases(self) -> FloatArray:
+        """OP at the last slip, before the first slip the stem's level, shape (N, G)."""
+        return self.steps.dense(0)
+
+    @property
+    def signs(self) -> FloatArray:
+        """Direction of the last slip, 0 before the first, shape (N, G)."""
+        return self.steps.dense(1)
 
     @property
     def dynamic(self) -> FloatArray:
@@ -62,10 +71,6 @@ class Cells:
         low = 0.5 * (self.bounds[:, 2] - self.bounds[:, 1])
         high = 0.5 * (self.bounds[:, 3] - self.bounds[:, 0])
         return np.stack([np.maximum(low, 0.0), high], axis=1)
-
-    def part(self, rows: slice) -> Cells:
-        """Return some of the cells."""
-        return Cells(self.bounds[rows], self.bases[:, rows], self.signs[:, rows])
 
 
 def has_cells(law: type[FrictionLaw]) -> bool:
@@ -156,15 +161,17 @@ def _moving_cells(
         rules.trace(point, level, first)
         for point, level in zip(points.tolist(), levels.tolist(), strict=True)
     ]
-    return Cells(
-        np.array([trace.bounds for trace in traces]).reshape(-1, 4),
-        np.array([trace.base for trace in traces]).reshape(-1, len(u)).T,
-        np.array([trace.sign for trace in traces]).reshape(-1, len(u)).T,
+    bases, signs = (
+        np.array([getattr(trace, name) for trace in traces]).reshape(-1, len(u)).T
+        for name in ("base", "sign")
     )
+    bounds = np.array([trace.bounds for trace in traces]).reshape(-1, 4)
+    return Cells(bounds, StepSignals.of(bases, signs))
 
 
 def _cells(u: FloatArray, points: FloatArray, level: FloatArray, begin: Beginning | None) -> Cells:
     jump, reverse = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
     first, direction = (-1, 0.0) if begin is None else (begin.first, begin.direction)
-    bases, signs = he_patterns(u, jump, reverse, level, first, direction)
-    return Cells(cell_bounds(u, bases, signs), bases, signs)
+    found = he_pattern_steps(u, jump, reverse, level, first, direction)
+    offsets, places, values, bounds = found
+    return Cells(bounds, StepSignals(len(u), offsets, places, values))

@@ -28,7 +28,7 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
     free = 2 * orders.output + len(record.valves) * orders.input + orders.noise + 3
     needed = orders.first + max(MIN_SAMPLES, 5 * free)
     require_samples(record, needed, TOO_SHORT)
-    u, y = record.op.T, record.pv.T
+    u, y = np.ascontiguousarray(record.op.T), np.ascontiguousarray(record.pv.T)
     span = np.ptp(u, axis=1)
     limit = span if options.friction_limit is None else np.minimum(span, options.friction_limit)
     return Data(

@@ -12,15 +12,17 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.filter_kernels import Window
+from stiction_ros.identification.level_kernels import pattern_energy
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
-    explained_energy,
-    filtered,
-    lagged_products,
-    subtract_projections,
+    delay_energy,
+    step_products,
 )
+from stiction_ros.identification.step_signals import StepSignals
 
-BATCH = 160_000  # samples of all stems of a batch together, which stay in the cache
+BATCH = 2000  # signals that are worked on together
+EXPLAINED = 1e-7  # of a column, below which the others explain it
 
 
 class OutputScan:
@@ -48,111 +50,105 @@ class OutputScan:
         denominator: FloatArray,
         free: FloatArray | None = None,
     ) -> None:
-        self.orders, self.delay = orders, delay
-        self.numerator = np.asarray(numerator, dtype=float)
-        self.denominator = np.asarray(denominator, dtype=float)
-        self.plain = len(self.numerator) == 1 and len(self.denominator) == 1
+        self._numerator = np.asarray(numerator, dtype=float)
+        self._denominator = np.asarray(denominator, dtype=float)
         first, count = orders.first, len(y)
         target = self._filtered(y)
         columns = [target[first - i : count - i] for i in range(1, orders.output + 1)]
         for stem, lag in zip(self._filtered(others), other_delays, strict=True):
             columns += [stem[first - lag - i : count - lag - i] for i in range(1, orders.input + 1)]
         columns.append(self._filtered(np.ones(count))[first:])
-        self.lags = range(delay[0] + 1, delay[1] + orders.input + 1)
+        lags = range(delay[0] + 1, delay[1] + orders.input + 1)
         if free is not None:
             filtered = self._filtered(free)
-            columns += [filtered[first - lag : count - lag] for lag in self.lags]
+            columns += [filtered[first - lag : count - lag] for lag in lags]
         impulse = np.zeros(count)
         impulse[first - orders.noise - len(denominator)] = 1.0
         impulse = self._filtered(impulse)
         columns += [impulse[first - i : count - i] for i in range(len(denominator) - 1)]
-        matrix = np.stack(columns, axis=1)
-        matrix /= np.sqrt(np.einsum("ij,ij->j", matrix, matrix)) + 1e-300
-        left, values, _ = np.linalg.svd(matrix, full_matrices=False)
-        basis = left[:, values > 1e-7 * values[0]]
-        rest = target[first:] - basis @ (basis.T @ target[first:])
+        basis = orthonormal(np.stack(columns), EXPLAINED)
+        rest = target[first:] - (basis @ target[first:]) @ basis
         self.count = count - first
         self.rest_energy = max(float(rest @ rest), 1e-300)
-        # One column block per lag, so that all projections are one matrix product.
-        self.width = basis.shape[1] + 1
-        projector = np.zeros((count, len(self.lags), self.width))
-        for position, lag in enumerate(self.lags):
-            projector[first - lag : count - lag, position, :-1] = basis
-            projector[first - lag : count - lag, position, -1] = rest
-        self._projector = projector.reshape(count, -1)
-
-    def projected(self, x: FloatArray) -> FloatArray:
-        """Return the products of lagged signals with basis and rest, shape (L, q + 1, G)."""
-        return (self._projector.T @ x).reshape(len(self.lags), self.width, -1)
+        backwards = np.zeros((len(basis) + 1, count))
+        backwards[:-1, : self.count] = basis[:, ::-1]
+        backwards[-1, : self.count] = rest[::-1]
+        tails = np.zeros((count + lags[-1] + 1, len(backwards)))
+        tails[:count] = np.cumsum(self._filtered(backwards), axis=1)[:, ::-1].T
+        self._window = Window(
+            count,
+            first,
+            lags[0],
+            len(lags),
+            orders.input,
+            tails,
+            self._numerator,
+            self._denominator,
+        )
 
     def _filtered(self, x: FloatArray) -> FloatArray:
         """Return what the prefilter makes of signals, time along the last axis."""
-        if self.plain:
+        if len(self._numerator) == 1 and len(self._denominator) == 1:
             return x
-        return np.asarray(lfilter(self.numerator, self.denominator, x, axis=-1))
+        return np.asarray(lfilter(self._numerator, self._denominator, x, axis=-1))
 
-    def energy(self, stems: FloatArray) -> FloatArray:
-        """Return SE, shape (G, T), for stems of shape (N, G) and T delays."""
-        batch = _Batch(self, stems)
-        return self._energy(batch.products(batch), batch.right)
+    def energy(self, stems: StepSignals) -> FloatArray:
+        """Return SE, shape (G, T), for G stems and T delays."""
+        products, right = step_products(self._window, stems.offsets, stems.places, stems.values)
+        return delay_energy(products, right, self.rest_energy)
 
-    def patterns(self, bases: FloatArray, signs: FloatArray) -> PatternEnergy:
-        """Return SE of the stems base − level · sign as a function of the level.
-
-        Args:
-            bases, signs: shape (N, G).
-        """
-        x, s = _Batch(self, bases), _Batch(self, signs)
-        cross = x.products(s) + s.products(x)
-        return PatternEnergy(self, (x.products(x), cross, s.products(s)), (x.right, s.right))
-
-    def _energy(self, products: FloatArray, right: FloatArray) -> FloatArray:
-        """Return SE, shape (G, T), from lagged products (n_b, L, G) and right-hand side (L, G)."""
-        explained = explained_energy(products, right)
-        # What the rest explains to the last digit says nothing: its products are rounding.
-        explained[explained > self.rest_energy * (1.0 + 1e-9)] = 0.0
-        return np.asarray(np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy))
-
-
-class _Batch:
-    """Prefiltered signals, shape (N, G), and their products with basis and rest."""
-
-    def __init__(self, scan: OutputScan, signals: FloatArray) -> None:
-        self._scan = scan
-        signals = np.ascontiguousarray(signals, dtype=float)
-        self.x = signals if scan.plain else filtered(scan.numerator, scan.denominator, signals)
-        self._projected = scan.projected(self.x)
-
-    @property
-    def right(self) -> FloatArray:
-        """Products with the rest, shape (L, G)."""
-        return self._projected[:, -1]
-
-    def products(self, other: _Batch) -> FloatArray:
-        """Return lagged products of what the basis leaves of both, shape (n_b, L, G)."""
-        scan = self._scan
-        orders, lags = scan.orders, scan.lags
-        out = lagged_products(self.x, other.x, orders.first, lags[0], len(lags), orders.input)
-        if other is self:  # a ridge, as a stem that stands still says nothing
-            out[0] *= 1.0 + 1e-13
-            out[0] += 1e-200
-        subtract_projections(out, self._projected[:, :-1], other._projected[:, :-1])
-        return out
+    def patterns(self, patterns: StepSignals) -> PatternEnergy:
+        """Return SE of the stems base − level · sign, the two channels, by the level."""
+        products, rights = step_products(
+            self._window, patterns.offsets, patterns.places, patterns.values
+        )
+        return PatternEnergy(products, rights, self.rest_energy)
 
 
 class PatternEnergy:
-    """SE of switching patterns as a function of f_D; the stem is affine in it."""
+    """SE of switching patterns as a function of f_D; the stem is affine in it.
 
-    def __init__(
-        self,
-        scan: OutputScan,
-        products: tuple[FloatArray, FloatArray, FloatArray],
-        rights: tuple[FloatArray, FloatArray],
-    ) -> None:
-        self._scan, self._products, self._rights = scan, products, rights
+    Attributes:
+        products: of what the columns leave of base with base, base with sign and sign with
+            sign, shape (G, 3, n_b, L).
+        rights: of base and sign with the rest, shape (G, 2, L).
+    """
+
+    def __init__(self, products: FloatArray, rights: FloatArray, rest_energy: float) -> None:
+        self.products, self.rights, self._rest_energy = products, rights, rest_energy
+
+    @property
+    def delays(self) -> int:
+        """T, number of delays."""
+        return int(self.products.shape[3] - self.products.shape[2] + 1)
 
     def __call__(self, levels: FloatArray) -> FloatArray:
         """Return SE, shape (G, F, T), for f_D of shape (G, F)."""
-        (xx, cross, ss), (x, s) = self._products, self._rights
-        parts = [self._scan._energy(xx - f * cross + f**2 * ss, x - f * s) for f in levels.T]
-        return np.stack(parts, axis=1)
+        out = np.empty((*levels.shape, self.delays))
+        for g, row in enumerate(levels):
+            for f, level in enumerate(row.tolist()):
+                pattern_energy(
+                    self.products[g], self.rights[g], level, self._rest_energy, out[g, f]
+                )
+        return out
+
+
+def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
+    """Return orthonormal rows that span the given rows, shape (q, n).
+
+    Rows of which those before leave less than ``tolerance`` are left out.
+    """
+    out = np.empty_like(columns)
+    kept = 0
+    for row in columns:
+        size = float(np.sqrt(row @ row))
+        if size < 1e-150:
+            continue
+        now = row / size
+        for _ in range(2 if kept else 0):  # twice is enough for orthogonality to the last digit
+            now -= (out[:kept] @ now) @ out[:kept]
+        size = float(np.sqrt(now @ now))
+        if size > tolerance:
+            out[kept] = now / size
+            kept += 1
+    return out[:kept]

@@ -138,7 +138,7 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
 def _elsewhere(data: Data, model: Model, orders: Orders, valve: int) -> tuple[Elsewhere, ...]:
     limit, start = float(data.limit[valve]), float(model.start[valve])
     points = WORK / (data.y.shape[1] * len(BEGINNINGS))
-    grid = even_grid(limit, min(STEPS, int(np.sqrt(points))))
+    grid = even_grid(limit, min(STEPS // 2, int(np.sqrt(points))))
     found = []
     for share in BEGINNINGS:
         starts = start + share * grid[:, 0]

@@ -17,6 +17,7 @@ from stiction_ros.identification.pattern_search import (
 )
 from stiction_ros.identification.patterns import beginning_of, cells_at
 from stiction_ros.identification.preparation import prepare, window
+from stiction_ros.identification.step_signals import StepSignals
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def test_no_point_of_the_rectangle_beats_its_cells(
     f_d = 0.5 * (reverse - jump)
     stem = cells.bases - f_d * cells.signs
     scan = search.scans[0]
-    point = scan.count * float(np.log(scan.energy(stem).min() / scan.count))
+    point = scan.count * float(np.log(scan.energy(StepSignals.of(stem)).min() / scan.count))
     assert found.loss.min() <= point + 1e-6
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan import OutputScan
+from stiction_ros.identification.step_signals import StepSignals
 
 
 @settings(max_examples=25, deadline=None)
@@ -18,7 +19,7 @@ def test_one_step_criterion_is_the_least_squares_one(seed: int, na: int, nb: int
     orders = Orders(na, nb, 2, 20)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 200)), (), orders, (0, 4), one, one)
-    energy = scan.energy(stems)
+    energy = scan.energy(StepSignals.of(stems))
     for g in range(3):
         for delay in range(5):
             columns = [y[20 - i : 200 - i] for i in range(1, na + 1)]
@@ -39,9 +40,9 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     levels = generator.random((4, 3))
     a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
     scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
-    energy = scan.patterns(bases, signs)(levels)
+    energy = scan.patterns(StepSignals.of(bases, signs))(levels)
     for f in range(3):
-        expected = scan.energy(bases - levels[:, f] * signs)
+        expected = scan.energy(StepSignals.of(bases - levels[:, f] * signs))
         assert energy[:, f] == pytest.approx(expected, rel=1e-7)
 
 
@@ -51,7 +52,7 @@ def test_stem_that_the_rest_explains_to_the_last_digit_explains_nothing() -> Non
     stems = np.stack([np.roll(y, 2), np.full(300, 1e6), np.zeros(300), y[::-1]], axis=1)
     one = np.ones(1)
     scan = OutputScan(y, np.empty((0, 300)), (), Orders(4, 2, 0, 20), (0, 3), one, one)
-    energy = scan.energy(stems)
+    energy = scan.energy(StepSignals.of(stems))
     assert np.isfinite(energy).all()
     assert energy[1:3] == pytest.approx(scan.rest_energy, rel=1e-6)
     assert (energy[0] > 0.9 * scan.rest_energy).all()
