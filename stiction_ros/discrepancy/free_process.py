@@ -85,12 +85,21 @@ def score_with_free_process(
     better = _shared(base, found)
     found = [dataclasses.replace(f, fit=_against(f.fit, base, better)) for f in found]
     strangers = _other_dynamics(better)
-    fits = sorted([*(f.fit for f in found), *strangers], key=lambda fit: -fit.delta_bic)
+    capped = [_no_luck(fit) for fit in (*(f.fit for f in found), *strangers)]
+    fits = sorted(capped, key=lambda fit: -fit.delta_bic)
     models: dict[tuple[str, str], LoopModel] = {}
     for each in sorted(found, key=lambda f: -f.fit.delta_bic):
         models.setdefault(each.name, with_equations(better.run.model, each.equations))
     tried = (*told, *(stranger.candidate for stranger in strangers))
     return FreeScores(Scores(better, tried, tuple(fits)), models)
+
+
+def _no_luck(fit: CandidateFit) -> CandidateFit:
+    """Return the fit, what it gains on held-out rows no more than on the fitted ones.
+
+    More than that is the luck of the other process behind it, not the effect's.
+    """
+    return dataclasses.replace(fit, held_gain=min(fit.held_gain, max(fit.delta_bic, 0.0)))
 
 
 def in_doubt_of_place(base: Baseline, decision: Decision) -> Decision:
