@@ -182,7 +182,7 @@ def _family(
     """Return stiction or backlash by the test of the jump, and the other one in doubt."""
     if best.candidate.effect not in FRICTION:
         return best, ()
-    rivals = [f for f in ranked if _same_family(f, best) and f.evidence > 0.0]
+    rivals = [f for f in ranked if _same_family(f, best) and f.evidence > 0.0 and confirmed(f)]
     jumping = [f for f in rivals if f.candidate.effect == "stiction"]
     plain = [f for f in rivals if f.candidate.effect == "backlash"]
     if not jumping or not plain:

@@ -13,12 +13,12 @@ import numpy as np
 
 from stiction_ros.discrepancy.free_equation import Equation, Problem
 from stiction_ros.discrepancy.noise import projector
-from stiction_ros.effects import FloatArray
-from stiction_ros.identification.scan_kernels import (
+from stiction_ros.discrepancy.stem_scan_kernels import (
     explained_energy,
     filtered,
     subtract_projections,
 )
+from stiction_ros.effects import FloatArray
 
 _TINY = 1e-300
 
