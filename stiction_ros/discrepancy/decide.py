@@ -90,7 +90,7 @@ def decide(
     best = kept[0]
     if stranger is not None and stranger.evidence > best.evidence and not _part(best, stranger):
         return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
-    best, family = _family(best, ranked, departures)
+    best, family = friction_kind(best, ranked, departures)
     rivals = [
         f
         for f in ranked
@@ -174,12 +174,18 @@ def _same_family(one: CandidateFit, other: CandidateFit) -> bool:
     return friction and one.candidate.place == other.candidate.place
 
 
-def _family(
+def friction_kind(
     best: CandidateFit,
     ranked: Sequence[CandidateFit],
     departures: Callable[[CandidateFit], int],
 ) -> tuple[CandidateFit, tuple[tuple[str, str], ...]]:
-    """Return stiction or backlash by the test of the jump, and the other one in doubt."""
+    """Return stiction or backlash by the test of the jump, and the other one in doubt.
+
+    Args:
+        best: any fit; what is no friction is returned as it is.
+        ranked: all fits, the best one first.
+        departures: how often the stem of a fit leaves a rest.
+    """
     if best.candidate.effect not in FRICTION:
         return best, ()
     rivals = [f for f in ranked if _same_family(f, best) and f.evidence > 0.0 and confirmed(f)]

@@ -116,10 +116,29 @@ def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Fre
     return FreeRun(with_effects(bare, effects), runs, leads)
 
 
+def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> Baseline:
+    """Return the baseline of a model with effects, their linear figures left open.
+
+    A drift, a sine or a gain that was found beside something that was not yet in the model is
+    a little wrong; what comes next is fitted together with it.
+    """
+    return left_open(Baseline.of(run_with(bare, runs, others)), others)
+
+
+def left_open(base: Baseline, added: Sequence[AddedEffect]) -> Baseline:
+    """Return the baseline with the linear figures of added effects among the free columns."""
+    columns = list(base.columns)
+    for effect in added:
+        candidate, point = effect.fit.candidate, effect.fit.point
+        if candidate.factors:
+            for i, sizes in candidate.respond(base.run, point[None, :]).sizes.items():
+                columns[i] = np.hstack([columns[i], sizes[:, 0]])
+    return Baseline.of(base.run, columns=columns) if added else base
+
+
 def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
     """Return effect k fitted again behind all others."""
-    others = effects[:k] + effects[k + 1 :]
-    base = Baseline.of(run_with(bare, runs, others))
+    base = base_beside(bare, runs, effects[:k] + effects[k + 1 :])
     candidate = same_candidate(all_candidates(base), effects[k].fit.candidate)
     if candidate is None:
         return effects[k]

@@ -151,7 +151,7 @@ class FreeRun:
         first = np.zeros(len(self.runs), dtype=bool)
         for rows in self.runs.slices:
             first[rows.start : rows.start + self.responses.skip + MAX_ORDER] = True
-        usable = self.runs.usable[output] & ~first
+        usable = _with_past(self.runs.usable[output]) & ~first
         size = max(len(self.runs) // BLOCKS, SHORTEST_BLOCK)
         kept = np.zeros(len(self.runs), dtype=bool)
         for r, rows in enumerate(self.runs.slices):
@@ -221,3 +221,11 @@ class FreeRun:
             if effect.effect not in DETERMINED:
                 shown = effect.simulate(shown, float(shown[0]), self.runs.sample_time)
         return np.asarray(shown - values)
+
+
+def _with_past(usable: BoolArray) -> BoolArray:
+    """Return the usable rows whose noise can be foretold: the rows before them are usable too."""
+    found = usable.copy()
+    for lag in range(1, MAX_ORDER + 1):
+        found[lag:] &= usable[:-lag]
+    return found

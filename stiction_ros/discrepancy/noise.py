@@ -19,6 +19,7 @@ from stiction_ros.effects import FloatArray
 
 MAX_ORDER = 6
 ROUNDS = 4
+SURPRISE = 5.0  # standard deviations that one held-out row may count
 _TINY = 1e-300
 
 BoolArray = NDArray[np.bool_]
@@ -51,7 +52,8 @@ class NoiseFit:
         residual: r, shape (N,).
         minus_two_log: n (log 2πσ² + 1) on the n training rows.
         rows: n.
-        held_minus_two_log: −2 log likelihood of the held-out rows with the trained figures.
+        held_minus_two_log: −2 log likelihood of the held-out rows with the trained figures;
+            innovations beyond 5 σ count as 5 σ, so that no single row outweighs all others.
         held_rows: their number.
     """
 
@@ -120,7 +122,7 @@ def fit_noise(
 
 
 def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:
-    rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held)
+    rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
     variance = max(inside / max(rows, 1), _TINY)
     log = math.log(2.0 * math.pi * variance)
     return NoiseFit(

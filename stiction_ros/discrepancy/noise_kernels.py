@@ -238,16 +238,19 @@ def best_autoregression(
 
 @compiled
 def sums_of_squares(
-    residual: FloatArray, ar: FloatArray, train: BoolArray, held: BoolArray
+    residual: FloatArray, ar: FloatArray, train: BoolArray, held: BoolArray, most: float
 ) -> tuple[int, float, int, float]:
-    """Return number and squared innovations of the fitted rows, then of those kept back."""
+    """Return number and squared innovations of the fitted rows, then of those kept back.
+
+    Innovations kept back beyond ``most`` standard deviations of the fitted ones count as those.
+    """
     inside, outside = whitened_rows(residual, ar, train), whitened_rows(residual, ar, held)
-    return (
-        len(inside),
-        inner_product(inside, inside),
-        len(outside),
-        inner_product(outside, outside),
-    )
+    total = inner_product(inside, inside)
+    cap = most * most * total / max(len(inside), 1)
+    kept = 0.0
+    for n in range(len(outside)):
+        kept += min(outside[n] * outside[n], cap)
+    return len(inside), total, len(outside), kept
 
 
 @compiled

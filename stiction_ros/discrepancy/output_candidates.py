@@ -78,7 +78,7 @@ class PoleCandidate(FilterCandidate):
         """Take the output's index."""
         super().__init__(run, output, ExtraPole, lag_axis(run))
         span = float(np.ptp(run.forced[:, output]))
-        self.axes = (*self.axes, Axis(-span, span, 1, linear=True))
+        self.axes = (*self.axes, Axis(-10.0 * span, 10.0 * span, 1, linear=True))
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         return first + points[:, 1]

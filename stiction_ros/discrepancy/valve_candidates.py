@@ -141,10 +141,15 @@ class SaturationCandidate(ValveCandidate):
 
 
 def departures(run: FreeRun, candidate: Candidate, point: FloatArray) -> int:
-    """Return how often a candidate's stem leaves a rest; 0 for what acts at no valve."""
+    """Return how often a candidate's stem leaves a rest.
+
+    0 for what acts at no valve, and where the stem never travels half as far as its band.
+    """
     if not isinstance(candidate, ValveCandidate):
         return 0
     stems = candidate.stems(run, point[None, :])[:, 0]
+    if float(np.ptp(stems)) < 0.5 * float(point[0]):
+        return 0
     moving = [np.diff(stems[rows]) != 0.0 for rows in run.runs.slices]
     return sum(int((each[1:] & ~each[:-1]).sum()) for each in moving)
 
@@ -183,7 +188,7 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         ValveCandidate(
             run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
         ),
-        LagCandidate(run, j, Lag, (lag_axis(run), Axis(-span, span, 1, linear=True))),
+        LagCandidate(run, j, Lag, (lag_axis(run), Axis(-2.0 * span, 2.0 * span, 1, linear=True))),
         SaturationCandidate(run, j, Saturation, (Axis(low, lower, 10), Axis(upper, high, 10))),
         ValveCandidate(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -13,8 +14,22 @@ from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, sc
 from stiction_ros.discrepancy.chance import stored_threshold
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
-from stiction_ros.discrepancy.decide import Decision, GapVerdict, decide
-from stiction_ros.discrepancy.extend import AddedEffect, Extension, extend, moved_away, run_with
+from stiction_ros.discrepancy.decide import (
+    FRICTION,
+    Decision,
+    GapVerdict,
+    decide,
+    friction_kind,
+)
+from stiction_ros.discrepancy.extend import (
+    AddedEffect,
+    Extension,
+    base_beside,
+    extend,
+    left_open,
+    moved_away,
+    run_with,
+)
 from stiction_ros.discrepancy.free_intervals import with_free_process
 from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
@@ -30,7 +45,7 @@ from stiction_ros.discrepancy.process_refit import (
 )
 from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
 from stiction_ros.discrepancy.say import experiment_for, overall
-from stiction_ros.discrepancy.search import Baseline
+from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
 from stiction_ros.discrepancy.testable import Testable, testable_effects
 from stiction_ros.discrepancy.uncertainty import (
     Intervals,
@@ -115,6 +130,8 @@ class _Workflow:
                 break
         while self.added and moved_away(self.base_before, self.base):
             self._withdraw()
+        if len(self.added) > 1 and not self.options.free_process:
+            self._tell_friction_again()
         return self._result(testable)
 
     def _withdraw(self) -> None:
@@ -126,27 +143,58 @@ class _Workflow:
         withdrawn = dataclasses.replace(self.looks[last], kept=False, reason=reason)
         self.looks = [*self.looks[:last], withdrawn]
 
+    def _tell_friction_again(self) -> None:
+        """Test for the jump of sticky valves again, with what was found later in the model."""
+        for k, effect in enumerate(self.added):
+            if effect.effect not in FRICTION:
+                continue
+            base = self._beside(k)
+            run = base.run
+            rivals = [
+                candidate
+                for candidate in all_candidates(base)
+                if candidate.place == effect.place and candidate.effect in FRICTION
+            ]
+            fits = sorted(
+                (fit_candidate(base, run.gap, each) for each in rivals),
+                key=lambda fit: -fit.evidence,
+            )
+            best, doubts = friction_kind(fits[0], fits, functools.partial(_departures, run))
+            behaviour = best.behaviour(run)
+            assert behaviour is not None
+            told = AddedEffect(best, behaviour, doubts)
+            self.added = (*self.added[:k], told, *self.added[k + 1 :])
+        self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
+
+    def _beside(self, k: int) -> Baseline:
+        """Return the baseline with all added effects but one."""
+        return base_beside(self.bare, self.runs, [*self.added[:k], *self.added[k + 1 :]])
+
     def _look(self, k: int) -> tuple[Look, tuple[Testable, ...]]:
         share = 1.0 / (self.options.most_effects + 1)
-        candidates = all_candidates(self.base, self.controller.clock_known)
-        scores, models = self._score(candidates, lambda done: self.report((k + 0.8 * done) * share))
+        base = self.base if self.options.free_process else left_open(self.base, self.added)
+        candidates = all_candidates(base, self.controller.clock_known)
+        scores, models = self._score(
+            base, candidates, lambda done: self.report((k + 0.8 * done) * share)
+        )
+        base = scores.base
         if self.options.quick:
             chance = stored_threshold(sum(each.inside for each in candidates))
         else:
-            chance = chance_threshold(self.base, candidates, self.random)
+            chance = chance_threshold(base, candidates, self.random)
         threshold = max(self.options.margin, chance)
-        allowed = not_contradicted(self.base.run, scores.fits)
-        run = self.base.run
+        run = base.run
+        allowed = not_contradicted(run, scores.fits)
         decision = decide(
             allowed,
             self.options.margin,
             threshold,
-            lambda fit: departures(run, fit.candidate, fit.point),
+            functools.partial(_departures, run),
         )
         if self.options.free_process:
-            decision = in_doubt_of_place(self.base, decision)
-        testable = testable_effects(self.base, list(candidates), self.options.margin)
-        where = locate(self.base)
+            decision = in_doubt_of_place(base, decision)
+        testable = testable_effects(base, list(candidates), self.options.margin)
+        where = locate(base)
         kept, reason = False, decision.reason
         if decision.chosen is not None and decision.inseparable:
             chosen = decision.chosen.candidate
@@ -161,12 +209,12 @@ class _Workflow:
         return Look(scores, decision, where, kept, reason), testable
 
     def _score(
-        self, candidates: tuple[Candidate, ...], report: Progress
+        self, base: Baseline, candidates: tuple[Candidate, ...], report: Progress
     ) -> tuple[Scores, Mapping[tuple[str, str], LoopModel]]:
         """Return the scores, and the model behind each candidate where the process is free."""
         if not self.options.free_process:
-            return score_candidates(self.base, candidates, report), {}
-        found = score_with_free_process(self.base, candidates, self.longest, report)
+            return score_candidates(base, candidates, report), {}
+        found = score_with_free_process(base, candidates, self.longest, report)
         self.base = found.scores.base
         if not self.added:
             self.base_before = self.base
@@ -184,8 +232,7 @@ class _Workflow:
         return extend(bare, self.runs, self.added, new, self.base)
 
     def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
-        others = [*self.added[:k], *self.added[k + 1 :]]
-        base = Baseline.of(run_with(self.bare, self.runs, others))
+        base = self._beside(k)
         found = self._given_process(k, effect, base)
         if not self.options.free_process:
             return found
@@ -267,6 +314,10 @@ class _Workflow:
             "verdict": effect.verdict.value,
             "alternatives": [f"{place} {name}" for place, name in effect.alternatives],
         }
+
+
+def _departures(run: FreeRun, fit: CandidateFit) -> int:
+    return departures(run, fit.candidate, fit.point)
 
 
 def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
