@@ -143,15 +143,15 @@ class SaturationCandidate(ValveCandidate):
 def departures(run: FreeRun, candidate: Candidate, point: FloatArray) -> int:
     """Return how often a candidate's stem leaves a rest.
 
-    0 for what acts at no valve, and where the stem never travels half as far as its band.
+    0 for what acts at no valve, and where all travel together is less than the band.
     """
     if not isinstance(candidate, ValveCandidate):
         return 0
     stems = candidate.stems(run, point[None, :])[:, 0]
-    if float(np.ptp(stems)) < 0.5 * float(point[0]):
+    moves = [np.diff(stems[rows]) for rows in run.runs.slices]
+    if sum(float(np.abs(each).sum()) for each in moves) < float(point[0]):
         return 0
-    moving = [np.diff(stems[rows]) != 0.0 for rows in run.runs.slices]
-    return sum(int((each[1:] & ~each[:-1]).sum()) for each in moving)
+    return sum(int(((each[1:] != 0.0) & (each[:-1] == 0.0)).sum()) for each in moves)
 
 
 def valve_candidates(run: FreeRun) -> list[Candidate]:
