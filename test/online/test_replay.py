@@ -24,21 +24,34 @@ from stiction_ros.online.replay_bag import read_replay_bag
 from stiction_ros.online.replay_estimator import ReplayedEstimator, identification_of
 from stiction_ros.online.replay_matching import first_difference
 from stiction_ros.online.replay_result import Match, Replay
+from stiction_ros.online.session import LiveRun
 from stiction_ros.records.bag_messages import read_messages, read_raw
 from stiction_ros.records.bag_writer import BagWriter
 from stiction_ros.records.mcap_scan import RawMessage
 from stiction_ros.records.record import Record
 from stiction_ros.settings import from_mapping
 
-FITS, SWAP = [399, 449, 499], 504  # samples
+FITS = [399, 449, 499]  # samples
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def live(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LiveRun]:
     """A run from its first sample until a little after the swap, with three fits."""
     path = tmp_path_factory.mktemp("run") / "bag"
-    write_run(path)
-    return path
+    return path, write_run(path)
+
+
+@pytest.fixture(scope="module")
+def bag(live: tuple[Path, LiveRun]) -> Path:
+    return live[0]
+
+
+@pytest.fixture(scope="module")
+def swap(live: tuple[Path, LiveRun]) -> int:
+    """The sample from which the live run was under the embedding controller."""
+    start, change = live[1].changes
+    assert (start.sample, change.mode.value) == (0, "embedding")
+    return change.sample
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -72,13 +85,13 @@ def test_every_op_is_equal(whole: Replay) -> None:
     assert (whole.op.compared, whole.op.equal) == (SAMPLES, SAMPLES)
 
 
-def test_the_swap_comes_at_the_same_moment(whole: Replay) -> None:
+def test_the_swap_comes_at_the_same_moment(whole: Replay, swap: int) -> None:
     assert whole.modes is not None
     assert (whole.modes.match, whole.modes.difference) == (Match.EQUAL, "")
     recorded, replayed = whole.modes.swaps
     assert recorded is not None
     assert recorded == replayed
-    assert whole.seconds(recorded.stamp) == SWAP
+    assert whole.seconds(recorded.stamp) == swap
 
 
 def test_the_whole_replay_is_equal_without_notes(whole: Replay) -> None:
@@ -88,12 +101,19 @@ def test_the_whole_replay_is_equal_without_notes(whole: Replay) -> None:
     assert whole.notes == ()
 
 
-def test_the_json_tells_fits_modes_and_swap(whole: Replay) -> None:
+def test_the_json_tells_fits_modes_and_swap(
+    whole: Replay, live: tuple[Path, LiveRun], swap: int
+) -> None:
     document = whole.to_json()
     assert document["match"] == "equal"
-    assert document["swap"] == {"recorded": SWAP, "replayed": SWAP}
-    assert [fit["loop_model"] for fit in document["fits"]] == [False, False, True]
-    assert document["fits"][2]["valves"][0]["verdict"] == "sticky"
+    assert document["swap"] == {"recorded": swap, "replayed": swap}
+    fits = live[1].fits
+    assert [fit["loop_model"] for fit in document["fits"]] == [
+        fit.loop_model is not None for fit in fits
+    ]
+    assert [fit["valves"][0]["verdict"] for fit in document["fits"]] == [
+        fit.identification.valves[0].verdict.value for fit in fits
+    ]
     modes = [change["mode"] for change in document["modes"]["replayed"]]
     assert modes == ["unaware", "embedding"]
 
@@ -116,12 +136,12 @@ def test_a_bag_that_begins_late_is_compared_from_its_first_whole_window(
 
 
 def test_with_all_recorded_fits_the_swap_of_a_late_bag_is_the_same(
-    bag: Path, tmp_path: Path
+    bag: Path, swap: int, tmp_path: Path
 ) -> None:
     found = replay(cut_bag(bag, tmp_path / "bag", first=121.0))
     assert found.modes is not None
     assert (found.modes.match, found.modes.difference) == (Match.EQUAL, "")
-    assert found.to_json()["swap"] == {"recorded": SWAP, "replayed": SWAP}
+    assert found.to_json()["swap"] == {"recorded": swap, "replayed": swap}
 
 
 def test_where_trust_is_not_known_no_mode_is_compared(bag: Path, tmp_path: Path) -> None:
@@ -195,11 +215,11 @@ def test_another_friction_in_stiction_is_named(bag: Path, tmp_path: Path) -> Non
     )
 
 
-def test_another_moment_of_the_swap_is_named(bag: Path, tmp_path: Path) -> None:
+def test_another_moment_of_the_swap_is_named(bag: Path, swap: int, tmp_path: Path) -> None:
     spoil = without("/diagnostics")
 
     def later(raw: RawMessage) -> RawMessage | None:
-        return raw if raw.log_time != (SWAP + 1) * SECOND else spoil(raw)
+        return raw if raw.log_time != (swap + 1) * SECOND else spoil(raw)
 
     found = replay(copy_bag(bag, tmp_path / "bag", later))
     assert found.modes is not None
