@@ -23,8 +23,6 @@ class Axis:
         points: of the first grid.
         logarithmic: whether the points are in proportion.
         whole: whether only whole numbers count.
-        reach: half the width of the largest box around a best point, in coordinates of the
-            search; for candidates whose optimum is a needle.
         linear: whether the response is a straight line in it, so that its best value is the
             vertex of a parabola.
     """
@@ -34,7 +32,6 @@ class Axis:
     points: int
     logarithmic: bool = False
     whole: bool = False
-    reach: float = 0.0
     linear: bool = False
 
     def grid(self) -> FloatArray:
@@ -152,6 +149,16 @@ class Candidate(ABC):
         if not self.axes:
             return coordinates
         return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
+
+    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return values in a box around a point, shape (G, axes); for needles alone.
+
+        Args:
+            point: values, shape (axes,).
+            cube: points between −1 and 1, shape (G, axes).
+            size: of the box, 1 for the largest.
+        """
+        raise NotImplementedError(f"{self.name} is no needle")
 
     def lead(self, point: FloatArray) -> float:
         """Return how far from OP a stem stands before the first sample, %."""

@@ -23,9 +23,10 @@ MOST = 200
 SLOW = np.array([0.8])
 SHRINK = 0.4
 PROBE = 0.05  # of a linear axis, at which its parabola is taken
-THROWS = 7
-THROWN = 600
-THROW_SHRINK = 0.6
+THROWS = 10
+THROWN = 400
+THROW_SHRINK = 0.7
+CENTRES = 5
 ROUNDS = 5
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
@@ -239,18 +240,22 @@ class _Search:
         The optimum of He's law is a needle in a valley: stems that differ in one slip differ
         for long. Points of a lattice miss it however fine they are along the valley.
         """
-        axes = self.candidate.axes
-        halton = qmc.Halton(len(axes), seed=0)
+        halton = qmc.Halton(len(self.candidate.axes), seed=0)
         size = 1.0
         for _ in range(THROWS):
-            best = self.best()
-            centre = np.array([a.inner(v) for a, v in zip(axes, best.point.tolist(), strict=True)])
-            reach = np.array([a.reach for a in axes]) * size
-            thrown = centre + reach * (2.0 * halton.random(THROWN) - 1.0)
-            values = self.candidate.values(thrown)
+            leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:CENTRES]
+            cubes = 2.0 * halton.random(THROWN * len(leading)) - 1.0
+            parts = np.split(cubes, len(leading))
+            values = np.vstack(
+                [
+                    self.candidate.scattered(fit.point, cube, size)
+                    for fit, cube in zip(leading, parts, strict=True)
+                ]
+            )
             response = self.candidate.respond(self.base.run, values)
-            self.best_of(values, response, [best.noise, self.base.noise])
-            self._judge_best(values, response, dict.fromkeys(response.outputs, np.zeros(0)))
+            self.best_of(values, response, [*(fit.noise for fit in leading), self.base.noise])
+            for ar in (np.zeros(0), SLOW):
+                self._judge_best(values, response, dict.fromkeys(response.outputs, ar))
             size *= THROW_SHRINK
 
     def best(self) -> CandidateFit:

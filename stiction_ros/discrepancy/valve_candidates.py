@@ -22,6 +22,7 @@ from stiction_ros.effects import (
 
 Rows = Callable[[FloatArray], FloatArray]
 LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
+SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
 _NEGLIGIBLE = 1e-9
 
 
@@ -91,6 +92,20 @@ class StictionCandidate(ValveCandidate):
 
     def count(self, point: FloatArray) -> int:
         return 2
+
+    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return points around one in the sum of the frictions and their difference, the jump.
+
+        The sum, how far OP goes back before the stem follows, is told well by any record; the
+        jump much less.
+        """
+        total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
+        totals = total * np.exp(SUM_BOX * size * cube[:, 0])
+        jumps = np.clip(jump + JUMP_BOX * total * size * cube[:, 1], 0.0, totals)
+        low, high = self.axes[0].low, self.axes[0].high
+        static = np.clip(0.5 * (totals + jumps), low, high)
+        leads = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
+        return np.column_stack([static, (totals - jumps) / (totals + jumps), leads])
 
 
 class BacklashCandidate(ValveCandidate):
@@ -172,13 +187,13 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
     low, high = float(op.min()), float(op.max())
     lower, upper = np.quantile(op, [0.6, 0.4]).tolist()
     # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
+    start = Axis(-1.0, 1.0, 1)
     fine = (
-        Axis(0.01 * span, LARGEST * span, 160, logarithmic=True, reach=0.25),
-        Axis(0.0, 1.0, 17, reach=0.25),
-        Axis(-1.0, 1.0, 1, reach=1.0),
+        Axis(0.01 * span, LARGEST * span, 160, logarithmic=True),
+        Axis(0.0, 1.0, 17),
+        start,
     )
     rough = (Axis(0.01 * span, LARGEST * span, 50, logarithmic=True), Axis(0.0, 1.0, 9))
-    start = Axis(-1.0, 1.0, 1)
     return [
         StictionCandidate(run, j, HeStiction, fine),
         StictionCandidate(run, j, XchStiction, (*rough, start)),
