@@ -6,8 +6,8 @@ import math
 
 # Candidates, and the evidence that 95 % of records of noise alone stay below:
 # ``stiction bench gap --calibrate --first 0 --loops 48``, 8 records from each tuning loop.
-FEW, SCORE_OF_FEW = 13, 3.1  # one valve, one output
-MANY, SCORE_OF_MANY = 26, 5.2  # two valves, two outputs
+FEW, SCORE_OF_FEW = 13, 2.1  # one valve, one output
+MANY, SCORE_OF_MANY = 26, 4.4  # two valves, two outputs
 
 
 def stored_threshold(candidates: int) -> float:

@@ -14,6 +14,7 @@ from stiction_ros.loop import LoopModel
 
 LONGEST_REST = 12
 ENDS = 6
+MOST_CLIPPED = 0.5  # of the rows: what stands at its ends more often is no clipped measurement
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
 
 
@@ -95,7 +96,7 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
 def quantum_of(values: FloatArray) -> float:
     """Return the distance of the values; 0 where there is none above the digits of a float."""
     distinct = np.unique(values)
-    if len(distinct) < 3:
+    if len(distinct) < 2:
         return 0.0
     steps = np.diff(distinct)
     smallest = float(steps.min())
@@ -160,7 +161,7 @@ def _clipped(
             gain += 2.0 * count * math.log(len(values) / 10.0)
         else:
             limits[k] += (2 * k - 1) * 10.0 * (high - low)  # beyond what was seen
-    if not ends:
+    if not ends or int(where.sum()) > MOST_CLIPPED * len(values):
         return []
     gain -= ends * math.log(len(values))
     behaviour = Clip(limits[0], limits[1])
@@ -174,7 +175,7 @@ def _rounded(runs: Runs, output: int, name: str, quantum: float) -> list[DataFin
         return []
     levels = len(np.unique(values))
     gain = 2.0 * len(values) * math.log(max(len(values) / levels, 1.0)) - math.log(len(values))
-    if levels < 4 or gain <= 0.0:
+    if gain <= 0.0:
         return []
     return [DataFinding(f"sensor:{name}", "quantisation", Quantisation(quantum), gain)]
 

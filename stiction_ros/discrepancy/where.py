@@ -12,6 +12,7 @@ from stiction_ros.effects import FloatArray
 from stiction_ros.loop.set_points import set_point_moves
 
 KNOTS = 60
+LEAST_ROWS = 30
 WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
 CLEAR = 1.5  # times the usual size of innovations
 STRONG = 0.5  # share of a track's variance
@@ -151,6 +152,8 @@ def _tracks(base: Baseline) -> list[Track]:
     hats = _hats(base)
     found = []
     for i, name in enumerate(run.model.outputs):
+        if int(base.blocks[i].train.sum()) < LEAST_ROWS:
+            continue
         found.append(_track(base, i, f"disturbance:{name}", hats, hats))
         for j, valve in enumerate(run.model.valves):
             moved = run.drive(i, j, run.stems[:, j, None] + hats) - run.forced[:, i, None]

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from gap_loops import loop, record, without_controller, without_set_points
 
+from stiction_ros.blind.generator import blind_loop
+from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.controller_check import ControllerStatus, check_controller
 from stiction_ros.discrepancy.free_run import join_records
 from stiction_ros.discrepancy.gate import Gate, look_at_data, quantum_of
@@ -98,3 +100,21 @@ def test_op_of_an_operator_is_left_unexplained() -> None:
     other = dataclasses.replace(recorded, op=np.clip(op, 5.0, 95.0))
     check = check_controller(loop(), join_records(loop(), [other]))
     assert check.status is ControllerStatus.UNEXPLAINED
+
+
+@pytest.mark.parametrize("kind", ["still", "two levels", "frozen", "at its ends"])
+def test_a_pv_that_shows_next_to_nothing_is_answered(kind: str) -> None:
+    seen, _ = blind_loop(1)
+    pv = seen.record.pv.copy()
+    if kind == "still":
+        pv[:] = pv[0]
+    elif kind == "two levels":
+        pv = np.where(pv > np.median(pv), pv.max(), pv.min())
+    elif kind == "frozen":
+        pv[20:-20] = pv[20]
+    else:
+        pv = np.clip(pv, *np.quantile(pv, [0.45, 0.55]))
+    answer = find_discrepancy(
+        seen.model, [dataclasses.replace(seen.record, pv=pv)], GapOptions(quick=True)
+    )
+    assert all(effect.place != "process:PV1" for effect in answer.effects)
