@@ -21,7 +21,7 @@ from stiction_ros.identification.models import (
     refit,
     settle_delays,
 )
-from stiction_ros.identification.one_step_best import one_step_best
+from stiction_ros.identification.one_step_best import one_step_best, seen
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.patterns import has_cells
@@ -79,6 +79,8 @@ def identify(
         lambda: judged_valves(record, data, model, linear, orders, options),
         lambda: least_one_step(record, data, model, orders, options),
     )
+    if one_step is not None and (final.friction[:, 0] == 0.0).any():
+        one_step = also_from(one_step, record, data, (model, final), orders)
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(final, valves, table, told, one_step)
@@ -105,6 +107,20 @@ def least_one_step(
     if not options.one_step_best or options.law != "he":
         return None
     return one_step_best(record, data, model, orders)
+
+
+def also_from(
+    found: SearchLog, record: Record, data: Data, models: tuple[Model, Model], orders: Orders
+) -> SearchLog:
+    """Return the lesser of the SE found from the first model and that from the second.
+
+    The second has no friction where the first is doubted. Where neither has any, the same
+    would be found again.
+    """
+    if np.array_equal(seen(data, models[0]), seen(data, models[1])):
+        return found
+    again = one_step_best(record, data, models[1], orders)
+    return min(found, again, key=lambda log: log.squared_error)
 
 
 def choose(

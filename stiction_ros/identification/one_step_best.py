@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.equation_error import (
@@ -76,8 +77,7 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
         orders: n_a and n_b.
     """
     search = _Search(record, data, orders)
-    seen = model.friction[:, :1] > TINY * data.limit[:, None]
-    best = search.point(np.where(seen, model.friction, 0.0), model.delays)
+    best = search.point(np.where(seen(data, model), model.friction, 0.0), model.delays)
     settled: dict[int, tuple[bytes, Delays]] = {}  # where a search of the valve found nothing
     for _ in range(1 if len(data.u) == 1 else SWEEPS):
         before = best.error
@@ -100,6 +100,11 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
         friction=tuple((float(f_s), float(f_d)) for f_s, f_d in best.friction),
         delays=best.delays,
     )
+
+
+def seen(data: Data, model: Model) -> NDArray[np.bool_]:
+    """Return which valves have a friction to start from, shape (m, 1)."""
+    return np.asarray(model.friction[:, :1] > TINY * data.limit[:, None])
 
 
 class _Search:
