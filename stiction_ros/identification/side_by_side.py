@@ -71,6 +71,7 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
         finally:
             _free.release()
 
-    _helper().submit(help_out)
+    helping = _helper().submit(help_out)
     work()
+    helping.result()  # so that it is free for the next call
     return [result.result() for result in results]
