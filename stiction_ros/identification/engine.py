@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from stiction_ros.identification.models import (
     refit,
     settle_delays,
 )
-from stiction_ros.identification.one_step_best import one_step_best
+from stiction_ros.identification.one_step_best import one_step_best, seen
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.patterns import has_cells
@@ -37,6 +38,8 @@ from stiction_ros.identification.results import (
     VerdictKind,
 )
 from stiction_ros.identification.search import SearchOutcome, search
+from stiction_ros.identification.search_log import SearchLog
+from stiction_ros.identification.side_by_side import at_once, together
 from stiction_ros.identification.verdict import evidence, judge
 from stiction_ros.records.record import Record
 
@@ -72,17 +75,52 @@ def identify(
         model = carried_over(data, linear, model, orders)
     report(0.5)
     model, delays = settle_delays(data, model, orders)
-    rivals = [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))]
-    report(0.7)
-    valves, model = estimate_valves(record, data, model, orders, rivals, options)
-    report(0.85)
-    one_step = None
-    if options.one_step_best and options.law == "he":
-        one_step = one_step_best(record, data, model, orders)
+    (valves, final), one_step = at_once(
+        lambda: judged_valves(record, data, model, linear, orders, options),
+        lambda: least_one_step(record, data, model, orders, options),
+    )
+    if one_step is not None and (final.friction[:, 0] == 0.0).any():
+        one_step = also_from(one_step, record, data, (model, final), orders)
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
-    findings = Findings(model, valves, table, told, one_step)
+    findings = Findings(final, valves, table, told, one_step)
     return conclude(record, data, findings, time.perf_counter() - begun)
+
+
+def judged_valves(
+    record: Record,
+    data: Data,
+    model: Model,
+    linear: Model,
+    orders: Orders,
+    options: IdentificationOptions,
+) -> tuple[tuple[ValveEstimate, ...], Model]:
+    """Return the estimates and the final model, judged against the friction-free rivals."""
+    rivals = [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))]
+    return estimate_valves(record, data, model, orders, rivals, options)
+
+
+def least_one_step(
+    record: Record, data: Data, model: Model, orders: Orders, options: IdentificationOptions
+) -> SearchLog | None:
+    """Return the least one-step SE, where it is asked for and the law has it."""
+    if not options.one_step_best or options.law != "he":
+        return None
+    return one_step_best(record, data, model, orders)
+
+
+def also_from(
+    found: SearchLog, record: Record, data: Data, models: tuple[Model, Model], orders: Orders
+) -> SearchLog:
+    """Return the lesser of the SE found from the first model and that from the second.
+
+    The second has no friction where the first is doubted. Where neither has any, the same
+    would be found again.
+    """
+    if np.array_equal(seen(data, models[0]), seen(data, models[1])):
+        return found
+    again = one_step_best(record, data, models[1], orders)
+    return min(found, again, key=lambda log: log.squared_error)
 
 
 def choose(
@@ -95,7 +133,8 @@ def choose(
     found = search(data, linear, start)
     if len(orders_list) == 1:
         return start, linear, found, (order_row(start, found.model),)
-    rivals = [(orders, linear_model(data, orders, found.model)) for orders in orders_list]
+    models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
+    rivals = list(zip(orders_list, models, strict=True))
     table = tuple(order_row(*rival) for rival in rivals)
     orders, best = min(rivals, key=lambda rival: rival[1].bic)
     if orders != start:
@@ -138,14 +177,16 @@ def linear_rivals(
     if model.friction[valve, 0] == 0.0:
         return [model]
     freed = without_friction(data, model, orders, valve)
-    rivals = [freed]
-    for extra in range(3):
+    own = dataclasses.replace(freed, delays=linear.delays)
+
+    def of_order(extra: int) -> Model:
         raised = dataclasses.replace(
             orders, output=orders.output + extra, input=orders.input + extra
         )
-        own = dataclasses.replace(freed, delays=linear.delays)
         known = raised == linear.fits[0].orders and not freed.friction.any()
-        rivals.append(linear if known else refit(data, own, raised, warm=False))
+        return linear if known else refit(data, own, raised, warm=False)
+
+    rivals = [freed, *together(*(partial(of_order, extra) for extra in (2, 1, 0)))]
     best = min(rivals, key=lambda rival: rival.bic)
     return [*rivals, improve_delays(data, best, best.fits[0].orders)]
 

@@ -260,8 +260,10 @@ def _fit(
     width = max(3 * len(columns), 30)
     if count < 2 * width:
         return None
-    scale = np.array([column.std() for column in columns]) + 1e-300
-    regressors, target = np.column_stack(columns) / scale, own[order:] / own.std()
+    sizes = [own.std()] * order
+    sizes += [size for size in others.std(axis=0) for _ in range(past.value, order + 1)]
+    scale = np.array(sizes) + 1e-300
+    regressors, target = np.column_stack(columns) / scale, own[order:] / sizes[0]
     moving = target != 0.0
     starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
     starts = starts[explained_stretches(regressors, target, starts, width, EXACT)]

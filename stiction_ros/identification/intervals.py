@@ -101,10 +101,9 @@ def friction_intervals(
 def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
     """Return the patterns of deadbands and of the best points of a coarse grid."""
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    ranges = nearby_delays(data, model, valve, 0)
-    coarse = scan_valve(data, model, orders, valve, coarse_grid(limit), start, ranges=ranges)
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve, 0))
+    coarse = search.scan(coarse_grid(limit), start)
     chosen = coarse.grid[np.argsort(coarse.loss, kind="stable")[:FAR]]
-    search = PatternSearch(data, model, orders, valve, ranges)
     return best_in_cells(search, np.vstack([chosen, _deadbands(limit)]), start)[1]
 
 

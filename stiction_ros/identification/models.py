@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,10 +16,12 @@ from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.scan import BATCH, OutputScan
+from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
+WORTHWHILE = 64  # stems, from which on two threads share a scan
 
 
 DelayRanges = tuple[tuple[int, int], ...]
@@ -121,15 +124,15 @@ class ValveScan:
 
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
+        loss = np.where(self.moves < min_moves, np.inf, self.loss)
         chosen: list[int] = []
-        for index in np.argsort(self.loss, kind="stable"):
-            if self.moves[index] < min_moves:
-                continue
-            near = [np.abs(self.grid[index] - self.grid[i]).max() < apart for i in chosen]
-            if not any(near):
-                chosen.append(int(index))
-            if len(chosen) == count:
+        while len(chosen) < count:
+            index = int(loss.argmin())
+            if not loss[index] < np.inf:
                 break
+            chosen.append(index)
+            loss[np.abs(self.grid - self.grid[index]).max(axis=1) < apart] = np.inf
+            loss[index] = np.inf
         return chosen
 
 
@@ -199,22 +202,38 @@ def scan_criteria(
 ) -> list[ValveScan]:
     """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
     ranges = ranges or data.delays
-    scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
+    scans = [(c, output_scans(data, model, orders, valve, c, ranges)) for c in criteria]
+    return scan_stems(data, valve, grid, starts, scans, ranges)
+
+
+def scan_stems(
+    data: Data,
+    valve: int,
+    grid: FloatArray,
+    starts: FloatArray | float,
+    scans: Sequence[tuple[Criterion, list[OutputScan]]],
+    ranges: DelayRanges,
+) -> list[ValveScan]:
+    """Scan as :func:`scan_criteria` by criteria that stand, with one scan per output each."""
     u = np.ascontiguousarray(data.u[valve])
     start = u[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(grid),))
-    loss = np.zeros((len(criteria), len(grid)))
-    best = np.zeros((len(criteria), len(grid), len(data.y)), dtype=int)
+    loss = np.zeros((len(scans), len(grid)))
+    best = np.zeros((len(scans), len(grid), len(data.y)), dtype=int)
     moves = np.zeros(len(grid))
-    for begin in range(0, len(grid), BATCH):
-        rows = slice(begin, begin + BATCH)
+
+    def scanned(rows: slice) -> None:
         stems = stem_steps(data.law, grid[rows], u, start[rows])
         moves[rows] = stems.moves
-        for c, outputs in enumerate(scans):
+        for c, (criterion, outputs) in enumerate(scans):
             for i, scan in enumerate(outputs):
                 energy = scan.energy(stems)
                 best[c, rows, i] = energy.argmin(axis=1) + ranges[i][0]
-                loss[c, rows] += criteria[c].loss(energy.min(axis=1), scan.count)
-    return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(criteria))]
+                loss[c, rows] += criterion.loss(energy.min(axis=1), scan.count)
+
+    batch = BATCH if len(grid) < WORTHWHILE else min(BATCH, len(grid) // 2 + 1)
+    begins = range(0, len(grid), batch)
+    together(*(partial(scanned, slice(begin, begin + batch)) for begin in begins))
+    return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(scans))]
 
 
 def with_delays(
@@ -258,11 +277,13 @@ def with_valve(
 
 def refit(data: Data, model: Model, orders: Orders, warm: bool = True) -> Model:
     """Return the model with all outputs fitted to its stems and delays."""
-    fits = []
-    for i, y in enumerate(data.y):
+
+    def fitted(i: int) -> OutputFit:
         old = model.fits[i] if warm and i < len(model.fits) else None
         usable = old if old is not None and old.orders == orders else None
-        fits.append(fit_output(y, model.stems, model.delays[i], orders, usable))
+        return fit_output(data.y[i], model.stems, model.delays[i], orders, usable)
+
+    fits = together(*(partial(fitted, i) for i in range(len(data.y))))
     return dataclasses.replace(model, fits=tuple(fits))
 
 

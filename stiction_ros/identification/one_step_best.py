@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.equation_error import (
@@ -25,7 +25,6 @@ from stiction_ros.identification.models import (
     Criterion,
     Data,
     Model,
-    scan_valve,
     with_delays,
 )
 from stiction_ros.identification.output_error import Orders
@@ -46,6 +45,8 @@ from stiction_ros.records.record import Record
 COMB, HALF, SHORT = 0.0016, 14, 5
 BEST = 5
 POLISHED = 3
+POLISHES = 3  # parabolas through the least three points
+TINY = 1e-3  # of the limit, below which a valve is taken up anew, from none
 NEAR = 1e-4  # relative error of the search's SE, by its ridge
 MOST_CELLS = 1500
 SWEEPS = 2
@@ -76,7 +77,7 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
         orders: n_a and n_b.
     """
     search = _Search(record, data, orders)
-    best = search.point(model.friction, model.delays)
+    best = search.point(np.where(seen(data, model), model.friction, 0.0), model.delays)
     settled: dict[int, tuple[bytes, Delays]] = {}  # where a search of the valve found nothing
     for _ in range(1 if len(data.u) == 1 else SWEEPS):
         before = best.error
@@ -99,6 +100,11 @@ def one_step_best(record: Record, data: Data, model: Model, orders: Orders) -> S
         friction=tuple((float(f_s), float(f_d)) for f_s, f_d in best.friction),
         delays=best.delays,
     )
+
+
+def seen(data: Data, model: Model) -> NDArray[np.bool_]:
+    """Return which valves have a friction to start from, shape (m, 1)."""
+    return np.asarray(model.friction[:, :1] > TINY * data.limit[:, None])
 
 
 class _Search:
@@ -134,9 +140,10 @@ class _Search:
         model = Model(best.friction, np.zeros(len(stems)), stems, best.delays, ())
         rows = best.friction[valve][None, :]
         criterion, ranges = Criterion.SQUARED_ERROR, self.data.delays
+        search = PatternSearch(self.data, model, self.orders, valve, ranges, criterion=criterion)
         if best.friction[valve, 0] > 0.0:
             grid = finer_grid(rows, step, limit, half)
-            scan = scan_valve(self.data, model, self.orders, valve, grid, 0.0, criterion, ranges)
+            scan = search.scan(grid, 0.0)
             self.points += len(grid)
             rows = np.vstack([rows, grid[scan.best(BEST, 0, 2.0 * step)]])
             rows = finer_grid(rows, step / 3.0, limit, 2)
@@ -147,9 +154,8 @@ class _Search:
         best = min(best, self.point(free, best.delays), key=lambda point: point.error)
         if not len(rows):
             return best
-        scan = scan_valve(self.data, model, self.orders, valve, rows, 0.0, criterion, ranges)
+        scan = search.scan(rows, 0.0)
         self.points += len(rows)
-        search = PatternSearch(self.data, model, self.orders, valve, ranges, criterion=criterion)
         enumerated: list[tuple[Beginning, PatternMap]] = []
         for index in scan.best(2, 0, 2.0 * step):
             friction = scan.grid[index]
@@ -223,16 +229,27 @@ class _Search:
         start = min(allowed, key=lambda f_d: abs(f_d - level))
         reach = (high - low) / 40.0
         low, high = max(min(allowed), start - reach), min(max(allowed), start + reach)
-        points = [at(start)]
-        if low < high:
-            found = minimize_scalar(
-                lambda f_d: at(f_d).error,
-                bounds=(low, high),
-                method="bounded",
-                options={"maxiter": 12, "xatol": 1e-9},
-            )
-            points.append(at(float(found.x)))
-        return min(points, key=lambda point: point.error)
+        points = {start: at(start)}
+        for f_d in (low, high, 0.5 * (low + high)):
+            if len(points) < 3 and f_d not in points:
+                points[f_d] = at(f_d)
+        for _ in range(POLISHES):
+            three = sorted(points, key=lambda f_d: points[f_d].error)[:3]
+            f_d = min(max(_vertex(three, [points[x].error for x in three]), low), high)
+            if f_d in points:
+                break
+            points[f_d] = at(f_d)
+        return min(points.values(), key=lambda point: point.error)
+
+
+def _vertex(places: list[float], errors: list[float]) -> float:
+    """Return where a parabola through points, the least first, ends; the first without one."""
+    if len(places) < 3:
+        return places[0]
+    (x, one, two), (least, _, _) = places, errors
+    first, second = (errors[1] - least) / (one - x), (errors[2] - least) / (two - x)
+    bend = (second - first) / (two - one)
+    return x + 0.5 * (bend * (one - x) - first) / bend if bend > 0.0 else x
 
 
 def _beginnings(u: FloatArray, friction: FloatArray, reach: float) -> list[Beginning]:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from functools import partial
 
 import numpy as np
 from scipy.linalg import lapack
@@ -31,6 +32,7 @@ from stiction_ros.identification.output_error_kernels import (
     loss_of,
 )
 from stiction_ros.identification.polynomials import stabilised
+from stiction_ros.identification.side_by_side import together
 
 THIN = 4
 START_RADIUS = 0.99
@@ -198,7 +200,9 @@ def fit_output(
         starts = [evaluate(problem, a, padded, 0.0), evaluate(problem, refined.a, noise, 0.0)]
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
-    rough = [descend(problem, point, table, max_iterations, ROUGH_GAIN) for point in starts]
+    rough = together(
+        *(partial(descend, problem, point, table, max_iterations, ROUGH_GAIN) for point in starts)
+    )
     best = min(rough, key=lambda point: loss_of(problem, point))
     return _finished(
         problem, delays, orders, descend(problem, best, table, max_iterations, FINE_GAIN)

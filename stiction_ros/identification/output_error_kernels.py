@@ -95,9 +95,9 @@ def _averaged(x: FloatArray, d: FloatArray, begin: int) -> FloatArray:
 
 
 @compiled
-def _fill(rows: FloatArray, row: int, x: FloatArray, start: int, count: int) -> None:
+def _fill(rows: FloatArray, row: int, x: FloatArray, start: int, count: int, columns: int) -> None:
     """Write x and its first differences, from ``start`` on, into ``count`` rows."""
-    length = min(rows.shape[1], len(x) - start)
+    length = min(columns, len(x) - start)
     now = x[max(start - count, 0) : start + length].copy()
     at = start - max(start - count, 0)
     for i in range(count):
@@ -181,10 +181,10 @@ def evaluate(problem: Problem, a: FloatArray, noise: FloatArray, weight: float) 
     driven = _driven(problem.signals, a)
     for g in range(len(problem.groups)):
         signal, lag, number = problem.groups[g]
-        _fill(plain, row, driven[signal], begin - lag, number)
+        _fill(plain, row, driven[signal], begin - lag, number, len(y) - begin)
         early = max(first - lag - number, 0)
         moving = _averaged(driven[signal], noise, early)
-        _fill(rows[:, :count], row, moving, first - lag - early, number)
+        _fill(rows, row, moving, first - lag - early, number, count)
         row += number
     target = np.empty(count + priced)
     moving = _averaged(y[begin:], noise, first - begin)
@@ -404,11 +404,11 @@ def arx_polynomial(problem: Problem, a: FloatArray, order: int) -> FloatArray:
             signals[1 + g, k] = problem.signals[g, k]
     driven = _driven(signals, a)
     rows = np.empty((size, count))
-    _fill(rows, 0, driven[0], problem.first - 1, order)
+    _fill(rows, 0, driven[0], problem.first - 1, order, count)
     row = order
     for g in range(stems):
         signal, lag, number = problem.groups[g]
-        _fill(rows, row, driven[signal + 1], problem.first - lag, number)
+        _fill(rows, row, driven[signal + 1], problem.first - lag, number, count)
         row += number
     for k in range(count):
         rows[row, k] = 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -39,9 +40,10 @@ class PatternScan:
 
     def static_range(self, index: int, dynamic: tuple[float, float]) -> tuple[float, float]:
         """Return the values of f_S in a cell for f_D in a range, %."""
-        jl, jh, sl, sh = self.bounds[index]
-        low = float(np.clip(0.5 * (sl - jl), *dynamic))
-        high = float(np.clip(0.5 * (sh - jh), *dynamic)) if np.isfinite(jh) else dynamic[1]
+        jl, jh, sl, sh = self.bounds[index].tolist()
+        least, most = dynamic
+        low = min(max(0.5 * (sl - jl), least), most)
+        high = min(max(0.5 * (sh - jh), least), most) if math.isfinite(jh) else most
         return max(jl + low, sl - low, low), min(jh + high, sh - high)
 
     def middle(self, index: int, limit: float) -> tuple[float, float]:

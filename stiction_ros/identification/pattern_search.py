@@ -9,6 +9,7 @@ remaining frictions are searched on grids (:mod:`.search`).
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from stiction_ros.identification.models import (
     Data,
     DelayRanges,
     Model,
+    ValveScan,
     output_scans,
+    scan_stems,
     with_valve,
 )
 from stiction_ros.identification.output_error import Orders
@@ -34,6 +37,7 @@ from stiction_ros.identification.patterns import (
     levels_of,
     resting_cells,
 )
+from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.step_signals import StepSignals
 
 MOST_CELLS = 3000
@@ -42,6 +46,7 @@ SAMPLES = 6000  # up to which neighbourhoods are of full size
 REJECTED = 1.0
 GROWTHS = 14
 MARGIN = 6.0
+FEW = 60  # cells too few to tell how many there will be
 ROUNDS = 4
 MOST_LEVELS = 30
 LEAST_GAIN = 0.3
@@ -61,11 +66,17 @@ class PatternSearch:
         criterion: Criterion = Criterion.INNOVATIONS,
     ) -> None:
         """Build the criterion; with ``begin`` the stem before its first slip is left free."""
+        self.data, self.valve = data, valve
         self.u, self.law = data.u[valve], data.law
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
         self.ranges, self.begin, self.criterion = ranges, begin, criterion
         self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
+
+    def scan(self, grid: FloatArray, starts: FloatArray | float) -> ValveScan:
+        """Scan rows (f_S, f_D), shape (G, 2), by the same criterion, see :func:`scan_valve`."""
+        by = [(self.criterion, self.scans)]
+        return scan_stems(self.data, self.valve, grid, starts, by, self.ranges)[0]
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D."""
@@ -132,7 +143,7 @@ class PatternSearch:
         self, patterns: StepSignals, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Minimise as :meth:`minimised` does, of base and sign as two channels."""
-        energies = [scan.patterns(patterns) for scan in self.scans]
+        energies = together(*(partial(scan.patterns, patterns) for scan in self.scans))
         widest = max(energies, key=lambda energy: energy.delays)
         products = np.zeros((patterns.size, len(energies), *widest.products.shape[1:]))
         rights = np.zeros((patterns.size, len(energies), *widest.rights.shape[1:]))
@@ -149,18 +160,20 @@ class PatternSearch:
         """Return all cells that meet the rectangle (J low, J high, S low, S high).
 
         Args:
-            most: largest number of cells; None comes back when there are more.
+            most: largest number of cells; None comes back when there are more, or would be
+                twice as many if the rest were covered by cells as large as those met so far.
         """
         todo = self._admissible(rectangle[None, :])
         met: list[Cells] = []
-        count = 0
+        count, whole = 0, _area(todo)
         while len(todo):
-            count += len(todo)
-            if count > most:
+            covered = whole - _area(todo)
+            if count + len(todo) > most or (count > FEW and count * whole > 2.0 * most * covered):
                 return None
+            count += len(todo)
             met.append(cells_at(self.u, begin, _points(todo), self.law))
             todo = self._admissible(_remainders(todo, met[-1].bounds))
-        return PatternScan.joined([self._nothing(), *map(self.evaluate, met)])
+        return self.evaluate(Cells.joined(met)) if met else self._nothing()
 
     def _nothing(self) -> PatternScan:
         flat = np.empty(0)
@@ -180,6 +193,11 @@ def points_of(friction: FloatArray) -> FloatArray:
     """Return rows (J, S) of rows (f_S, f_D)."""
     static, dynamic = friction[:, 0], friction[:, 1]
     return np.column_stack([static - dynamic, static + dynamic])
+
+
+def _area(rectangles: FloatArray) -> float:
+    jl, jh, sl, sh = rectangles.T
+    return float((jh - jl) @ (sh - sl))
 
 
 def _points(rectangles: FloatArray) -> FloatArray:

@@ -55,6 +55,14 @@ class Cells:
     bounds: FloatArray
     steps: StepSignals
 
+    @staticmethod
+    def joined(parts: list[Cells]) -> Cells:
+        """Return the cells of several lists, at least one."""
+        if len(parts) == 1:
+            return parts[0]
+        steps = StepSignals.joined([part.steps for part in parts])
+        return Cells(np.concatenate([part.bounds for part in parts]), steps)
+
     @property
     def bases(self) -> FloatArray:
         """OP at the last slip, before the first slip the stem's level, shape (N, G)."""

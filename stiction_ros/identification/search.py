@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -43,6 +44,7 @@ from stiction_ros.identification.pattern_search import (
 )
 from stiction_ros.identification.patterns import has_cells
 from stiction_ros.identification.polygon_search import refine_near
+from stiction_ros.identification.side_by_side import at_once, together
 
 STEPS = 80
 LINES = 14
@@ -128,11 +130,17 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
     limit, start = float(data.limit[valve]), float(model.start[valve])
     fine = np.vstack([np.zeros((1, 2)), first_grid(limit, data.y.shape[1])])
     coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
-    one_step = scan_valve(data, model, orders, valve, fine, start, Criterion.ONE_STEP)
-    others = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-    scans = scan_criteria(data, model, orders, valve, coarse, start, others)
-    by_criterion = {Criterion.ONE_STEP: one_step, **dict(zip(others, scans, strict=True))}
-    return FirstScan(model, valve, by_criterion, _elsewhere(data, model, orders, valve))
+    filtered = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
+    plain = (Criterion.ONE_STEP,)
+    (scans, closer), others = at_once(
+        lambda: together(
+            partial(scan_criteria, data, model, orders, valve, fine, start, plain),
+            partial(scan_criteria, data, model, orders, valve, coarse, start, filtered),
+        ),
+        lambda: _elsewhere(data, model, orders, valve),
+    )
+    by_criterion = dict(zip((*plain, *filtered), (*scans, *closer), strict=True))
+    return FirstScan(model, valve, by_criterion, others)
 
 
 def _elsewhere(data: Data, model: Model, orders: Orders, valve: int) -> tuple[Elsewhere, ...]:
@@ -154,29 +162,37 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
         grown = growing_search(data, model, orders, valve)
         if grown is not None and grown.loss < model.loss:
             return grown
-    rivals = []
-    for criterion, scan in first.scans.items():
+
+    def from_scan(criterion: Criterion) -> Model:
+        scan = first.scans[criterion]
         count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
         parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
-        rivals.append(descend(data, model, orders, valve, parents, criterion, data.delays, False))
-    rivals.append(_from_fitted(data, first, orders))
-    for other in first.better_beginnings:
+        return descend(data, model, orders, valve, parents, criterion, data.delays, False)
+
+    def from_elsewhere(other: Elsewhere) -> Model:
         chosen = other.scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)
         if not chosen:
-            continue
+            return model
         start = model.start.copy()
         start[valve] = other.starts[chosen[0]]
         moved, parents = dataclasses.replace(model, start=start), other.scan.grid[chosen]
-        ranges = data.delays
-        rivals.append(
-            descend(data, moved, orders, valve, parents, Criterion.ONE_STEP, ranges, False)
+        ranges, criterion = data.delays, Criterion.ONE_STEP
+        return descend(data, moved, orders, valve, parents, criterion, ranges, False)
+
+    rivals = together(
+        *(partial(from_scan, criterion) for criterion in first.scans),
+        lambda: _from_fitted(data, first, orders),
+        *(partial(from_elsewhere, other) for other in first.better_beginnings),
+    )
+    promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
+    closer = together(
+        *(
+            partial(comb, data, rival, orders, valve)
+            for rival in promising
+            if rival.friction[valve, 0] > 0.0
         )
-    best = model
-    for rival in sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]:
-        if rival.friction[valve, 0] > 0.0:
-            closer = comb(data, rival, orders, valve)
-            best = min(best, closer, key=lambda candidate: candidate.loss)
-    return best
+    )
+    return min([model, *closer], key=lambda candidate: candidate.loss)
 
 
 def _from_fitted(data: Data, first: FirstScan, orders: Orders) -> Model:
@@ -286,20 +302,19 @@ def zoom(
     nothing = np.empty((0, 2)), np.empty((0, len(data.y)), dtype=int)
     if not len(parents):
         return nothing
-    patterns = None
+    patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
     if has_cells(data.law):
-        patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
         parents, _ = best_in_cells(patterns, parents, start)
     step = APART * limit
     while step > FINEST * limit:
         step /= 3.0
         grid = finer_grid(parents, step, limit)
-        scan = scan_valve(data, model, orders, valve, grid, start, criterion, ranges)
+        scan = patterns.scan(grid, start)
         chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
         if not chosen:
             return nothing
         parents, delays = grid[chosen], scan.delays[chosen]
-        if patterns is not None:
+        if has_cells(data.law):
             parents, cells = best_in_cells(patterns, parents, start)
             order = np.argsort(cells.loss, kind="stable")
             parents, delays = parents[order], cells.delays[order]
@@ -313,12 +328,12 @@ def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
     its neighbours much worse than a wrong pattern further off.
     """
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    ranges = nearby_delays(data, model, valve)
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
     step = COMB * limit * min(1.0, SAMPLES / data.u.shape[1])
     grid, half, best = model.friction[valve][None, :], 15, model
     for _ in range(2):
         grid = finer_grid(grid, step, limit, half)
-        scan = scan_valve(data, model, orders, valve, grid, start, ranges=ranges)
+        scan = search.scan(grid, start)
         chosen = scan.best(PARENTS, data.min_moves, 2.0 * step)
         grid, half, step = grid[chosen], 3, step / 3.0
     for index in chosen[:2]:
@@ -345,7 +360,7 @@ def search(data: Data, model: Model, orders: Orders) -> SearchOutcome:
     """Coordinate search over all valves: the most promising first, until nothing changes."""
     left, rivals = list(range(len(data.u))), []
     while left:
-        scans = [first_scan(data, model, orders, valve) for valve in left]
+        scans = together(*(partial(first_scan, data, model, orders, valve) for valve in left))
         first = max(scans, key=lambda scan: scan.gain)
         model = improve_valve(data, first_search(data, orders, first), orders, first.valve)
         left.remove(first.valve)

@@ -42,6 +42,20 @@ class StepSignals:
         rows = np.ascontiguousarray(np.stack(channels).transpose(2, 0, 1), dtype=float)
         return cls(count, *dense_steps(rows))
 
+    @classmethod
+    def joined(cls, parts: list[StepSignals]) -> StepSignals:
+        """Return all signals of several lists, at least one, of equal N and c."""
+        offsets, total = [np.zeros(1, dtype=np.int64)], 0
+        for part in parts:
+            offsets.append(part.offsets[1:] + total)
+            total += len(part.places)
+        return cls(
+            parts[0].count,
+            np.concatenate(offsets),
+            np.concatenate([part.places for part in parts]),
+            np.concatenate([part.values for part in parts]),
+        )
+
     @property
     def size(self) -> int:
         """G, number of signals."""

@@ -9,6 +9,7 @@ from stiction_ros.effects import HeStiction, KanoStiction
 from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
+SIZES = st.integers(0, 3)
 GRID = np.array([[0.0, 0.0], [0.3, 0.1], [1.0, 1.0], [2.5, 0.5], [90.0, 1.0]])
 
 
@@ -35,3 +36,14 @@ def test_dense_signals_come_back(seed: int, samples: int, size: int) -> None:
     assert (steps.dense(0) == one).all()
     assert (steps.dense(1) == two).all()
     assert (steps.moves == np.count_nonzero(np.diff(one, axis=0), axis=0)).all()
+
+
+@given(seed=st.integers(0, 10_000), samples=st.integers(1, 40), sizes=st.tuples(*3 * [SIZES]))
+@settings(deadline=None)
+def test_joined_signals_are_those_of_the_parts(
+    seed: int, samples: int, sizes: tuple[int, ...]
+) -> None:
+    generator = np.random.default_rng(seed)
+    parts = [generator.integers(0, 2, (samples, size)).astype(float) for size in sizes]
+    joined = StepSignals.joined([StepSignals.of(part) for part in parts])
+    assert (joined.dense(0) == np.hstack(parts)).all()

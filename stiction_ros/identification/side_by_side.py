@@ -1,0 +1,77 @@
+"""Independent parts of a search, at the same time on two cores.
+
+The compiled loops let other threads run, so two threads share most of the work. What comes
+back does not depend on how many there are: every part is computed as it would be alone.
+"""
+
+from __future__ import annotations
+
+import collections
+import functools
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar, cast
+
+Result = TypeVar("Result")
+One = TypeVar("One")
+Two = TypeVar("Two")
+
+_free = threading.Lock()  # held as long as the helper has work
+
+
+@functools.cache
+def _helper() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(1, thread_name_prefix="identification")
+
+
+def _may_help() -> bool:
+    """Return whether there is a core for a second thread.
+
+    A process that another one started has none: such processes share the cores already.
+    """
+    return (os.cpu_count() or 1) > 1 and multiprocessing.parent_process() is None
+
+
+def at_once(one: Callable[[], One], two: Callable[[], Two]) -> tuple[One, Two]:
+    """Return both results, as :func:`together`, of parts that return different things."""
+    first, second = together(one, two)
+    return cast(One, first), cast(Two, second)
+
+
+def together(*parts: Callable[[], Result]) -> list[Result]:
+    """Return the results of all parts, in their order.
+
+    Parts may call this as well: where no thread is free all run in the calling one.
+
+    Raises:
+        Exception: of the first part, in their order, that raised one.
+    """
+    if len(parts) < 2 or not _may_help() or not _free.acquire(blocking=False):
+        return [part() for part in parts]
+    results: list[Future[Result]] = [Future() for _ in parts]
+    waiting = collections.deque(zip(parts, results, strict=True))
+
+    def work() -> None:
+        while waiting:
+            try:
+                part, result = waiting.popleft()
+            except IndexError:  # the other thread took the last part
+                return
+            try:
+                result.set_result(part())
+            except Exception as error:
+                result.set_exception(error)
+
+    def help_out() -> None:
+        try:
+            work()
+        finally:
+            _free.release()
+
+    helping = _helper().submit(help_out)
+    work()
+    helping.result()  # so that it is free for the next call
+    return [result.result() for result in results]
