@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.effects import (
@@ -46,6 +46,7 @@ def test_pattern_gives_the_stem_of_the_law(
     law: type[FrictionLaw], seed: int, static: float, share: float, level: float
 ) -> None:
     u, dynamic = smooth_walk(seed), share * static
+    assume(abs(abs(u[0] - level) - static) > 1e-9)  # at a tie rounding says whether it moves
     point = np.array([[static - dynamic, static + dynamic]])
     cells = resting_cells(u, np.array([level]), point, law)
     stem = simulate(law, np.array([[static, dynamic]]), u, level)
