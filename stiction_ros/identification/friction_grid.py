@@ -47,7 +47,13 @@ def triangle(limit: float, steps: int, first: int = 1) -> FloatArray:
 def coarse_grid(limit: float) -> FloatArray:
     """Return the first grid: 20 steps over the whole triangle, finer towards small friction."""
     fine = [triangle(limit / 4.0, 14), triangle(limit / 20.0, 8), triangle(limit / 100.0, 4)]
-    return np.unique(np.vstack([triangle(limit, 20), *fine]).round(12), axis=0)
+    return _without_repetition(np.vstack([triangle(limit, 20), *fine]))
+
+
+def _without_repetition(rows: FloatArray) -> FloatArray:
+    """Return rows (f_S, f_D), rounded, in rising order, each once."""
+    pairs = np.ascontiguousarray(rows.round(12)).view(np.complex128)[:, 0]
+    return np.unique(pairs).view(np.float64).reshape(-1, 2)
 
 
 def even_grid(limit: float, steps: int) -> FloatArray:
@@ -99,7 +105,7 @@ def finer_grid(centres: FloatArray, step: float, limit: float, half: int = 3) ->
     rows = (centres[:, None, :] + mesh[None]).reshape(-1, 2)
     static = np.clip(rows[:, 0], 0.0, limit)
     dynamic = np.clip(rows[:, 1], 0.0, static)
-    grid = np.unique(np.column_stack([static, dynamic]).round(12), axis=0)
+    grid = _without_repetition(np.column_stack([static, dynamic]))
     return np.asarray(grid[grid[:, 0] > 0.0])
 
 

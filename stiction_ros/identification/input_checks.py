@@ -34,6 +34,7 @@ TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
 MAX_ORDER = 8
 MAX_SAMPLES = 4000
 WINDOWS = 60  # stretches of a record in which an exact relation is looked for
+FEW = 6  # of them that are solved together
 EXACT = 1e-7  # largest error of an exact relation within its stretch, in standard deviations
 CLOSE = 1e-6  # the same over the whole record, where it must hold in SHARE of the samples
 SHARE = 0.7
@@ -267,20 +268,29 @@ def _fit(
     moving = target != 0.0
     starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
     starts = starts[explained_stretches(regressors, target, starts, width, EXACT)]
-    if not len(starts):
-        return None
-    rows = starts[:, None] + np.arange(width)
-    left, singular, right = np.linalg.svd(regressors[rows], full_matrices=False)
-    kept = singular > np.finfo(float).eps * width * singular[:, :1]
-    along = np.einsum("wij,wi->wj", left, target[rows])
+    for begin in range(0, len(starts), FEW):  # mostly the first few will do
+        rows = starts[begin : begin + FEW, None] + np.arange(width)
+        for theta in _solutions(regressors[rows], target[rows], past):
+            error = np.abs(regressors[moving] @ theta - target[moving])
+            if np.mean(error < CLOSE) >= SHARE:
+                return np.asarray(theta * own.std() / scale)
+    return None
+
+
+def _solutions(regressors: FloatArray, target: FloatArray, past: _Past) -> FloatArray:
+    """Return coefficients, shape (…, q), of the stretches that they explain.
+
+    Args:
+        regressors: shape (stretches, width, q).
+        target: shape (stretches, width).
+    """
+    left, singular, right = np.linalg.svd(regressors, full_matrices=False)
+    kept = singular > np.finfo(float).eps * regressors.shape[1] * singular[:, :1]
+    along = np.einsum("wij,wi->wj", left, target)
     along = np.where(kept, along / np.where(kept, singular, 1.0), 0.0)
     solutions = np.einsum("wji,wj->wi", right, along)
+    residual = np.einsum("wij,wj->wi", regressors, solutions) - target
+    explained = np.abs(residual).max(axis=1) <= EXACT
     if past is _Past.AND_PRESENT:
-        unique = singular[:, -1] > SINGULAR * singular[:, 0]
-        solutions, rows = solutions[unique], rows[unique]
-    residual = np.einsum("wij,wj->wi", regressors[rows], solutions) - target[rows]
-    for theta in solutions[np.abs(residual).max(axis=1) <= EXACT]:
-        error = np.abs(regressors[moving] @ theta - target[moving])
-        if np.mean(error < CLOSE) >= SHARE:
-            return np.asarray(theta * own.std() / scale)
-    return None
+        explained &= singular[:, -1] > SINGULAR * singular[:, 0]
+    return np.asarray(solutions[explained])

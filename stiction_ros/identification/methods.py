@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification.input_checks import swapped_columns
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import Identification
+from stiction_ros.identification.side_by_side import at_once
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -56,11 +58,26 @@ def identify(
             does not have, or OP and PV that are clearly swapped.
     """
     options = options or IdentificationOptions()
-    evidence = swapped_columns(record) if options.check_columns else None
+    found, evidence = at_once(
+        partial(_attempt, record, options, progress),
+        lambda: swapped_columns(record) if options.check_columns else None,
+    )
     if evidence is not None:
         raise InputError(
             f"OP and PV look swapped: {evidence.reason}",
             where=record.name,
             fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
         )
-    return METHODS[options.method](record, options, progress)
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def _attempt(
+    record: Record, options: IdentificationOptions, progress: Progress | None
+) -> Identification | InputError:
+    """Return what the method finds or what it refuses: swapped columns are a better reason."""
+    try:
+        return METHODS[options.method](record, options, progress)
+    except InputError as error:
+        return error

@@ -16,6 +16,7 @@ from stiction_ros.effects import FloatArray, FrictionLaw
 from stiction_ros.identification.friction_grid import simulate
 from stiction_ros.identification.output_error import Orders, OutputFit, fit_output
 from stiction_ros.identification.scan import BATCH, OutputScan
+from stiction_ros.identification.scan_kernels import best_apart
 from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
@@ -125,15 +126,7 @@ class ValveScan:
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
         loss = np.where(self.moves < min_moves, np.inf, self.loss)
-        chosen: list[int] = []
-        while len(chosen) < count:
-            index = int(loss.argmin())
-            if not loss[index] < np.inf:
-                break
-            chosen.append(index)
-            loss[np.abs(self.grid - self.grid[index]).max(axis=1) < apart] = np.inf
-            loss[index] = np.inf
-        return chosen
+        return best_apart(self.grid, loss, count, apart).tolist()
 
 
 def stem_of(data: Data, valve: int, friction: FloatArray, start: float) -> FloatArray:

@@ -12,11 +12,12 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.filter_kernels import Window
+from stiction_ros.identification.filter_kernels import Window, tails_of
 from stiction_ros.identification.level_kernels import pattern_energy
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
     delay_energy,
+    orthonormal,
     step_products,
 )
 from stiction_ros.identification.step_signals import StepSignals
@@ -70,11 +71,8 @@ class OutputScan:
         rest = target[first:] - (basis @ target[first:]) @ basis
         self.count = count - first
         self.rest_energy = max(float(rest @ rest), 1e-300)
-        backwards = np.zeros((len(basis) + 1, count))
-        backwards[:-1, : self.count] = basis[:, ::-1]
-        backwards[-1, : self.count] = rest[::-1]
-        tails = np.zeros((count + lags[-1] + 1, len(backwards)))
-        tails[:count] = np.cumsum(self._filtered(backwards), axis=1)[:, ::-1].T
+        rows = np.vstack([basis, rest])
+        tails = tails_of(rows, self._numerator, self._denominator, count, count + lags[-1] + 1)
         self._window = Window(
             count,
             first,
@@ -132,23 +130,3 @@ class PatternEnergy:
                 )
         return out
 
-
-def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
-    """Return orthonormal rows that span the given rows, shape (q, n).
-
-    Rows of which those before leave less than ``tolerance`` are left out.
-    """
-    out = np.empty_like(columns)
-    kept = 0
-    for row in columns:
-        size = float(np.sqrt(row @ row))
-        if size < 1e-150:
-            continue
-        now = row / size
-        for _ in range(2 if kept else 0):  # twice is enough for orthogonality to the last digit
-            now -= (out[:kept] @ now) @ out[:kept]
-        size = float(np.sqrt(now @ now))
-        if size > tolerance:
-            out[kept] = now / size
-            kept += 1
-    return out[:kept]

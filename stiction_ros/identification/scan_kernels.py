@@ -2,8 +2,8 @@
 
 Signals come as rows of moves, see :mod:`.step_signals`. Products with fixed signals are sums
 over moves: a fixed signal, filtered backwards in time and summed up from its end, says at every
-sample what a step there contributes. Products of the signals with themselves are sums over
-stretches without a move where there is no prefilter, otherwise over samples.
+sample what a step there contributes. Products of the signals with themselves are sums over moves
+as well where there is no prefilter, otherwise over samples.
 """
 
 from __future__ import annotations
@@ -13,19 +13,35 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.filter_kernels import (
-    LANES,
-    Window,
-    driving,
-    filtered_products,
-)
+from stiction_ros.identification.filter_kernels import Window, filtered_products
 
 IntArray = NDArray[np.int64]
 
 DEPENDENT = 1e-13
 RIDGE = 1e-12
 SAME = 1e-9
-MOVES_APART = 20  # samples from move to move, above which stretches are added up
+
+
+@compiled
+def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
+    """Return orthonormal rows that span the given rows, shape (q, n).
+
+    Rows of which those before leave less than ``tolerance`` are left out.
+    """
+    out = np.empty_like(columns)
+    kept = 0
+    for i in range(len(columns)):
+        size = np.sqrt(np.dot(columns[i], columns[i]))
+        if size < 1e-150:
+            continue
+        now = columns[i] / size
+        for _ in range(2 if kept else 0):  # twice is enough for orthogonality to the last digit
+            now -= np.dot(np.dot(out[:kept], now), out[:kept])
+        size = np.sqrt(np.dot(now, now))
+        if size > tolerance:
+            out[kept] = now / size
+            kept += 1
+    return out[:kept].copy()
 
 
 @compiled
@@ -49,29 +65,6 @@ def _projected(
 
 
 @compiled
-def _stretch_product(
-    places: IntArray, x: FloatArray, s: FloatArray, shift: int, begin: int, end: int
-) -> float:
-    """Return the sum of x[j] s[j − shift] over begin ≤ j < end, of signals given by moves."""
-    last, i, m, total, j = len(places) - 1, 0, 0, 0.0, begin
-    while i < last and places[i + 1] <= j:
-        i += 1
-    while m < last and places[m + 1] + shift <= j:
-        m += 1
-    while j < end:
-        until = end
-        if i < last:
-            until = min(until, places[i + 1])
-        if m < last:
-            until = min(until, places[m + 1] + shift)
-        total += (until - j) * x[i] * s[m]
-        j = until
-        i += i < last and places[i + 1] == j
-        m += m < last and places[m + 1] + shift == j
-    return total
-
-
-@compiled
 def _samples(places: IntArray, values: FloatArray, begin: int, end: int, out: FloatArray) -> None:
     """Write samples ``begin`` to ``end`` of a signal into the same places, shape (c, N)."""
     i = len(places) - 1
@@ -87,37 +80,54 @@ def _samples(places: IntArray, values: FloatArray, begin: int, end: int, out: Fl
 
 
 @compiled
+def _first_products(
+    window: Window, places: IntArray, x: FloatArray, s: FloatArray, out: FloatArray
+) -> None:
+    """Write sums over k ≥ first of x[k − l] s[k − l − d] at the first l, shape (width,).
+
+    From d − 1 to d the sum loses what s changes by at every move, times x at d − 1 later.
+    """
+    begin, end, rows = window.first - window.lag, window.samples - window.lag, len(places)
+    now = 0.0
+    for i in range(rows):
+        until = min(places[i + 1], end) if i + 1 < rows else end
+        now += max(until - max(places[i], begin), 0) * x[i] * s[i]
+    out[0] = now
+    for d in range(1, len(out)):
+        for i in range(1, rows):
+            k, at = places[i] + d - 1, i
+            if begin <= k < end:
+                while at + 1 < rows and places[at + 1] <= k:
+                    at += 1
+                now -= x[at] * (s[i] - s[i - 1])
+        out[d] = now
+
+
+@compiled
 def _plain_products(
     window: Window, places: IntArray, values: FloatArray, room: FloatArray, out: FloatArray
 ) -> None:
-    """Write sums over k ≥ first of x[k − l] s[k − l − d], shape (c², width, L).
-
-    Channels x and s are the quotient and the rest of the row by c.
+    """Add lagged products of a signal to ``out``, shape (pairs, width, L).
 
     Args:
         room: for samples, shape (c, N).
     """
     channels, lags = len(room), window.lags
     begin, end = window.first - window.lag, window.samples - window.lag
-    often = len(places) * MOVES_APART > end - begin
-    if often:
-        _samples(places, values, begin - lags + 1, end, room)
-    else:
-        _samples(places, values, begin - lags + 1, begin, room)
-        _samples(places, values, end - lags + 1, end, room)
-    for pair in range(len(out)):
-        one, two = pair // channels, pair % channels
-        x, s = room[one], room[two]
-        for d in range(min(window.width, lags)):
-            if often:
-                now = np.dot(x[begin:end], s[begin - d : end - d])
-            else:
-                now = _stretch_product(places, values[:, one], values[:, two], d, begin, end)
-            out[pair, d, 0] = now
-            for position in range(1, lags - d):
-                before, last = begin - position, end - position
-                now += x[before] * s[before - d] - x[last] * s[last - d]
-                out[pair, d, position] = now
+    _samples(places, values, begin - lags + 1, begin, room)
+    _samples(places, values, end - lags + 1, end, room)
+    first = np.empty(min(window.width, lags))
+    for one in range(channels):
+        for two in range(channels):
+            _first_products(window, places, values[:, one], values[:, two], first)
+            x, s, products = room[one], room[two], out[one + two]
+            for d in range(len(first)):
+                now = first[d]
+                products[d, 0] += now
+                for position in range(1, lags - d):
+                    before, last = begin - position, end - position
+                    now += x[before] * s[before - d] - x[last] * s[last - d]
+                    products[d, position] += now
 
 
 @compiled
@@ -143,42 +153,27 @@ def step_products(
         (first and last) and with each other, both ways added up. Row d holds the first L − d.
         Shape (G, c, L): with the rest.
     """
-    size, channels = len(offsets) - 1, values.shape[1]
-    lags, width = window.lags, window.width
-    out = np.zeros((size, 2 * channels - 1, width, lags))
+    size, channels, lags = len(offsets) - 1, values.shape[1], window.lags
+    out = np.zeros((size, 2 * channels - 1, window.width, lags))
     right = np.empty((size, channels, lags))
     projected = np.empty((channels, lags, window.tails.shape[1]))
-    pairs = np.zeros((channels**2, width, lags))
     room = np.zeros((channels, window.samples))
     plain = len(window.numerator) == 1 and len(window.denominator) == 1
-    each = LANES // channels
-    z = np.empty((1 if plain else window.samples, LANES))
-    lanes = np.zeros((2, width, lags, LANES))
+    if not plain:
+        filtered_products(window, offsets, places, values, out)
     for g in range(size):
         part = slice(offsets[g], offsets[g + 1])
-        at, of, lane = places[part], values[part], g % each
         if plain:
-            _plain_products(window, at, of, room, pairs)
-        elif lane == 0:
-            driving(window, offsets, places, values, g, z)
-            filtered_products(window, z, channels == 2, lanes)
+            _plain_products(window, places[part], values[part], room, out[g])
         for c in range(channels):
-            _projected(window, at, of, c, projected[c])
+            _projected(window, places[part], values[part], c, projected[c])
             for position in range(lags):
                 right[g, c, position] = projected[c, position, -1]
-        for pair in range(channels**2):
-            one, two = pair // channels, pair % channels
-            products = out[g, one + two]
-            for d in range(width):
-                for position in range(lags):
-                    if plain:
-                        value = pairs[pair, d, position]
-                    else:
-                        value = lanes[one ^ two, d, position, each * one + lane]
-                    if d == 0 and one == two:  # as a stem that stands still says nothing
-                        value += value * DEPENDENT + 1e-200
-                    products[d, position] += value
-            _without_projections(products, projected[one], projected[two])
+                value = out[g, 2 * c, 0, position]  # a stem that stands still says nothing
+                out[g, 2 * c, 0, position] = value + value * DEPENDENT + 1e-200
+        for one in range(channels):
+            for two in range(channels):
+                _without_projections(out[g, one + two], projected[one], projected[two])
     return out, right
 
 
@@ -232,3 +227,28 @@ def delay_energy(products: FloatArray, right: FloatArray, rest: float) -> FloatA
         for t in range(out.shape[1]):
             out[g, t] = left_over(products[g, 0], right[g, 0], t, rest, room)
     return out
+
+
+@compiled
+def best_apart(grid: FloatArray, loss: FloatArray, count: int, apart: float) -> IntArray:
+    """Return up to ``count`` rows of least finite loss, at least ``apart`` from each other.
+
+    Args:
+        grid: shape (G, 2); rows are as far apart as the coordinate in which they are further.
+        loss: shape (G,).
+    """
+    chosen = np.empty(count, dtype=np.int64)
+    number = 0
+    left = loss.copy()
+    while number < count and len(left):
+        best = int(left.argmin())
+        if not left[best] < np.inf:
+            break
+        chosen[number] = best
+        number += 1
+        one, two = grid[best, 0], grid[best, 1]
+        for g in range(len(left)):
+            if abs(grid[g, 0] - one) < apart and abs(grid[g, 1] - two) < apart:
+                left[g] = np.inf
+        left[best] = np.inf
+    return chosen[:number].copy()

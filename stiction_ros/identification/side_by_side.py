@@ -44,7 +44,8 @@ def at_once(one: Callable[[], One], two: Callable[[], Two]) -> tuple[One, Two]:
 def together(*parts: Callable[[], Result]) -> list[Result]:
     """Return the results of all parts, in their order.
 
-    Parts may call this as well: where no thread is free all run in the calling one.
+    The calling thread takes the parts from the first on, the other one from the last on. Parts
+    may call this as well: where no thread is free all run in the calling one.
 
     Raises:
         Exception: of the first part, in their order, that raised one.
@@ -54,10 +55,10 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
     results: list[Future[Result]] = [Future() for _ in parts]
     waiting = collections.deque(zip(parts, results, strict=True))
 
-    def work() -> None:
+    def work(take: Callable[[], tuple[Callable[[], Result], Future[Result]]]) -> None:
         while waiting:
             try:
-                part, result = waiting.popleft()
+                part, result = take()
             except IndexError:  # the other thread took the last part
                 return
             try:
@@ -67,11 +68,11 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
 
     def help_out() -> None:
         try:
-            work()
+            work(waiting.pop)
         finally:
             _free.release()
 
     helping = _helper().submit(help_out)
-    work()
+    work(waiting.popleft)
     helping.result()  # so that it is free for the next call
     return [result.result() for result in results]

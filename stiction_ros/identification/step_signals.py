@@ -64,6 +64,8 @@ class StepSignals:
     @property
     def moves(self) -> IntArray:
         """How often the first channel of each signal changes, shape (G,)."""
+        if self.values.shape[1] == 1:  # every row but the first is a change
+            return np.diff(self.offsets) - 1
         changed = np.zeros(len(self.places) + 1, dtype=np.int64)
         changed[1:-1] = self.values[1:, 0] != self.values[:-1, 0]
         changed[self.offsets] = 0

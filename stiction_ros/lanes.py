@@ -1,0 +1,139 @@
+"""Eight numbers side by side in compiled loops: one instruction works on all of them.
+
+A recursion over samples cannot be vectorised in time. Eight signals can go through it at once,
+which a compiler finds by itself only where it may; here it is said. A *row* is what
+:func:`row` reads from eight numbers that follow each other in memory and :func:`put` writes
+back; rows are added, subtracted and multiplied, by each other or by a number.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, overload, register_model
+
+LANES = 8
+
+_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+_PLACES = ir.VectorType(ir.IntType(32), LANES)
+
+
+class Row(types.Type):
+    """LANES numbers in one register; in Python nothing but a name."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"Row({LANES})")
+
+
+_ROW = Row()
+
+
+@register_model(Row)
+class _RowModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Row) -> None:
+        super().__init__(manager, kind, _VECTOR)
+
+
+def _memory(context: Any, builder: Any, kind: Any, array: Any, at: Any) -> Any:
+    """Return the address of LANES numbers of a contiguous array from its element ``at`` on."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [at]), _VECTOR.as_pointer())
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    one = builder.insert_element(_VECTOR(ir.Undefined), value, cgutils.int32_t(0))
+    return builder.shuffle_vector(one, _VECTOR(ir.Undefined), _PLACES([0] * LANES))
+
+
+@intrinsic
+def row(typing: Any, array: Any, at: Any) -> Any:
+    """Return LANES numbers of a C-contiguous array from the flat index LANES · at on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        index = builder.mul(arguments[1], cgutils.intp_t(LANES))
+        place = _memory(context, builder, signature.args[0], arguments[0], index)
+        return builder.load(place, align=8)
+
+    return _ROW(array, types.intp), generate
+
+
+@intrinsic
+def put(typing: Any, array: Any, at: Any, value: Any) -> Any:
+    """Write a row where :func:`row` reads it."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        index = builder.mul(arguments[1], cgutils.intp_t(LANES))
+        place = _memory(context, builder, signature.args[0], arguments[0], index)
+        builder.store(arguments[2], place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, _ROW), generate
+
+
+@intrinsic
+def spread(typing: Any, value: Any) -> Any:
+    """Return a row of equal numbers."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _spread(builder, arguments[0])
+
+    return _ROW(types.float64), generate
+
+
+@intrinsic
+def halves_swapped(typing: Any, value: Any) -> Any:
+    """Return the row with its second half before its first."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        order = [(lane + LANES // 2) % LANES for lane in range(LANES)]
+        return builder.shuffle_vector(arguments[0], _VECTOR(ir.Undefined), _PLACES(order))
+
+    return _ROW(_ROW), generate
+
+
+def _by_lanes(method: str) -> Any:
+    @intrinsic
+    def compute(typing: Any, one: Any, two: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return getattr(builder, method)(*arguments)
+
+        return _ROW(_ROW, _ROW), generate
+
+    return compute
+
+
+_sum, _difference, _product = _by_lanes("fadd"), _by_lanes("fsub"), _by_lanes("fmul")
+
+
+# Numba wants an overload to have the very parameters of what it returns, annotations included.
+@overload(operator.add)
+def _add(one: Any, two: Any) -> Any:
+    def both(one: Any, two: Any) -> Any:
+        return _sum(one, two)
+
+    return both if one is _ROW and two is _ROW else None
+
+
+@overload(operator.sub)
+def _subtract(one: Any, two: Any) -> Any:
+    def both(one: Any, two: Any) -> Any:
+        return _difference(one, two)
+
+    return both if one is _ROW and two is _ROW else None
+
+
+@overload(operator.mul)
+def _multiply(one: Any, two: Any) -> Any:
+    def both(one: Any, two: Any) -> Any:
+        return _product(one, two)
+
+    def scaled(one: Any, two: Any) -> Any:
+        return _product(spread(one), two)
+
+    if two is not _ROW:
+        return None
+    return both if one is _ROW else scaled if one is types.float64 else None
