@@ -3,7 +3,7 @@
 A recursion over samples cannot be vectorised in time. Eight signals can go through it at once,
 which a compiler finds by itself only where it may; here it is said. A *row* is what
 :func:`row` reads from eight numbers that follow each other in memory and :func:`put` writes
-back; rows are added, subtracted and multiplied, by each other or by a number.
+back; rows are added, subtracted, multiplied and divided, and multiplied by a number.
 """
 
 from __future__ import annotations
@@ -106,7 +106,8 @@ def _by_lanes(method: str) -> Any:
     return compute
 
 
-_sum, _difference, _product = _by_lanes("fadd"), _by_lanes("fsub"), _by_lanes("fmul")
+_sum, _difference = _by_lanes("fadd"), _by_lanes("fsub")
+_product, _quotient = _by_lanes("fmul"), _by_lanes("fdiv")
 
 
 # Numba wants an overload to have the very parameters of what it returns, annotations included.
@@ -137,3 +138,11 @@ def _multiply(one: Any, two: Any) -> Any:
     if two is not _ROW:
         return None
     return both if one is _ROW else scaled if one is types.float64 else None
+
+
+@overload(operator.truediv)
+def _divide(one: Any, two: Any) -> Any:
+    def both(one: Any, two: Any) -> Any:
+        return _quotient(one, two)
+
+    return both if one is _ROW and two is _ROW else None

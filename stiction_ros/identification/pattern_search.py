@@ -124,9 +124,11 @@ class PatternSearch:
         self, cells: Cells, dynamic: float, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the best stem before the first slip at f_D, and its loss, per cell."""
-        before = cells.signs == 0.0
-        bases = np.where(before, 0.0, cells.bases - dynamic * cells.signs)
-        level, _, loss, _ = self.minimised(bases, -before.astype(float), ranges)
+        base, sign = cells.steps.values.T
+        before = sign == 0.0
+        stem = np.where(before, 0.0, base - dynamic * sign)
+        values = np.column_stack([stem, -before.astype(float)])
+        level, _, loss, _ = self._minimised(dataclasses.replace(cells.steps, values=values), ranges)
         return level, loss
 
     def minimised(
