@@ -22,7 +22,7 @@ from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
-WORTHWHILE = 64  # stems, from which on two threads share a scan
+WORTHWHILE = 64  # stems or patterns, from which on two threads share a scan
 
 
 DelayRanges = tuple[tuple[int, int], ...]
@@ -374,15 +374,17 @@ def settle_delays(
 def _neighbours(data: Data, model: Model, orders: Orders, i: int, j: int) -> dict[int, OutputFit]:
     """Return fits by delay of channel (i, j), out from the present one until rejected."""
     now = model.delays[i][j]
-    rivals = {now: model.fits[i]}
-    for shift in (-1, 1):
-        best, delay = model.fits[i].loss, now + shift
+
+    def outwards(shift: int) -> dict[int, OutputFit]:
+        best, delay, met = model.fits[i].loss, now + shift, {}
         while data.delay[0] <= delay <= data.delay[1]:
             row = list(model.delays[i])
             row[j] = delay
-            fit = fit_output(data.y[i], model.stems, tuple(row), orders)
-            rivals[delay] = fit
-            if fit.loss > best + DELAY_MARGIN:
+            met[delay] = fit_output(data.y[i], model.stems, tuple(row), orders)
+            if met[delay].loss > best + DELAY_MARGIN:
                 break
-            best, delay = min(best, fit.loss), delay + shift
-    return rivals
+            best, delay = min(best, met[delay].loss), delay + shift
+        return met
+
+    shorter, longer = together(partial(outwards, -1), partial(outwards, 1))
+    return {now: model.fits[i]} | shorter | longer

@@ -16,6 +16,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.level_kernels import best_levels
 from stiction_ros.identification.models import (
+    WORTHWHILE,
     Criterion,
     Data,
     DelayRanges,
@@ -145,7 +146,20 @@ class PatternSearch:
         self, patterns: StepSignals, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Minimise as :meth:`minimised` does, of base and sign as two channels."""
-        energies = together(*(partial(scan.patterns, patterns) for scan in self.scans))
+        middle = patterns.size // 2
+        if patterns.size < WORTHWHILE:
+            return self._minimised_part(patterns, ranges)
+        one, two = together(
+            partial(self._minimised_part, patterns.part(0, middle), ranges[:middle]),
+            partial(self._minimised_part, patterns.part(middle, patterns.size), ranges[middle:]),
+        )
+        levels, second, loss, delays = map(np.concatenate, zip(one, two, strict=True))
+        return levels, second, loss, delays
+
+    def _minimised_part(
+        self, patterns: StepSignals, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        energies = [scan.patterns(patterns) for scan in self.scans]
         widest = max(energies, key=lambda energy: energy.delays)
         products = np.zeros((patterns.size, len(energies), *widest.products.shape[1:]))
         rights = np.zeros((patterns.size, len(energies), *widest.rights.shape[1:]))

@@ -206,9 +206,10 @@ def left_over(
         pivot = matrix[i, i]
         if pivot <= DEPENDENT * diagonal[i]:
             continue
-        total += vector[i] * vector[i] / pivot
+        inverse = 1.0 / pivot
+        total += vector[i] * vector[i] * inverse
         for j in range(i + 1, width):
-            factor = matrix[j, i] / pivot
+            factor = matrix[j, i] * inverse
             vector[j] -= factor * vector[i]
             for below in range(i + 1, j + 1):
                 matrix[j, below] -= factor * matrix[below, i]

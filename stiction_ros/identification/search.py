@@ -372,9 +372,11 @@ def search(data: Data, model: Model, orders: Orders) -> SearchOutcome:
     sticky = np.flatnonzero(model.friction[:, 0])
     if len(sticky) > 1:
         for _ in range(ROUNDS):
-            before = model.loss
+            gains = []
             for valve in sticky:
-                model = improve_valve(data, model, orders, int(valve))
-            if model.loss > before - LEAST_GAIN:
+                better = improve_valve(data, model, orders, int(valve))
+                gains.append(model.loss - better.loss)
+                model = better
+            if max(gains) < LEAST_GAIN:
                 break
     return SearchOutcome(model, tuple(rivals))

@@ -56,6 +56,12 @@ class StepSignals:
             np.concatenate([part.values for part in parts]),
         )
 
+    def part(self, begin: int, end: int) -> StepSignals:
+        """Return the signals from ``begin`` to before ``end``."""
+        rows = slice(self.offsets[begin], self.offsets[end])
+        offsets = self.offsets[begin : end + 1] - self.offsets[begin]
+        return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
+
     @property
     def size(self) -> int:
         """G, number of signals."""
