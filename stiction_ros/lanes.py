@@ -1,41 +1,52 @@
 """Eight numbers side by side in compiled loops: one instruction works on all of them.
 
 A recursion over samples cannot be vectorised in time. Eight signals can go through it at once,
-which a compiler finds by itself only where it may; here it is said. A *row* is what
-:func:`row` reads from eight numbers that follow each other in memory and :func:`put` writes
-back; rows are added, subtracted, multiplied and divided, and multiplied by a number.
+which the compiler does not find by itself; here it is said. A *row* is what :func:`row` reads
+from eight numbers that follow each other in memory and :func:`put` writes back; rows are added,
+subtracted, multiplied and divided, and multiplied by a number. In type hints a row is an array
+of LANES numbers; there are none outside compiled code.
 """
 
 from __future__ import annotations
 
 import operator
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
+from stiction_ros.effects.behaviour import FloatArray
+
 LANES = 8
+
+_Rule = Callable[..., Any]
+_compiled_in_place = cast(Callable[[_Rule], _Rule], intrinsic)
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _PLACES = ir.VectorType(ir.IntType(32), LANES)
 
 
-class Row(types.Type):
-    """LANES numbers in one register; in Python nothing but a name."""
+class _Row(types.Type):
+    """LANES numbers in one register."""
 
     def __init__(self) -> None:
         super().__init__(name=f"Row({LANES})")
 
 
-_ROW = Row()
+_ROW = _Row()
 
 
-@register_model(Row)
+@register_model(_Row)
 class _RowModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Row) -> None:
-        super().__init__(manager, kind, _VECTOR)
+    def __init__(self, manager: Any, kind: _Row) -> None:
+        cast(Any, super()).__init__(manager, kind, _VECTOR)
+
+
+def _holds_rows(kind: Any) -> bool:
+    return isinstance(kind, types.Array) and kind.dtype is types.float64 and kind.layout == "C"
 
 
 def _memory(context: Any, builder: Any, kind: Any, array: Any, at: Any) -> Any:
@@ -44,14 +55,15 @@ def _memory(context: Any, builder: Any, kind: Any, array: Any, at: Any) -> Any:
     return builder.bitcast(builder.gep(data, [at]), _VECTOR.as_pointer())
 
 
-def _spread(builder: Any, value: Any) -> Any:
+def _filled(builder: Any, value: Any) -> Any:
     one = builder.insert_element(_VECTOR(ir.Undefined), value, cgutils.int32_t(0))
     return builder.shuffle_vector(one, _VECTOR(ir.Undefined), _PLACES([0] * LANES))
 
 
-@intrinsic
-def row(typing: Any, array: Any, at: Any) -> Any:
-    """Return LANES numbers of a C-contiguous array from the flat index LANES · at on."""
+@_compiled_in_place
+def _row(typing: Any, array: Any, at: Any) -> Any:
+    if not _holds_rows(array):
+        return None
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         index = builder.mul(arguments[1], cgutils.intp_t(LANES))
@@ -61,9 +73,10 @@ def row(typing: Any, array: Any, at: Any) -> Any:
     return _ROW(array, types.intp), generate
 
 
-@intrinsic
-def put(typing: Any, array: Any, at: Any, value: Any) -> Any:
-    """Write a row where :func:`row` reads it."""
+@_compiled_in_place
+def _put(typing: Any, array: Any, at: Any, value: Any) -> Any:
+    if not _holds_rows(array):
+        return None
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         index = builder.mul(arguments[1], cgutils.intp_t(LANES))
@@ -74,20 +87,16 @@ def put(typing: Any, array: Any, at: Any, value: Any) -> Any:
     return types.void(array, types.intp, _ROW), generate
 
 
-@intrinsic
-def spread(typing: Any, value: Any) -> Any:
-    """Return a row of equal numbers."""
-
+@_compiled_in_place
+def _spread(typing: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _spread(builder, arguments[0])
+        return _filled(builder, arguments[0])
 
     return _ROW(types.float64), generate
 
 
-@intrinsic
-def halves_swapped(typing: Any, value: Any) -> Any:
-    """Return the row with its second half before its first."""
-
+@_compiled_in_place
+def _halves_swapped(typing: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         order = [(lane + LANES // 2) % LANES for lane in range(LANES)]
         return builder.shuffle_vector(arguments[0], _VECTOR(ir.Undefined), _PLACES(order))
@@ -95,8 +104,21 @@ def halves_swapped(typing: Any, value: Any) -> Any:
     return _ROW(_ROW), generate
 
 
+row = cast(Callable[[FloatArray, int], FloatArray], _row)
+"""Return row ``at`` of a C-contiguous array: LANES numbers from its element LANES · at on."""
+
+put = cast(Callable[[FloatArray, int, FloatArray], None], _put)
+"""Write a row where :func:`row` reads it."""
+
+spread = cast(Callable[[float], FloatArray], _spread)
+"""Return a row of equal numbers."""
+
+halves_swapped = cast(Callable[[FloatArray], FloatArray], _halves_swapped)
+"""Return a row with its second half before its first."""
+
+
 def _by_lanes(method: str) -> Any:
-    @intrinsic
+    @_compiled_in_place
     def compute(typing: Any, one: Any, two: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return getattr(builder, method)(*arguments)
@@ -133,7 +155,7 @@ def _multiply(one: Any, two: Any) -> Any:
         return _product(one, two)
 
     def scaled(one: Any, two: Any) -> Any:
-        return _product(spread(one), two)
+        return _product(_spread(one), two)
 
     if two is not _ROW:
         return None

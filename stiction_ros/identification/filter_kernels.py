@@ -14,7 +14,6 @@ from stiction_ros.lanes import LANES, halves_swapped, put, row, spread
 IntArray = NDArray[np.int64]
 
 
-
 class Window(NamedTuple):
     """What of a scan is the same for all signals.
 
@@ -59,9 +58,9 @@ def _driving(
     for i in range(min(each, len(offsets) - 1 - group)):
         for c in range(channels):
             before, lane = 0.0, each * c + i
-            for row in range(offsets[group + i], offsets[group + i + 1]):
-                step, at = values[row, c] - before, places[row]
-                before = values[row, c]
+            for move in range(offsets[group + i], offsets[group + i + 1]):
+                step, at = values[move, c] - before, places[move]
+                before = values[move, c]
                 for d in range(min(order, window.samples - at)):
                     out[at + d, lane] += step * window.numerator[d]
 
@@ -112,7 +111,7 @@ def tails_of(
         samples: N.
         length: at least N; 0 from there on.
     """
-    count, last = rows.shape
+    count = len(rows)
     out = np.zeros((length, count))
     z = np.empty((samples, LANES))
     for begin in range(0, count, LANES):

@@ -126,7 +126,7 @@ class ValveScan:
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
         loss = np.where(self.moves < min_moves, np.inf, self.loss)
-        return best_apart(self.grid, loss, count, apart).tolist()
+        return [int(index) for index in best_apart(self.grid, loss, count, apart)]
 
 
 def stem_of(data: Data, valve: int, friction: FloatArray, start: float) -> FloatArray:

@@ -129,4 +129,3 @@ class PatternEnergy:
                     self.products[g], self.rights[g], level, self._rest_energy, out[g, f]
                 )
         return out
-
