@@ -130,10 +130,10 @@ def tails_of(
 
 
 @compiled_fused
-def _products(window: Window, z: FloatArray, crossed: bool, out: FloatArray) -> None:
+def _products(window: Window, z: FloatArray, crossed: int, out: FloatArray) -> None:
     """Write sums over k ≥ first of z[k − l] z[k − l − d], shape (width, L, LANES).
 
-    Crossed, the second factor comes from the lane that is half of the lanes further.
+    Unless ``crossed`` is 0, the second factor comes from the lane that is half of the lanes further.
     """
     lags, width = window.lags, min(window.width, window.lags)
     begin, end = window.first - window.lag, window.samples - window.lag
@@ -169,20 +169,18 @@ def filtered_products(
     size, channels = len(out), values.shape[1]
     each = LANES // channels
     z = np.empty((window.samples, LANES))
-    own = np.zeros((window.width, window.lags, LANES))
-    crossed = np.zeros((window.width, window.lags, LANES))
+    sums = np.zeros((channels, window.width, window.lags, LANES))
     for group in range(0, size, each):
         _driving(window, offsets, places, values, group, z)
         _recursion(window.denominator, z)
-        _products(window, z, False, own)
-        if channels > 1:
-            _products(window, z, True, crossed)
+        for crossed in range(channels):
+            _products(window, z, crossed, sums[crossed])
         for lane in range(min(each, size - group)):
             for d in range(window.width):
                 for position in range(window.lags):
-                    now = own[d, position]
-                    out[group + lane, 0, d, position] = now[lane]
+                    now = sums[:, d, position]
+                    out[group + lane, 0, d, position] = now[0, lane]
                     if channels > 1:
-                        out[group + lane, 2, d, position] = now[each + lane]
-                        now = crossed[d, position]
-                        out[group + lane, 1, d, position] = now[lane] + now[each + lane]
+                        other = each + lane
+                        out[group + lane, 1, d, position] = now[1, lane] + now[1, other]
+                        out[group + lane, 2, d, position] = now[0, other]

@@ -22,7 +22,7 @@ from stiction_ros.identification.step_signals import StepSignals, stem_steps
 
 DELAY_MARGIN = 10.8
 EQUAL = 3.84
-WORTHWHILE = 64  # stems or patterns, from which on two threads share a scan
+WORTHWHILE = 400_000  # samples of all stems or patterns, from which on two threads share them
 
 
 DelayRanges = tuple[tuple[int, int], ...]
@@ -223,7 +223,8 @@ def scan_stems(
                 best[c, rows, i] = energy.argmin(axis=1) + ranges[i][0]
                 loss[c, rows] += criterion.loss(energy.min(axis=1), scan.count)
 
-    batch = BATCH if len(grid) < WORTHWHILE else min(BATCH, len(grid) // 2 + 1)
+    shared = len(grid) * len(u) >= WORTHWHILE
+    batch = min(BATCH, len(grid) // 2 + 1) if shared else BATCH
     begins = range(0, len(grid), batch)
     together(*(partial(scanned, slice(begin, begin + batch)) for begin in begins))
     return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(scans))]

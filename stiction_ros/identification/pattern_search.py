@@ -147,7 +147,7 @@ class PatternSearch:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Minimise as :meth:`minimised` does, of base and sign as two channels."""
         middle = patterns.size // 2
-        if patterns.size < WORTHWHILE:
+        if patterns.size * patterns.count < WORTHWHILE:
             return self._minimised_part(patterns, ranges)
         one, two = together(
             partial(self._minimised_part, patterns.part(0, middle), ranges[:middle]),
