@@ -133,7 +133,7 @@ def tails_of(
 def _products(window: Window, z: FloatArray, crossed: int, out: FloatArray) -> None:
     """Write sums over k ≥ first of z[k − l] z[k − l − d], shape (width, L, LANES).
 
-    Unless ``crossed`` is 0, the second factor comes from the lane that is half of the lanes further.
+    Unless ``crossed`` is 0, the second factor comes from the lane half of the lanes further on.
     """
     lags, width = window.lags, min(window.width, window.lags)
     begin, end = window.first - window.lag, window.samples - window.lag
