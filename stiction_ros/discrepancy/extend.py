@@ -107,18 +107,26 @@ def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> B
     A drift, a sine or a gain that was found beside something that was not yet in the model is
     a little wrong; what comes next is fitted together with it.
     """
-    return left_open(Baseline.of(run_with(bare, runs, others)), others)
+    run = run_with(bare, runs, others)
+    return Baseline.of(run, columns=open_columns(run, others))
 
 
 def left_open(base: Baseline, added: Sequence[AddedEffect]) -> Baseline:
-    """Return the baseline with the linear figures of added effects among the free columns."""
-    columns = list(base.columns)
+    """Return the baseline of added effects, their linear figures left open where there are any."""
+    if not any(effect.fit.candidate.factors for effect in added):
+        return base
+    return Baseline.of(base.run, columns=open_columns(base.run, added))
+
+
+def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]:
+    """Return per output the free columns and those of linear figures, shape (N, q)."""
+    columns = list(run.free)
     for effect in added:
         candidate, point = effect.fit.candidate, effect.fit.point
         if candidate.factors:
-            for i, sizes in candidate.respond(base.run, point[None, :]).sizes.items():
+            for i, sizes in candidate.respond(run, point[None, :]).sizes.items():
                 columns[i] = np.hstack([columns[i], sizes[:, 0]])
-    return Baseline.of(base.run, columns=columns) if added else base
+    return columns
 
 
 def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
