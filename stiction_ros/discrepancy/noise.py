@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from stiction_ros.discrepancy.noise_kernels import (
     NOTHING,
@@ -87,6 +88,11 @@ def whiten(values: FloatArray, ar: FloatArray) -> FloatArray:
     for lag, coefficient in enumerate(ar.tolist(), start=1):
         out[lag:] -= coefficient * values[:-lag]
     return out
+
+
+def coloured(white: FloatArray, ar: FloatArray) -> FloatArray:
+    """Return r_k = Σ φ_i r_{k−i} + white_k along the first axis: the inverse of :func:`whiten`."""
+    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), white, axis=0))
 
 
 def fit_noise(

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.stats import qmc
 
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.misfit import misfit
 from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
-from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
+from stiction_ros.discrepancy.noise import coloured, fit_noise, projector, whiten
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
 
@@ -235,4 +234,4 @@ def _rebuilt(innovations: FloatArray, ar: FloatArray, random: np.random.Generato
     count = len(innovations)
     begins = random.integers(0, max(count - BLOCK, 1), count // BLOCK + 1)
     drawn = np.concatenate([innovations[b : b + BLOCK] for b in begins])[:count]
-    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), drawn - drawn.mean()))
+    return coloured(drawn - drawn.mean(), ar)

@@ -32,8 +32,8 @@ from stiction_ros.discrepancy.extend import (
 )
 from stiction_ros.discrepancy.free_intervals import with_free_process
 from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
-from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
-from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
+from stiction_ros.discrepancy.free_run import FreeRun, Runs
+from stiction_ros.discrepancy.gate import DataFinding, open_gate
 from stiction_ros.discrepancy.long_records import liveliest_parts
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.measured_stem import not_contradicted
@@ -99,9 +99,8 @@ class _Workflow:
         self.report = progress or (lambda share: None)
         self.begun = time.perf_counter()
         self.random = np.random.default_rng(options.seed)
-        runs = join_records(model, liveliest_parts(records) if options.free_process else records)
-        self.gate: Gate = look_at_data(model, runs)
-        runs = dataclasses.replace(runs, usable=self.gate.usable)
+        kept = liveliest_parts(records) if options.free_process else records
+        runs, self.gate = open_gate(model, kept)
         self.controller: ControllerCheck = check_controller(model, runs)
         found = self.controller.finding
         self.data: list[DataFinding] = [*([found] if found else []), *self.gate.findings]
