@@ -57,7 +57,7 @@ class StemScan:
             delays: of that valve, samples, without gaps.
             prefilter: of all signals.
         """
-        self.runs, self.prefilter = problem.runs, prefilter
+        self.problem, self.prefilter = problem, prefilter
         self.width = len(own.b[valve])
         self.rows = int(problem.blocks.train.sum())
         self.lags = range(delays[0] + 1, delays[-1] + 1 + self.width)
@@ -69,7 +69,7 @@ class StemScan:
         self._masks = np.zeros((len(self.lags), count))
         whole = np.zeros((count, inner.shape[1]))
         whole[problem.blocks.train] = inner
-        for rows in self.runs.slices:
+        for rows in problem.runs.slices:
             for place, lag in enumerate(self.lags):
                 target = slice(rows.start, max(rows.stop - lag, rows.start))
                 source = slice(min(rows.start + lag, rows.stop), rows.stop)
@@ -95,12 +95,12 @@ class StemScan:
 
     def energy(self, stems: FloatArray) -> FloatArray:
         """Return the sum of squares, shape (G, T), for stems of shape (N, G) and T delays."""
-        x = end_to_end([self._filtered(stems[rows]) for rows in self.runs.slices])
+        x = end_to_end([self._filtered(stems[rows]) for rows in self.problem.runs.slices])
         projected = (self._basis.reshape(-1, len(x)) @ x).reshape(*self._basis.shape[:2], -1)
         projected = np.ascontiguousarray(np.moveaxis(projected, -1, 0))
         products = np.empty((x.shape[1], 1, self.width, len(self.lags)))
         for d in range(self.width):
-            products[:, 0, d] = (self._masks @ (x * self._late(x, d))).T
+            products[:, 0, d] = (self._masks @ (x * self.problem.late(x, d))).T
         products[:, :, 0] = products[:, :, 0] * (1.0 + DEPENDENT) + 1e-200
         for own, inner in zip(products[:, 0], projected, strict=True):
             _without_projections(own, inner, inner)
@@ -111,11 +111,3 @@ class StemScan:
         """Return the stems of one record, in deviations from the first, behind the prefilter."""
         numerator, denominator = self.prefilter.numerator, self.prefilter.denominator
         return filtered(numerator, denominator, np.ascontiguousarray(stems), np.zeros(len(stems)))
-
-    def _late(self, x: FloatArray, count: int) -> FloatArray:
-        if not count:
-            return x
-        out = np.zeros_like(x)
-        for rows in self.runs.slices:
-            out[rows.start + count : rows.stop] = x[rows.start : rows.stop - count]
-        return out

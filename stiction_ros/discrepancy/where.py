@@ -137,8 +137,8 @@ def _change(residual: FloatArray, scored: BoolArray) -> tuple[int, float]:
 def _line(base: Baseline, output: int) -> tuple[float, float]:
     """Return the strongest period of the gap in seconds and its share of the variance."""
     values = base.noise[output].residual
-    rows = max(base.run.runs.slices, key=lambda rows: rows.stop - rows.start)
-    part = values[rows] - values[rows].mean()
+    part = values[base.run.runs.longest]
+    part = part - part.mean()
     power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
     power[:2] = 0.0
     peak = int(np.argmax(power))
