@@ -36,6 +36,6 @@ def _gain(seen: BlindLoop, truth: Truth, entry: Hidden) -> float:
     gains = [
         fit_candidate(base, gap, candidate).evidence
         for candidate in all_candidates(base)
-        if entry.name in {(candidate.place, candidate.effect), *candidate.twins}
+        if entry.name in candidate.keys
     ]
     return max(gains, default=-math.inf) - MARGIN

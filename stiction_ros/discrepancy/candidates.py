@@ -150,6 +150,10 @@ class Candidate(ABC):
             return coordinates
         return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
 
+    def coordinates(self, point: FloatArray) -> FloatArray:
+        """Return the coordinates of the search of one point, both of shape (axes,)."""
+        return np.array([a.inner(v) for a, v in zip(self.axes, point.tolist(), strict=True)])
+
     def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
         """Return values in a box around a point, shape (G, axes); for needles alone.
 
@@ -163,6 +167,16 @@ class Candidate(ABC):
     def lead(self, point: FloatArray) -> float:
         """Return how far from OP a stem stands before the first sample, %."""
         return 0.0
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Place and effect."""
+        return self.place, self.effect
+
+    @property
+    def keys(self) -> tuple[tuple[str, str], ...]:
+        """Place and effect, its own first, of all that it stands for."""
+        return (self.key, *self.twins)
 
     @property
     def name(self) -> str:

@@ -146,7 +146,7 @@ def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> A
 def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
     """Return the candidate of the same place, effect and behaviour; None when there is none."""
     for candidate in candidates:
-        alike = (candidate.place, candidate.effect) == (wanted.place, wanted.effect)
+        alike = candidate.key == wanted.key
         if alike and getattr(candidate, "kind", None) is getattr(wanted, "kind", None):
             return candidate
     return None

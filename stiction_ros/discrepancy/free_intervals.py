@@ -47,7 +47,7 @@ def _region(
 ) -> FloatArray:
     """Return points that the likelihood does not reject, shape (K, axes), values."""
     axes = candidate.axes
-    centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
+    centre = candidate.coordinates(fit.point)
     steps = np.array([axis.step if axis.points > 1 else 0.0 for axis in axes])
     free = np.flatnonzero(steps)
     sides = np.meshgrid(*[np.linspace(-1.0, 1.0, BOX)] * len(free), indexing="ij")

@@ -56,10 +56,6 @@ class _Found:
     fit: CandidateFit
     equations: tuple[Equation, ...]
 
-    @property
-    def name(self) -> tuple[str, str]:
-        return self.fit.candidate.place, self.fit.candidate.effect
-
 
 def score_with_free_process(
     base: Baseline,
@@ -89,7 +85,7 @@ def score_with_free_process(
     fits = sorted(capped, key=lambda fit: -fit.delta_bic)
     models: dict[tuple[str, str], LoopModel] = {}
     for each in sorted(found, key=lambda f: -f.fit.delta_bic):
-        models.setdefault(each.name, with_equations(better.run.model, each.equations))
+        models.setdefault(each.fit.candidate.key, with_equations(better.run.model, each.equations))
     tried = (*told, *(stranger.candidate for stranger in strangers))
     return FreeScores(Scores(better, tried, tuple(fits)), models)
 

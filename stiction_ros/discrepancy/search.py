@@ -121,11 +121,7 @@ def fit_candidate(
         around: a point near which alone is searched, shape (axes,), values; None everywhere.
     """
     search = _Search(base, gap, candidate)
-    if around is None:
-        centres = search.coarse()[:STARTS]
-    else:
-        inner = [axis.inner(v) for axis, v in zip(candidate.axes, around.tolist(), strict=True)]
-        centres = [np.array(inner)]
+    centres = search.coarse()[:STARTS] if around is None else [candidate.coordinates(around)]
     for centre in centres:
         search.refine(centre, 0.7)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
@@ -213,8 +209,7 @@ class _Search:
         """Search on around the best point until smaller grids gain next to nothing."""
         if not self.candidate.axes or self.best().delta_bic <= 0.0:
             return
-        axes = zip(self.candidate.axes, self.best().point.tolist(), strict=True)
-        best = np.array([axis.inner(value) for axis, value in axes]), self.best()
+        best = self.candidate.coordinates(self.best().point), self.best()
         size = 0.7 * SHRINK**ROUNDS
         for _ in range(POLISHES):
             better = self._around(best, size)

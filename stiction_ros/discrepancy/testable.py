@@ -57,8 +57,7 @@ def testable_effects(
         if not candidate.inside:
             continue
         expected = _expected(base, candidate)
-        names = ((candidate.place, candidate.effect), *candidate.twins)
-        for name in names:
+        for name in candidate.keys:
             old = found.get(name)
             if old is None or old.expected < expected:
                 hint = EXPERIMENTS.get(candidate.effect, "")

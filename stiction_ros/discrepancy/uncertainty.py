@@ -155,7 +155,7 @@ def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
     axes = fit.candidate.axes
     if not axes:
         return np.zeros((1, 0))
-    centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
+    centre = fit.candidate.coordinates(fit.point)
     free = [d for d, a in enumerate(axes) if a.step > 0.0 and not a.linear]
     if not free:
         return fit.candidate.values(centre[None, :])

@@ -196,15 +196,15 @@ class _Workflow:
         where = locate(base)
         kept, reason = False, decision.reason
         if decision.chosen is not None and decision.inseparable:
-            chosen = decision.chosen.candidate
-            bare = models.get((chosen.place, chosen.effect), self.bare)
+            key = decision.chosen.candidate.key
+            bare = models.get(key, self.bare)
             step = self._extend(decision, bare)
             kept, reason = step.kept, step.reason
             if step.kept:
                 self.earlier.append(self.bare)
                 self.added, self.base, self.bare = step.added, step.base, bare
                 if models:
-                    self.gains[chosen.place, chosen.effect] = decision.chosen.delta_bic
+                    self.gains[key] = decision.chosen.delta_bic
         return Look(scores, decision, where, kept, reason), testable
 
     def _score(
