@@ -154,11 +154,7 @@ def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candid
 
 def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:
     """Return why the effect must go again; empty when the held-out rows bear it out."""
-    held = sum(
-        old.held_minus_two_log - new.held_minus_two_log
-        for old, new in zip(base.noise, after_base.noise, strict=True)
-    )
-    if not borne_out(base.bic - after_base.bic, held, dated):
+    if not borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated):
         return "the innovations of the held-out rows do not become smaller"
     return ""
 

@@ -167,14 +167,10 @@ def _run_behind(base: Baseline, equations: tuple[Equation, ...]) -> FreeRun:
 
 def _against(fit: CandidateFit, other: Baseline, base: Baseline) -> CandidateFit:
     """Return a fit that was scored against ``other`` as it stands against ``base``."""
-    held = sum(
-        old.held_minus_two_log - new.held_minus_two_log
-        for old, new in zip(other.noise, base.noise, strict=True)
-    )
     return dataclasses.replace(
         fit,
         delta_bic=fit.delta_bic - (other.bic - base.bic),
-        held_gain=fit.held_gain - held,
+        held_gain=fit.held_gain - base.held_gain(other),
     )
 
 

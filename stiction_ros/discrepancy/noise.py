@@ -153,6 +153,11 @@ def projector(columns: FloatArray) -> FloatArray:
     return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
 
 
+def left_by(basis: FloatArray, values: FloatArray) -> FloatArray:
+    """Return what an orthonormal basis, shape (n, r), leaves of values, shape (n, …)."""
+    return np.asarray(values - basis @ (basis.T @ values))
+
+
 def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
     if not columns.shape[1]:
         return np.zeros(0)

@@ -76,6 +76,13 @@ class Baseline:
         """BIC of the current model, but for what every candidate shares with it."""
         return sum(fit.bic(0) for fit in self.noise)
 
+    def held_gain(self, before: Baseline) -> float:
+        """Return −2 log likelihood that it gains on the held-out rows against another model."""
+        return sum(
+            old.held_minus_two_log - new.held_minus_two_log
+            for old, new in zip(before.noise, self.noise, strict=True)
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class CandidateFit:

@@ -13,7 +13,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.free_equation import Equation, Problem
 from stiction_ros.discrepancy.free_run import end_to_end
-from stiction_ros.discrepancy.noise import projector
+from stiction_ros.discrepancy.noise import left_by, projector
 from stiction_ros.discrepancy.response_kernels import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification.scan_kernels import (
@@ -90,8 +90,7 @@ class StemScan:
             columns.append(problem.each(problem.impulses(reach), numerator, denominator))
         train = problem.blocks.train
         basis = projector(np.hstack(columns)[train])
-        rest = y[train] - basis @ (basis.T @ y[train])
-        return basis, rest
+        return basis, left_by(basis, y[train])
 
     def energy(self, stems: FloatArray) -> FloatArray:
         """Return the sum of squares, shape (G, T), for stems of shape (N, G) and T delays."""

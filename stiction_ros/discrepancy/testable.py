@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
-from stiction_ros.discrepancy.noise import projector, whiten
+from stiction_ros.discrepancy.noise import left_by, projector, whiten
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 
@@ -82,8 +82,7 @@ def _expected(base: Baseline, candidate: Candidate) -> float:
             wave = wave + _reference_size(candidate, noise.innovation_std, response.sizes[i][:, 0])
         train = blocks.train
         basis = projector(whiten(base.columns[i], noise.ar)[train])
-        left = whiten(wave, noise.ar)[train]
-        left = left - basis @ (basis.T @ left)
+        left = left_by(basis, whiten(wave, noise.ar)[train])
         energy += float(left @ left) / max(noise.innovation_std**2, 1e-300)
         rows = max(rows, noise.rows)
     return energy - candidate.count(point[0]) * float(np.log(rows))

@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.misfit import misfit
 from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
-from stiction_ros.discrepancy.noise import coloured, fit_noise, projector, whiten
+from stiction_ros.discrepancy.noise import coloured, fit_noise, left_by, projector, whiten
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
 
@@ -98,7 +98,7 @@ def chance_threshold(
         for i, r in enumerate(rows)
     ]
     bases = [projector(whiten(base.columns[i], base.noise[i].ar)[rows[i]]) for i in outputs]
-    drawn = [each - q @ (q.T @ each) for each, q in zip(drawn, bases, strict=True)]
+    drawn = [left_by(q, each) for each, q in zip(drawn, bases, strict=True)]
     best = np.full(DRAWS, -np.inf)
     for candidate in candidates:
         if not candidate.inside:
@@ -129,7 +129,7 @@ def _chance_gain(
     total = np.sum(drawn**2, axis=0)
     if shift is not None:
         wave = whitened_shifts(np.ascontiguousarray(shift), np.flatnonzero(rows), ar)
-        wave -= basis @ (basis.T @ wave)
+        wave = left_by(basis, wave)
         left = (-2.0 * wave.T) @ drawn
         left += np.einsum("ng,ng->g", wave, wave)[:, None]
         left += total
@@ -137,7 +137,7 @@ def _chance_gain(
         assert sizes is not None
         count, points, factors = sizes.shape
         waves = whiten(sizes.reshape(count, -1), ar)[rows]
-        waves = (waves - basis @ (basis.T @ waves)).reshape(-1, points, factors)
+        waves = left_by(basis, waves).reshape(-1, points, factors)
         taken = []
         for g in range(points):
             inner = projector(waves[:, g])
@@ -199,8 +199,7 @@ def _factor_errors(base: Baseline, fit: CandidateFit) -> FloatArray:
     (output,) = response.sizes
     noise, rows = fit.noise[output], base.blocks[output].train
     basis = projector(whiten(base.columns[output], noise.ar)[rows])
-    columns = whiten(response.sizes[output][:, 0], noise.ar)[rows]
-    columns = columns - basis @ (basis.T @ columns)
+    columns = left_by(basis, whiten(response.sizes[output][:, 0], noise.ar)[rows])
     inverse = np.linalg.pinv(columns.T @ columns)
     return np.asarray(noise.innovation_std * np.sqrt(np.maximum(np.diag(inverse), 0.0)))
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.discrepancy.noise import BoolArray, projector
+from stiction_ros.discrepancy.noise import BoolArray, left_by, projector
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop.set_points import set_point_moves
@@ -178,9 +178,8 @@ def _track(base: Baseline, output: int, place: str, hats: FloatArray, columns: F
     """
     train = base.blocks[output].train
     basis = projector(base.columns[output][train])
-    target = base.run.gap[train, output]
-    target = target - basis @ (basis.T @ target)
-    inner = columns[train] - basis @ (basis.T @ columns[train])
+    target = left_by(basis, base.run.gap[train, output])
+    inner = left_by(basis, columns[train])
     gram, cross = inner.T @ inner, inner.T @ target
     rough = np.diff(np.eye(columns.shape[1]), axis=0)
     penalty = rough.T @ rough
