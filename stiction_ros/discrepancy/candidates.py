@@ -13,6 +13,10 @@ from stiction_ros.discrepancy.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray, Parameter
 from stiction_ros.effects.behaviour import SimulatesGrid
 
+_RANKED = 200  # points of a grid that may be among the best ones
+_NEIGHBOURS = 1.5  # steps of the first grid
+_TINY = 1e-300
+
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
@@ -153,6 +157,24 @@ class Candidate(ABC):
     def coordinates(self, point: FloatArray) -> FloatArray:
         """Return the coordinates of the search of one point, both of shape (axes,)."""
         return np.array([a.inner(v) for a, v in zip(self.axes, point.tolist(), strict=True)])
+
+    def apart(self, coordinates: FloatArray, loss: FloatArray, most: int) -> list[int]:
+        """Return the best points that are no neighbours of each other in the first grid.
+
+        Args:
+            coordinates: of the search, shape (G, axes).
+            loss: shape (G,), the least is best.
+            most: how many at most.
+        """
+        steps = np.array([max(axis.step, _TINY) for axis in self.axes])
+        chosen: list[int] = []
+        for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
+            away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]
+            if all(each.max(initial=0.0) > _NEIGHBOURS for each in away):
+                chosen.append(place)
+            if len(chosen) == most:
+                break
+        return chosen
 
     def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
         """Return values in a box around a point, shape (G, axes); for needles alone.

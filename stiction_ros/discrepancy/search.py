@@ -19,7 +19,6 @@ LEADERS = 4
 STARTS = 4
 MOMENTS = 241
 REACH = 4.0  # points of the first grid, wider than a held-out block
-MOST = 200
 SLOW = np.array([0.8])
 SHRINK = 0.4
 PROBE = 0.05  # of a linear axis, at which its parabola is taken
@@ -179,7 +178,7 @@ class _Search:
         for _ in range(3):
             for ar in guesses:
                 squares = misfit(self.base, self.gap, response, ar)
-                for point in self._apart(grid, squares):
+                for point in self.candidate.apart(grid, squares, LEADERS):
                     if point not in leaders:
                         fit = self.judge(values[point], response.pick(point))
                         leaders[point] = fit.delta_bic
@@ -187,20 +186,6 @@ class _Search:
             guesses = [{i: fit.ar for i, fit in best.noise.items()}]
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
-
-    def _apart(self, grid: FloatArray, squares: FloatArray) -> list[int]:
-        """Return the best points of a grid that are no neighbours of each other."""
-        steps = np.array([max(axis.step, _TINY) for axis in self.candidate.axes])
-        chosen: list[int] = []
-        for point in np.argsort(squares)[:MOST].tolist():
-            near = [
-                np.abs((grid[point] - grid[other]) / steps).max(initial=0.0) for other in chosen
-            ]
-            if all(distance > 1.5 for distance in near):
-                chosen.append(point)
-            if len(chosen) == LEADERS:
-                break
-        return chosen
 
     def refine(self, centre: FloatArray, size: float) -> None:
         """Search smaller and smaller grids around a point."""
