@@ -204,3 +204,8 @@ class Candidate(ABC):
     def name(self) -> str:
         """Name for people, such as ``valve:V1 stiction``."""
         return f"{self.place} {self.effect}"
+
+
+def figures_of(behaviour: Behaviour) -> dict[str, float]:
+    """Return the parameters of an effect by key, in engineering units."""
+    return {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}

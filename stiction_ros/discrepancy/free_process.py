@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
-from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates
+from stiction_ros.discrepancy.catalogue_scores import Progress, Scores, all_candidates
 from stiction_ros.discrepancy.decide import Decision, GapVerdict
 from stiction_ros.discrepancy.decoys import Dynamics
 from stiction_ros.discrepancy.extend import same_candidate
@@ -32,8 +32,6 @@ MORE_POLES = 2
 ABSORBED = ("lag", "pole", "delay", "gain", "leak", "other dynamics")
 # What bends the way from OP to PV may sit in the valve or in the process behind it.
 STATIC = ("characteristic", "saturation")
-
-Progress = Callable[[float], None]
 
 
 @dataclasses.dataclass(frozen=True)

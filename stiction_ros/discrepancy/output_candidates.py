@@ -195,7 +195,7 @@ def surprises(run: FreeRun, innovations: FloatArray) -> FloatArray:
     sizes = np.abs(innovations)
     for rows in run.runs.slices:
         sizes[rows.start : rows.start + run.responses.skip + MAX_ORDER] = 0.0
-    return np.asarray(run.runs.time[np.argsort(-sizes)[:SURPRISES]])
+    return np.asarray(run.runs.time[np.argsort(-sizes, kind="stable")[:SURPRISES]])
 
 
 def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:

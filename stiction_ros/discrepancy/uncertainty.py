@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.stats import qmc
 
-from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.candidates import Candidate, figures_of
 from stiction_ros.discrepancy.misfit import misfit
 from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
 from stiction_ros.discrepancy.noise import coloured, fit_noise, left_by, projector, whiten
@@ -218,7 +218,7 @@ def _parameters(
 ) -> dict[str, float]:
     behaviour = candidate.behaviour(base.run, point, factors)
     assert behaviour is not None
-    return {p.key: getattr(behaviour, p.attribute) for p in behaviour.parameters()}
+    return figures_of(behaviour)
 
 
 def _ends(

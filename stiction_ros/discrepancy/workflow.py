@@ -5,12 +5,17 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidates import Candidate
-from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, score_candidates
+from stiction_ros.discrepancy.candidates import Candidate, figures_of
+from stiction_ros.discrepancy.catalogue_scores import (
+    Progress,
+    Scores,
+    all_candidates,
+    score_candidates,
+)
 from stiction_ros.discrepancy.chance import stored_threshold
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
@@ -57,8 +62,6 @@ from stiction_ros.discrepancy.valve_candidates import departures
 from stiction_ros.discrepancy.where import locate
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-
-Progress = Callable[[float], None]
 
 
 def find_discrepancy(
@@ -289,14 +292,10 @@ class _Workflow:
 
     def _effect(self, k: int, effect: AddedEffect) -> FoundEffect:
         verdict = GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED
-        values = {
-            p.key: float(getattr(effect.behaviour, p.attribute))
-            for p in effect.behaviour.parameters()
-        }
         return FoundEffect(
             effect.place,
             effect.effect,
-            values,
+            figures_of(effect.behaviour),
             self._intervals(k, effect),
             self.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
             verdict,
@@ -327,8 +326,7 @@ def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
 
 
 def _data_effect(finding: DataFinding) -> FoundEffect:
-    behaviour = finding.behaviour
-    values = {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}
+    values = figures_of(finding.behaviour)
     return FoundEffect(
         finding.place, finding.effect, values, {}, finding.delta_bic, GapVerdict.NAMED
     )
