@@ -6,13 +6,13 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
 from stiction_ros.blind.generator import blind_loop
 from stiction_ros.discrepancy.catalogue_scores import all_candidates, score_candidates
 from stiction_ros.discrepancy.decide import confirmed, large_enough
-from stiction_ros.discrepancy.free_run import FreeRun, join_records
-from stiction_ros.discrepancy.gate import look_at_data
+from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.gate import open_gate
+from stiction_ros.discrepancy.noise import coloured
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 
@@ -43,8 +43,7 @@ def chance_scores(seeds: Sequence[int], draws: int) -> Iterator[ChanceScore]:
     """
     for seed in seeds:
         seen, _ = blind_loop(seed)
-        runs = join_records(seen.model, [seen.record])
-        runs = dataclasses.replace(runs, usable=look_at_data(seen.model, runs).usable)
+        runs, _ = open_gate(seen.model, [seen.record])
         base = Baseline.of(FreeRun(seen.model, runs))
         random = np.random.default_rng([seed, draws])
         for _ in range(draws):
@@ -65,5 +64,5 @@ def _drawn(base: Baseline, random: np.random.Generator) -> FloatArray:
     columns = []
     for noise in base.noise:
         white = random.standard_normal(len(noise.residual)) * noise.innovation_std
-        columns.append(lfilter([1.0], np.concatenate([[1.0], -noise.ar]), white))
+        columns.append(coloured(white, noise.ar))
     return np.column_stack(columns)

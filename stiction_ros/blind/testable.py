@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 from stiction_ros.blind.families import SHOWN_BY_DATA, Name
 from stiction_ros.blind.generator import BlindLoop
 from stiction_ros.blind.truth import Hidden, Truth
 from stiction_ros.discrepancy.catalogue_scores import all_candidates
-from stiction_ros.discrepancy.free_run import FreeRun, join_records
-from stiction_ros.discrepancy.gate import look_at_data
+from stiction_ros.discrepancy.free_run import FreeRun
+from stiction_ros.discrepancy.gate import open_gate
 from stiction_ros.discrepancy.options import MARGIN
 from stiction_ros.discrepancy.search import Baseline, fit_candidate
 
@@ -31,13 +30,12 @@ def _gain(seen: BlindLoop, truth: Truth, entry: Hidden) -> float:
     for other in truth.hidden:
         if other is not entry:
             model = model.with_effect(other.place, other.behaviour)
-    runs = join_records(model, [seen.record])
-    runs = dataclasses.replace(runs, usable=look_at_data(model, runs).usable)
+    runs, _ = open_gate(model, [seen.record])
     base = Baseline.of(FreeRun(model, runs))
     gap = base.run.gap
     gains = [
         fit_candidate(base, gap, candidate).evidence
         for candidate in all_candidates(base)
-        if entry.name in {(candidate.place, candidate.effect), *candidate.twins}
+        if entry.name in candidate.keys
     ]
     return max(gains, default=-math.inf) - MARGIN

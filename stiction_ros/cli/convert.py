@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -49,10 +48,7 @@ def run(options: argparse.Namespace) -> int:
         for note in record.notes:
             print(f"note: {note}", file=sys.stderr)
         if to_csv:
-            read_by = write_csv(record, target, iso=options.iso)
-            if read_by:
-                said = shlex.join(["stiction", "identify", str(target), *read_by])
-                print(f"read it by {said}", file=sys.stderr)
+            write_csv(record, target, iso=options.iso)
         else:
             write_bag(record, target)
     return 0

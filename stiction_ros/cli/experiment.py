@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     record = prbs_experiment(
         model, options.samples, options.seed, options.switch_probability, options.levels
     )
-    read_by = write_csv(record, options.out)
-    command = shlex.join(["stiction", "fit-linear", options.out, *read_by])
+    write_csv(record, options.out)
+    command = shlex.join(["stiction", "fit-linear", options.out])
     print(f"{options.out}: {len(record)} samples; read it by\n{command}", file=sys.stderr)
     return 0

@@ -58,7 +58,10 @@ def add(commands: Any) -> None:
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the columns of a CSV file, or the loop in a bag."""
-    group = parser.add_argument_group("columns of a CSV file (default: t, OP, PV[, SP][, STEM])")
+    group = parser.add_argument_group(
+        "columns of a CSV file (default: t, OP, PV[, SP][, STEM])",
+        "A file that stiction wrote needs none of these: its TAG.OP, TAG.PV … are recognised.",
+    )
     for option, text in (
         ("op", "controller output of a valve"),
         ("pv", "process variable"),

@@ -13,6 +13,10 @@ from stiction_ros.discrepancy.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray, Parameter
 from stiction_ros.effects.behaviour import SimulatesGrid
 
+_RANKED = 200  # points of a grid that may be among the best ones
+_NEIGHBOURS = 1.5  # steps of the first grid
+_TINY = 1e-300
+
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
@@ -150,6 +154,28 @@ class Candidate(ABC):
             return coordinates
         return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
 
+    def coordinates(self, point: FloatArray) -> FloatArray:
+        """Return the coordinates of the search of one point, both of shape (axes,)."""
+        return np.array([a.inner(v) for a, v in zip(self.axes, point.tolist(), strict=True)])
+
+    def apart(self, coordinates: FloatArray, loss: FloatArray, most: int) -> list[int]:
+        """Return the best points that are no neighbours of each other in the first grid.
+
+        Args:
+            coordinates: of the search, shape (G, axes).
+            loss: shape (G,), the least is best.
+            most: how many at most.
+        """
+        steps = np.array([max(axis.step, _TINY) for axis in self.axes])
+        chosen: list[int] = []
+        for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
+            away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]
+            if all(each.max(initial=0.0) > _NEIGHBOURS for each in away):
+                chosen.append(place)
+            if len(chosen) == most:
+                break
+        return chosen
+
     def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
         """Return values in a box around a point, shape (G, axes); for needles alone.
 
@@ -165,6 +191,21 @@ class Candidate(ABC):
         return 0.0
 
     @property
+    def key(self) -> tuple[str, str]:
+        """Place and effect."""
+        return self.place, self.effect
+
+    @property
+    def keys(self) -> tuple[tuple[str, str], ...]:
+        """Place and effect, its own first, of all that it stands for."""
+        return (self.key, *self.twins)
+
+    @property
     def name(self) -> str:
         """Name for people, such as ``valve:V1 stiction``."""
         return f"{self.place} {self.effect}"
+
+
+def figures_of(behaviour: Behaviour) -> dict[str, float]:
+    """Return the parameters of an effect by key, in engineering units."""
+    return {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}

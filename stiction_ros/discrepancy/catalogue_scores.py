@@ -34,8 +34,7 @@ class Scores:
     def of(self, place: str, effect: str) -> CandidateFit | None:
         """Return the best fit of an effect, its twins' included; None when not tried."""
         for fit in self.fits:
-            names = [(fit.candidate.place, fit.candidate.effect), *fit.candidate.twins]
-            if (place, effect) in names:
+            if (place, effect) in fit.candidate.keys:
                 return fit
         return None
 

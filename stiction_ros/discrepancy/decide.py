@@ -95,12 +95,13 @@ def decide(
         f
         for f in ranked
         if f.candidate.inside
-        and _name(f) != _name(best)
+        and f.candidate.key != best.candidate.key
         and f.evidence > max(best.evidence - margin, 0.0)
         and large_enough(f)
         and not _same_family(f, best)
     ]
-    names = list(dict.fromkeys([*family, *best.candidate.twins, *(_name(f) for f in rivals)]))
+    others = [f.candidate.key for f in rivals]
+    names = list(dict.fromkeys([*family, *best.candidate.twins, *others]))
     for rival in rivals:
         names += [twin for twin in rival.candidate.twins if twin not in names]
     if names:
@@ -158,11 +159,8 @@ def _unknown(stranger: CandidateFit, reason: str) -> Decision:
 
 def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
     """Tell whether a fit is most of what a rival outside the catalogue contains."""
-    return _name(fit) in stranger.candidate.contains and fit.evidence > MOST_OF * stranger.evidence
-
-
-def _name(fit: CandidateFit) -> tuple[str, str]:
-    return fit.candidate.place, fit.candidate.effect
+    part = fit.candidate.key in stranger.candidate.contains
+    return part and fit.evidence > MOST_OF * stranger.evidence
 
 
 def _lags(fit: CandidateFit) -> bool:
@@ -196,10 +194,10 @@ def friction_kind(
     jump = jumping[0].evidence - plain[0].evidence
     if best.evidence < CLEAR:  # too little to tell whether there is a jump
         other = jumping[0] if best.candidate.effect == "backlash" else plain[0]
-        return best, (_name(other),)
+        return best, (other.candidate.key,)
     if jump > JUMP_SURE:
         return jumping[0], ()
     if jump < -JUMP_ABSENT and departures(plain[0]) >= OFTEN:
         return plain[0], ()
     first, second = (jumping[0], plain[0]) if jump > 0.0 else (plain[0], jumping[0])
-    return first, (_name(second),)
+    return first, (second.candidate.key,)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from stiction_ros.discrepancy.candidates import Candidate
 from stiction_ros.discrepancy.catalogue_scores import all_candidates
 from stiction_ros.discrepancy.decide import borne_out
 from stiction_ros.discrepancy.free_run import FreeRun, Runs
-from stiction_ros.discrepancy.measure import OutputGap, measure_gap
 from stiction_ros.discrepancy.measured_stem import stem_misfit
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
 from stiction_ros.effects import Behaviour, FloatArray
@@ -54,19 +52,14 @@ class Extension:
     """The model after one more effect.
 
     Attributes:
-        model: with all effects that stayed.
-        added: these effects.
-        base: the free run of ``model``.
-        before, after: the gap on held-out rows without and with the last effect.
+        added: all effects that stayed.
+        base: of the model with them.
         kept: whether the last effect stayed.
         reason: why it did not.
     """
 
-    model: LoopModel
     added: tuple[AddedEffect, ...]
     base: Baseline
-    before: tuple[OutputGap, ...]
-    after: tuple[OutputGap, ...]
     kept: bool
     reason: str
 
@@ -83,37 +76,29 @@ def extend(
         new: the one to be added.
         base: of the model with ``added``.
     """
-    before = measure_gap(base)
     effects = [*added, new]
     for _ in range(ROUNDS if added else 1):
         effects = [_refit(bare, runs, effects, k) for k in range(len(effects))]
     worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
-    model = with_effects(bare, worth)
     after_base = Baseline.of(run_with(bare, runs, worth))
-    after = measure_gap(after_base)
     trouble = _trouble(base, after_base, new.fit.candidate.dated) or _stem_trouble(base, after_base)
     if trouble:
-        kept = tuple(added)
-        return Extension(with_effects(bare, kept), kept, base, before, before, False, trouble)
-    return Extension(model, tuple(worth), after_base, before, after, True, "")
-
-
-def with_effects(model: LoopModel, effects: Sequence[AddedEffect], **provenance: Any) -> LoopModel:
-    """Return the model with effects at the end of their chains."""
-    for effect in effects:
-        note: Mapping[str, Any] = provenance
-        model = model.with_effect(effect.place, effect.behaviour, **note)
-    return model
+        return Extension(tuple(added), base, False, trouble)
+    return Extension(tuple(worth), after_base, True, "")
 
 
 def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> FreeRun:
-    """Return the free run with effects, every sticky stem starting where the fit puts it."""
-    leads: dict[str, float] = {}
+    """Return the free run with effects at the end of their chains.
+
+    Every sticky stem starts where the fit puts it.
+    """
+    model, leads = bare, {}
     for effect in effects:
+        model = model.with_effect(effect.place, effect.behaviour)
         kind, _, tag = effect.place.partition(":")
         if kind == "valve":
             leads[tag] = effect.fit.candidate.lead(effect.fit.point)
-    return FreeRun(with_effects(bare, effects), runs, leads)
+    return FreeRun(model, runs, leads)
 
 
 def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> Baseline:
@@ -122,18 +107,26 @@ def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> B
     A drift, a sine or a gain that was found beside something that was not yet in the model is
     a little wrong; what comes next is fitted together with it.
     """
-    return left_open(Baseline.of(run_with(bare, runs, others)), others)
+    run = run_with(bare, runs, others)
+    return Baseline.of(run, columns=open_columns(run, others))
 
 
 def left_open(base: Baseline, added: Sequence[AddedEffect]) -> Baseline:
-    """Return the baseline with the linear figures of added effects among the free columns."""
-    columns = list(base.columns)
+    """Return the baseline of added effects, their linear figures left open where there are any."""
+    if not any(effect.fit.candidate.factors for effect in added):
+        return base
+    return Baseline.of(base.run, columns=open_columns(base.run, added))
+
+
+def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]:
+    """Return per output the free columns and those of linear figures, shape (N, q)."""
+    columns = list(run.free)
     for effect in added:
         candidate, point = effect.fit.candidate, effect.fit.point
         if candidate.factors:
-            for i, sizes in candidate.respond(base.run, point[None, :]).sizes.items():
+            for i, sizes in candidate.respond(run, point[None, :]).sizes.items():
                 columns[i] = np.hstack([columns[i], sizes[:, 0]])
-    return Baseline.of(base.run, columns=columns) if added else base
+    return columns
 
 
 def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
@@ -153,7 +146,7 @@ def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> A
 def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
     """Return the candidate of the same place, effect and behaviour; None when there is none."""
     for candidate in candidates:
-        alike = (candidate.place, candidate.effect) == (wanted.place, wanted.effect)
+        alike = candidate.key == wanted.key
         if alike and getattr(candidate, "kind", None) is getattr(wanted, "kind", None):
             return candidate
     return None
@@ -161,11 +154,7 @@ def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candid
 
 def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:
     """Return why the effect must go again; empty when the held-out rows bear it out."""
-    held = sum(
-        old.held_minus_two_log - new.held_minus_two_log
-        for old, new in zip(base.noise, after_base.noise, strict=True)
-    )
-    if not borne_out(base.bic - after_base.bic, held, dated):
+    if not borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated):
         return "the innovations of the held-out rows do not become smaller"
     return ""
 

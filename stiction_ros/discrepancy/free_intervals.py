@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiction_ros.discrepancy.candidates import figures_of
 from stiction_ros.discrepancy.free_search import FreeSearch
 from stiction_ros.discrepancy.search import Baseline, CandidateFit
 from stiction_ros.discrepancy.uncertainty import CHI_SQUARE, Intervals
@@ -34,11 +35,10 @@ def with_free_process(
     ends = dict(intervals)
     for point in _region(base, fit, fit.candidate, longest):
         behaviour = fit.candidate.behaviour(base.run, point, fit.factors)
-        for parameter in behaviour.parameters():
-            if parameter.key in ends:
-                value = float(getattr(behaviour, parameter.attribute))
-                low, high = ends[parameter.key]
-                ends[parameter.key] = (min(low, value), max(high, value))
+        for key, value in figures_of(behaviour).items():
+            if key in ends:
+                low, high = ends[key]
+                ends[key] = (min(low, value), max(high, value))
     return ends
 
 
@@ -47,7 +47,7 @@ def _region(
 ) -> FloatArray:
     """Return points that the likelihood does not reject, shape (K, axes), values."""
     axes = candidate.axes
-    centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
+    centre = candidate.coordinates(fit.point)
     steps = np.array([axis.step if axis.points > 1 else 0.0 for axis in axes])
     free = np.flatnonzero(steps)
     sides = np.meshgrid(*[np.linspace(-1.0, 1.0, BOX)] * len(free), indexing="ij")

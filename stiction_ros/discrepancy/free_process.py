@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
-from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates
+from stiction_ros.discrepancy.catalogue_scores import Progress, Scores, all_candidates
 from stiction_ros.discrepancy.decide import Decision, GapVerdict
 from stiction_ros.discrepancy.decoys import Dynamics
 from stiction_ros.discrepancy.extend import same_candidate
@@ -33,8 +33,6 @@ ABSORBED = ("lag", "pole", "delay", "gain", "leak", "other dynamics")
 # What bends the way from OP to PV may sit in the valve or in the process behind it.
 STATIC = ("characteristic", "saturation")
 
-Progress = Callable[[float], None]
-
 
 @dataclasses.dataclass(frozen=True)
 class FreeScores:
@@ -55,10 +53,6 @@ class _Found:
 
     fit: CandidateFit
     equations: tuple[Equation, ...]
-
-    @property
-    def name(self) -> tuple[str, str]:
-        return self.fit.candidate.place, self.fit.candidate.effect
 
 
 def score_with_free_process(
@@ -89,7 +83,7 @@ def score_with_free_process(
     fits = sorted(capped, key=lambda fit: -fit.delta_bic)
     models: dict[tuple[str, str], LoopModel] = {}
     for each in sorted(found, key=lambda f: -f.fit.delta_bic):
-        models.setdefault(each.name, with_equations(better.run.model, each.equations))
+        models.setdefault(each.fit.candidate.key, with_equations(better.run.model, each.equations))
     tried = (*told, *(stranger.candidate for stranger in strangers))
     return FreeScores(Scores(better, tried, tuple(fits)), models)
 
@@ -171,14 +165,10 @@ def _run_behind(base: Baseline, equations: tuple[Equation, ...]) -> FreeRun:
 
 def _against(fit: CandidateFit, other: Baseline, base: Baseline) -> CandidateFit:
     """Return a fit that was scored against ``other`` as it stands against ``base``."""
-    held = sum(
-        old.held_minus_two_log - new.held_minus_two_log
-        for old, new in zip(other.noise, base.noise, strict=True)
-    )
     return dataclasses.replace(
         fit,
         delta_bic=fit.delta_bic - (other.bic - base.bic),
-        held_gain=fit.held_gain - held,
+        held_gain=fit.held_gain - base.held_gain(other),
     )
 
 

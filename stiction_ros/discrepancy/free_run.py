@@ -47,6 +47,11 @@ class Runs:
         """Seconds between two samples."""
         return self.records[0].sample_time
 
+    @property
+    def longest(self) -> slice:
+        """Rows of the longest record."""
+        return max(self.slices, key=lambda rows: rows.stop - rows.start)
+
     def __len__(self) -> int:
         return len(self.op)
 
@@ -172,7 +177,7 @@ class FreeRun:
         """
         parts = []
         for rows in self.runs.slices:
-            inputs = [self.stems[rows, j : j + 1] for j in range(self.stems.shape[1])]
+            inputs = self._inputs(rows)
             if valve is not None and stems is not None:
                 inputs[valve] = stems[rows]
             parts.append(self.responses.forced(output, inputs))
@@ -190,11 +195,12 @@ class FreeRun:
         return np.asarray(np.clip(stem, low, high))
 
     def _free(self, output: int) -> FloatArray:
-        blocks = []
-        for rows in self.runs.slices:
-            inputs = [self.stems[rows, j : j + 1] for j in range(self.stems.shape[1])]
-            blocks.append(self.responses.free(output, inputs))
+        blocks = [self.responses.free(output, self._inputs(rows)) for rows in self.runs.slices]
         return np.asarray(block_diag(*blocks))
+
+    def _inputs(self, rows: slice) -> list[FloatArray]:
+        """Return the stems of one record, each of shape (N, 1)."""
+        return [self.stems[rows, j : j + 1] for j in range(self.stems.shape[1])]
 
     def _known(self, output: int) -> FloatArray:
         name = self.model.outputs[output]

@@ -105,7 +105,7 @@ class FreeSearch:
             [Prefilter.of(own, n.ar) for own, n in zip(self.own, noise, strict=True)],
         ):
             loss, delays = self._scan(stems, prefilters, self.own)
-            for place in self._leaders(grid, loss):
+            for place in self.candidate.apart(grid, loss, LEADERS):
                 seeds.setdefault(place, delays[place])
         return [(grid[place], delay) for place, delay in seeds.items()]
 
@@ -131,22 +131,10 @@ class FreeSearch:
                 loss[part] += scan.rows * np.log(energy.min(axis=1))
         return loss, delays
 
-    def _leaders(self, grid: FloatArray, loss: FloatArray) -> list[int]:
-        """Return the best points of a grid that are no neighbours of each other."""
-        steps = np.array([max(axis.step, 1e-300) for axis in self.candidate.axes])
-        chosen: list[int] = []
-        for place in np.argsort(loss, kind="stable")[:200].tolist():
-            far = [np.abs((grid[place] - grid[k]) / steps).max() > 1.5 for k in chosen]
-            if all(far):
-                chosen.append(place)
-            if len(chosen) == LEADERS:
-                break
-        return chosen
-
     def _apart(self, found: Sequence[Behind]) -> list[Behind]:
         places = np.array([f.coordinates for f in found])
         order = np.arange(len(found), dtype=float)
-        return [found[k] for k in self._leaders(places, order)][:CENTRES]
+        return [found[k] for k in self.candidate.apart(places, order, CENTRES)]
 
     def _exact(
         self,

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.free_run import Runs
+from stiction_ros.discrepancy.free_run import Runs, join_records
 from stiction_ros.discrepancy.noise import MAX_ORDER, BoolArray, autoregression, whiten
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
 from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
 
 LONGEST_REST = 12
 ENDS = 6
@@ -55,6 +57,17 @@ class Gate:
     set_point_moves: tuple[int, ...] | None
     reversals: tuple[int, ...]
     notes: tuple[str, ...]
+
+
+def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
+    """Return the records end to end, their usable rows marked, and what the gate saw.
+
+    Raises:
+        InputError: as :func:`join_records`.
+    """
+    runs = join_records(model, records)
+    gate = look_at_data(model, runs)
+    return dataclasses.replace(runs, usable=gate.usable), gate
 
 
 def look_at_data(model: LoopModel, runs: Runs) -> Gate:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidates import Response
 from stiction_ros.discrepancy.misfit_kernels import left_of_shifts, taken_by_sizes
-from stiction_ros.discrepancy.noise import Blocks, projector, whiten
+from stiction_ros.discrepancy.noise import Blocks, left_by, projector, whiten
 from stiction_ros.effects import FloatArray
 
 _TINY = 1e-300
@@ -38,8 +38,7 @@ def misfit(
         marked = base.blocks[i].train
         basis = projector(whiten(base.columns[i], ar[i])[marked])
         rows = np.flatnonzero(marked)
-        white = whiten(gap[:, i], ar[i])[marked]
-        target = white - basis @ (basis.T @ white)
+        target = left_by(basis, whiten(gap[:, i], ar[i])[marked])
         shift, sizes = response.shifts.get(i), response.sizes.get(i)
         if shift is not None:
             squares = left_of_shifts(target, np.ascontiguousarray(shift), rows, basis, ar[i])

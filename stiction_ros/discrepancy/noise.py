@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from stiction_ros.discrepancy.noise_kernels import (
     NOTHING,
@@ -89,6 +90,11 @@ def whiten(values: FloatArray, ar: FloatArray) -> FloatArray:
     return out
 
 
+def coloured(white: FloatArray, ar: FloatArray) -> FloatArray:
+    """Return r_k = Σ φ_i r_{k−i} + white_k along the first axis: the inverse of :func:`whiten`."""
+    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), white, axis=0))
+
+
 def fit_noise(
     target: FloatArray, columns: FloatArray, blocks: Blocks, start: FloatArray | None = None
 ) -> NoiseFit:
@@ -145,6 +151,11 @@ def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
 def projector(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
     return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
+
+
+def left_by(basis: FloatArray, values: FloatArray) -> FloatArray:
+    """Return what an orthonormal basis, shape (n, r), leaves of values, shape (n, …)."""
+    return np.asarray(values - basis @ (basis.T @ values))
 
 
 def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:

@@ -157,8 +157,8 @@ class SineCandidate(OutputCandidate):
     def __init__(self, run: FreeRun, output: int, lines: FloatArray) -> None:
         """Take the output's index and cycles per sample at which the gap has lines."""
         super().__init__(run, output, "disturbance", "sine")
-        longest = max(rows.stop - rows.start for rows in run.runs.slices)
-        self._bin = 1.0 / longest
+        rows = run.runs.longest
+        self._bin = 1.0 / (rows.stop - rows.start)
         self._lines = lines
         self.axes = (Axis(2.0 * self._bin, 0.45, 2 * int(0.45 / self._bin)),)
 
@@ -195,7 +195,7 @@ def surprises(run: FreeRun, innovations: FloatArray) -> FloatArray:
     sizes = np.abs(innovations)
     for rows in run.runs.slices:
         sizes[rows.start : rows.start + run.responses.skip + MAX_ORDER] = 0.0
-    return np.asarray(run.runs.time[np.argsort(-sizes)[:SURPRISES]])
+    return np.asarray(run.runs.time[np.argsort(-sizes, kind="stable")[:SURPRISES]])
 
 
 def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:
@@ -221,7 +221,8 @@ def output_candidates(run: FreeRun, gap: FloatArray, whitened: list[FloatArray])
         whitened: per output the innovations, shape (N,).
     """
     found: list[Candidate] = []
-    longest = max(rows.stop - rows.start for rows in run.runs.slices)
+    part = run.runs.longest
+    longest = part.stop - part.start
     step = run.runs.sample_time
     memory = slowest(run.model.process, step)
     for i in range(gap.shape[1]):
@@ -238,7 +239,6 @@ def output_candidates(run: FreeRun, gap: FloatArray, whitened: list[FloatArray])
                 lowest = max(0.3 / longest, 0.5 / memory) / step
                 rates = Axis(lowest, 0.3 / step, 18, logarithmic=True)
                 found.append(FilterCandidate(run, i, Leak, rates))
-        part = run.runs.slices[int(np.argmax([r.stop - r.start for r in run.runs.slices]))]
         lines = spectral_lines([gap[part, i], whitened[i][part]], 3.0 / longest)
         found += [
             StepCandidate(run, i, surprises(run, whitened[i])),

@@ -47,8 +47,7 @@ def overall(
     open_set = last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable
     if not effects:
         if open_set and last.chosen is not None:
-            chosen = last.chosen.candidate
-            names = [(chosen.place, chosen.effect), *chosen.twins, *last.alternatives]
+            names = [*last.chosen.candidate.keys, *last.alternatives]
             return GapVerdict.AMBIGUOUS, tuple(dict.fromkeys(names))
         if last.verdict is GapVerdict.UNKNOWN:
             return GapVerdict.UNKNOWN, ()

@@ -19,7 +19,6 @@ LEADERS = 4
 STARTS = 4
 MOMENTS = 241
 REACH = 4.0  # points of the first grid, wider than a held-out block
-MOST = 200
 SLOW = np.array([0.8])
 SHRINK = 0.4
 PROBE = 0.05  # of a linear axis, at which its parabola is taken
@@ -76,6 +75,13 @@ class Baseline:
         """BIC of the current model, but for what every candidate shares with it."""
         return sum(fit.bic(0) for fit in self.noise)
 
+    def held_gain(self, before: Baseline) -> float:
+        """Return −2 log likelihood that it gains on the held-out rows against another model."""
+        return sum(
+            old.held_minus_two_log - new.held_minus_two_log
+            for old, new in zip(before.noise, self.noise, strict=True)
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class CandidateFit:
@@ -121,11 +127,7 @@ def fit_candidate(
         around: a point near which alone is searched, shape (axes,), values; None everywhere.
     """
     search = _Search(base, gap, candidate)
-    if around is None:
-        centres = search.coarse()[:STARTS]
-    else:
-        inner = [axis.inner(v) for axis, v in zip(candidate.axes, around.tolist(), strict=True)]
-        centres = [np.array(inner)]
+    centres = search.coarse()[:STARTS] if around is None else [candidate.coordinates(around)]
     for centre in centres:
         search.refine(centre, 0.7)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
@@ -176,7 +178,7 @@ class _Search:
         for _ in range(3):
             for ar in guesses:
                 squares = misfit(self.base, self.gap, response, ar)
-                for point in self._apart(grid, squares):
+                for point in self.candidate.apart(grid, squares, LEADERS):
                     if point not in leaders:
                         fit = self.judge(values[point], response.pick(point))
                         leaders[point] = fit.delta_bic
@@ -184,20 +186,6 @@ class _Search:
             guesses = [{i: fit.ar for i, fit in best.noise.items()}]
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
-
-    def _apart(self, grid: FloatArray, squares: FloatArray) -> list[int]:
-        """Return the best points of a grid that are no neighbours of each other."""
-        steps = np.array([max(axis.step, _TINY) for axis in self.candidate.axes])
-        chosen: list[int] = []
-        for point in np.argsort(squares)[:MOST].tolist():
-            near = [
-                np.abs((grid[point] - grid[other]) / steps).max(initial=0.0) for other in chosen
-            ]
-            if all(distance > 1.5 for distance in near):
-                chosen.append(point)
-            if len(chosen) == LEADERS:
-                break
-        return chosen
 
     def refine(self, centre: FloatArray, size: float) -> None:
         """Search smaller and smaller grids around a point."""
@@ -213,8 +201,7 @@ class _Search:
         """Search on around the best point until smaller grids gain next to nothing."""
         if not self.candidate.axes or self.best().delta_bic <= 0.0:
             return
-        axes = zip(self.candidate.axes, self.best().point.tolist(), strict=True)
-        best = np.array([axis.inner(value) for axis, value in axes]), self.best()
+        best = self.candidate.coordinates(self.best().point), self.best()
         size = 0.7 * SHRINK**ROUNDS
         for _ in range(POLISHES):
             better = self._around(best, size)

@@ -12,13 +12,15 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.free_equation import Equation, Problem
-from stiction_ros.discrepancy.noise import projector
-from stiction_ros.discrepancy.stem_scan_kernels import (
-    explained_energy,
-    filtered,
-    subtract_projections,
-)
+from stiction_ros.discrepancy.free_run import end_to_end
+from stiction_ros.discrepancy.noise import left_by, projector
+from stiction_ros.discrepancy.response_kernels import filtered
 from stiction_ros.effects import FloatArray
+from stiction_ros.identification.scan_kernels import (
+    DEPENDENT,
+    _without_projections,
+    delay_energy,
+)
 
 _TINY = 1e-300
 
@@ -55,7 +57,7 @@ class StemScan:
             delays: of that valve, samples, without gaps.
             prefilter: of all signals.
         """
-        self.runs, self.prefilter = problem.runs, prefilter
+        self.problem, self.prefilter = problem, prefilter
         self.width = len(own.b[valve])
         self.rows = int(problem.blocks.train.sum())
         self.lags = range(delays[0] + 1, delays[-1] + 1 + self.width)
@@ -67,7 +69,7 @@ class StemScan:
         self._masks = np.zeros((len(self.lags), count))
         whole = np.zeros((count, inner.shape[1]))
         whole[problem.blocks.train] = inner
-        for rows in self.runs.slices:
+        for rows in problem.runs.slices:
             for place, lag in enumerate(self.lags):
                 target = slice(rows.start, max(rows.stop - lag, rows.start))
                 source = slice(min(rows.start + lag, rows.stop), rows.stop)
@@ -88,31 +90,23 @@ class StemScan:
             columns.append(problem.each(problem.impulses(reach), numerator, denominator))
         train = problem.blocks.train
         basis = projector(np.hstack(columns)[train])
-        rest = y[train] - basis @ (basis.T @ y[train])
-        return basis, rest
+        return basis, left_by(basis, y[train])
 
     def energy(self, stems: FloatArray) -> FloatArray:
         """Return the sum of squares, shape (G, T), for stems of shape (N, G) and T delays."""
-        parts = []
-        for rows in self.runs.slices:
-            moves = np.ascontiguousarray(stems[rows] - stems[rows.start])
-            parts.append(filtered(self.prefilter.numerator, self.prefilter.denominator, moves))
-        x = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        x = end_to_end([self._filtered(stems[rows]) for rows in self.problem.runs.slices])
         projected = (self._basis.reshape(-1, len(x)) @ x).reshape(*self._basis.shape[:2], -1)
-        products = np.empty((self.width, len(self.lags), x.shape[1]))
+        projected = np.ascontiguousarray(np.moveaxis(projected, -1, 0))
+        products = np.empty((x.shape[1], 1, self.width, len(self.lags)))
         for d in range(self.width):
-            products[d] = self._masks @ (x * self._late(x, d))
-        products[0] = products[0] * (1.0 + 1e-13) + 1e-200
-        inner = np.ascontiguousarray(projected[:, :-1])
-        subtract_projections(products, inner, inner)
-        explained = explained_energy(products, np.ascontiguousarray(projected[:, -1]))
-        explained[explained > self.rest_energy * (1.0 + 1e-9)] = 0.0
-        return np.asarray(np.maximum(self.rest_energy - explained, 1e-12 * self.rest_energy))
+            products[:, 0, d] = (self._masks @ (x * self.problem.late(x, d))).T
+        products[:, :, 0] = products[:, :, 0] * (1.0 + DEPENDENT) + 1e-200
+        for own, inner in zip(products[:, 0], projected, strict=True):
+            _without_projections(own, inner, inner)
+        right = np.ascontiguousarray(projected[:, None, :, -1])
+        return delay_energy(products, right, self.rest_energy)
 
-    def _late(self, x: FloatArray, count: int) -> FloatArray:
-        if not count:
-            return x
-        out = np.zeros_like(x)
-        for rows in self.runs.slices:
-            out[rows.start + count : rows.stop] = x[rows.start : rows.stop - count]
-        return out
+    def _filtered(self, stems: FloatArray) -> FloatArray:
+        """Return the stems of one record, in deviations from the first, behind the prefilter."""
+        numerator, denominator = self.prefilter.numerator, self.prefilter.denominator
+        return filtered(numerator, denominator, np.ascontiguousarray(stems), np.zeros(len(stems)))

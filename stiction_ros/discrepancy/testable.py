@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.candidates import Candidate
-from stiction_ros.discrepancy.noise import projector, whiten
+from stiction_ros.discrepancy.noise import left_by, projector, whiten
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 
@@ -57,8 +57,7 @@ def testable_effects(
         if not candidate.inside:
             continue
         expected = _expected(base, candidate)
-        names = ((candidate.place, candidate.effect), *candidate.twins)
-        for name in names:
+        for name in candidate.keys:
             old = found.get(name)
             if old is None or old.expected < expected:
                 hint = EXPERIMENTS.get(candidate.effect, "")
@@ -83,8 +82,7 @@ def _expected(base: Baseline, candidate: Candidate) -> float:
             wave = wave + _reference_size(candidate, noise.innovation_std, response.sizes[i][:, 0])
         train = blocks.train
         basis = projector(whiten(base.columns[i], noise.ar)[train])
-        left = whiten(wave, noise.ar)[train]
-        left = left - basis @ (basis.T @ left)
+        left = left_by(basis, whiten(wave, noise.ar)[train])
         energy += float(left @ left) / max(noise.innovation_std**2, 1e-300)
         rows = max(rows, noise.rows)
     return energy - candidate.count(point[0]) * float(np.log(rows))

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.stats import qmc
 
-from stiction_ros.discrepancy.candidates import Candidate
+from stiction_ros.discrepancy.candidates import Candidate, figures_of
 from stiction_ros.discrepancy.misfit import misfit
 from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
-from stiction_ros.discrepancy.noise import fit_noise, projector, whiten
+from stiction_ros.discrepancy.noise import coloured, fit_noise, left_by, projector, whiten
 from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate, settled
 from stiction_ros.effects import FloatArray
 
@@ -99,7 +98,7 @@ def chance_threshold(
         for i, r in enumerate(rows)
     ]
     bases = [projector(whiten(base.columns[i], base.noise[i].ar)[rows[i]]) for i in outputs]
-    drawn = [each - q @ (q.T @ each) for each, q in zip(drawn, bases, strict=True)]
+    drawn = [left_by(q, each) for each, q in zip(drawn, bases, strict=True)]
     best = np.full(DRAWS, -np.inf)
     for candidate in candidates:
         if not candidate.inside:
@@ -130,7 +129,7 @@ def _chance_gain(
     total = np.sum(drawn**2, axis=0)
     if shift is not None:
         wave = whitened_shifts(np.ascontiguousarray(shift), np.flatnonzero(rows), ar)
-        wave -= basis @ (basis.T @ wave)
+        wave = left_by(basis, wave)
         left = (-2.0 * wave.T) @ drawn
         left += np.einsum("ng,ng->g", wave, wave)[:, None]
         left += total
@@ -138,7 +137,7 @@ def _chance_gain(
         assert sizes is not None
         count, points, factors = sizes.shape
         waves = whiten(sizes.reshape(count, -1), ar)[rows]
-        waves = (waves - basis @ (basis.T @ waves)).reshape(-1, points, factors)
+        waves = left_by(basis, waves).reshape(-1, points, factors)
         taken = []
         for g in range(points):
             inner = projector(waves[:, g])
@@ -156,7 +155,7 @@ def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
     axes = fit.candidate.axes
     if not axes:
         return np.zeros((1, 0))
-    centre = np.array([a.inner(v) for a, v in zip(axes, fit.point.tolist(), strict=True)])
+    centre = fit.candidate.coordinates(fit.point)
     free = [d for d, a in enumerate(axes) if a.step > 0.0 and not a.linear]
     if not free:
         return fit.candidate.values(centre[None, :])
@@ -200,8 +199,7 @@ def _factor_errors(base: Baseline, fit: CandidateFit) -> FloatArray:
     (output,) = response.sizes
     noise, rows = fit.noise[output], base.blocks[output].train
     basis = projector(whiten(base.columns[output], noise.ar)[rows])
-    columns = whiten(response.sizes[output][:, 0], noise.ar)[rows]
-    columns = columns - basis @ (basis.T @ columns)
+    columns = left_by(basis, whiten(response.sizes[output][:, 0], noise.ar)[rows])
     inverse = np.linalg.pinv(columns.T @ columns)
     return np.asarray(noise.innovation_std * np.sqrt(np.maximum(np.diag(inverse), 0.0)))
 
@@ -220,7 +218,7 @@ def _parameters(
 ) -> dict[str, float]:
     behaviour = candidate.behaviour(base.run, point, factors)
     assert behaviour is not None
-    return {p.key: getattr(behaviour, p.attribute) for p in behaviour.parameters()}
+    return figures_of(behaviour)
 
 
 def _ends(
@@ -235,4 +233,4 @@ def _rebuilt(innovations: FloatArray, ar: FloatArray, random: np.random.Generato
     count = len(innovations)
     begins = random.integers(0, max(count - BLOCK, 1), count // BLOCK + 1)
     drawn = np.concatenate([innovations[b : b + BLOCK] for b in begins])[:count]
-    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), drawn - drawn.mean()))
+    return coloured(drawn - drawn.mean(), ar)

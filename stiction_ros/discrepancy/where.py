@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.discrepancy.noise import BoolArray, projector
+from stiction_ros.discrepancy.noise import BoolArray, left_by, projector
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop.set_points import set_point_moves
@@ -137,8 +137,8 @@ def _change(residual: FloatArray, scored: BoolArray) -> tuple[int, float]:
 def _line(base: Baseline, output: int) -> tuple[float, float]:
     """Return the strongest period of the gap in seconds and its share of the variance."""
     values = base.noise[output].residual
-    rows = max(base.run.runs.slices, key=lambda rows: rows.stop - rows.start)
-    part = values[rows] - values[rows].mean()
+    part = values[base.run.runs.longest]
+    part = part - part.mean()
     power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
     power[:2] = 0.0
     peak = int(np.argmax(power))
@@ -178,9 +178,8 @@ def _track(base: Baseline, output: int, place: str, hats: FloatArray, columns: F
     """
     train = base.blocks[output].train
     basis = projector(base.columns[output][train])
-    target = base.run.gap[train, output]
-    target = target - basis @ (basis.T @ target)
-    inner = columns[train] - basis @ (basis.T @ columns[train])
+    target = left_by(basis, base.run.gap[train, output])
+    inner = left_by(basis, columns[train])
     gram, cross = inner.T @ inner, inner.T @ target
     rough = np.diff(np.eye(columns.shape[1]), axis=0)
     penalty = rough.T @ rough

@@ -5,12 +5,17 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidates import Candidate
-from stiction_ros.discrepancy.catalogue_scores import Scores, all_candidates, score_candidates
+from stiction_ros.discrepancy.candidates import Candidate, figures_of
+from stiction_ros.discrepancy.catalogue_scores import (
+    Progress,
+    Scores,
+    all_candidates,
+    score_candidates,
+)
 from stiction_ros.discrepancy.chance import stored_threshold
 from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
 from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
@@ -32,8 +37,8 @@ from stiction_ros.discrepancy.extend import (
 )
 from stiction_ros.discrepancy.free_intervals import with_free_process
 from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
-from stiction_ros.discrepancy.free_run import FreeRun, Runs, join_records
-from stiction_ros.discrepancy.gate import DataFinding, Gate, look_at_data
+from stiction_ros.discrepancy.free_run import FreeRun, Runs
+from stiction_ros.discrepancy.gate import DataFinding, open_gate
 from stiction_ros.discrepancy.long_records import liveliest_parts
 from stiction_ros.discrepancy.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.measured_stem import not_contradicted
@@ -57,8 +62,6 @@ from stiction_ros.discrepancy.valve_candidates import departures
 from stiction_ros.discrepancy.where import locate
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-
-Progress = Callable[[float], None]
 
 
 def find_discrepancy(
@@ -99,9 +102,8 @@ class _Workflow:
         self.report = progress or (lambda share: None)
         self.begun = time.perf_counter()
         self.random = np.random.default_rng(options.seed)
-        runs = join_records(model, liveliest_parts(records) if options.free_process else records)
-        self.gate: Gate = look_at_data(model, runs)
-        runs = dataclasses.replace(runs, usable=self.gate.usable)
+        kept = liveliest_parts(records) if options.free_process else records
+        runs, self.gate = open_gate(model, kept)
         self.controller: ControllerCheck = check_controller(model, runs)
         found = self.controller.finding
         self.data: list[DataFinding] = [*([found] if found else []), *self.gate.findings]
@@ -197,15 +199,15 @@ class _Workflow:
         where = locate(base)
         kept, reason = False, decision.reason
         if decision.chosen is not None and decision.inseparable:
-            chosen = decision.chosen.candidate
-            bare = models.get((chosen.place, chosen.effect), self.bare)
+            key = decision.chosen.candidate.key
+            bare = models.get(key, self.bare)
             step = self._extend(decision, bare)
             kept, reason = step.kept, step.reason
             if step.kept:
                 self.earlier.append(self.bare)
                 self.added, self.base, self.bare = step.added, step.base, bare
                 if models:
-                    self.gains[chosen.place, chosen.effect] = decision.chosen.delta_bic
+                    self.gains[key] = decision.chosen.delta_bic
         return Look(scores, decision, where, kept, reason), testable
 
     def _score(
@@ -290,14 +292,10 @@ class _Workflow:
 
     def _effect(self, k: int, effect: AddedEffect) -> FoundEffect:
         verdict = GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED
-        values = {
-            p.key: float(getattr(effect.behaviour, p.attribute))
-            for p in effect.behaviour.parameters()
-        }
         return FoundEffect(
             effect.place,
             effect.effect,
-            values,
+            figures_of(effect.behaviour),
             self._intervals(k, effect),
             self.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
             verdict,
@@ -328,8 +326,7 @@ def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
 
 
 def _data_effect(finding: DataFinding) -> FoundEffect:
-    behaviour = finding.behaviour
-    values = {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}
+    values = figures_of(finding.behaviour)
     return FoundEffect(
         finding.place, finding.effect, values, {}, finding.delta_bic, GapVerdict.NAMED
     )

@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 
 from stiction_ros.discrepancy.free_run import FreeRun, join_records
 from stiction_ros.discrepancy.measure import measure_gap
-from stiction_ros.discrepancy.noise import Blocks, BoolArray, fit_noise, projector, whiten
+from stiction_ros.discrepancy.noise import Blocks, BoolArray, fit_noise, left_by, projector, whiten
 from stiction_ros.discrepancy.search import Baseline
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
@@ -183,7 +183,6 @@ def _output_baseline(run: FreeRun, output: int) -> OutputBaseline:
 
 def _innovation_std(run: FreeRun, output: int, ar: FloatArray, rows: BoolArray) -> float:
     """Return the standard deviation of the innovations with start and level left open."""
-    target = whiten(run.gap[:, output], ar)[rows]
     basis = projector(whiten(run.free[output], ar)[rows])
-    left = target - basis @ (basis.T @ target)
+    left = left_by(basis, whiten(run.gap[:, output], ar)[rows])
     return math.sqrt(float(left @ left) / max(len(left) - basis.shape[1], 1))

@@ -7,6 +7,7 @@ import dataclasses
 import datetime
 import io
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -14,12 +15,11 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 from stiction_ros.records.record import Record
 from stiction_ros.records.regular import Part, regular_part, split_at_gaps
 from stiction_ros.records.sampling import sample_time
 
-DEFAULT_VALVE = "V1"
-DEFAULT_OUTPUT = "PV1"
 _TIME_NAMES = ("t", "time", "timestamp")
 _DELIMITERS = (",", ";", "\t")
 
@@ -27,6 +27,9 @@ _DELIMITERS = (",", ";", "\t")
 @dataclasses.dataclass(frozen=True)
 class CsvColumns:
     """Which column is what; a tag to its column, None for the default names.
+
+    In a file that :func:`stiction_ros.records.csv_writer.write_csv` wrote the default is what
+    is written there, ``TAG.OP``, ``TAG.PV`` … included.
 
     Attributes:
         op: valve to column of its OP, default ``{"V1": "OP"}``.
@@ -114,7 +117,7 @@ class _Table:
     def read(path: Path) -> _Table:
         text = _text(path)
         first = next((line for line in text.splitlines() if line.strip()), "")
-        delimiter = max(_DELIMITERS, key=first.count)
+        delimiter = max(_DELIMITERS, key=re.sub('"[^"]*"', "", first).count)
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
         header: tuple[str, ...] = ()
         rows, lines = [], []
@@ -215,14 +218,16 @@ class _Table:
 
 
 def _records(table: _Table, columns: CsvColumns) -> tuple[Record, ...]:
-    op = columns.op or {DEFAULT_VALVE: "OP"}
-    pv = columns.pv or {DEFAULT_OUTPUT: "PV"}
-    sp = columns.sp
-    if sp is None and columns.pv is None and table.find("SP") is not None:
-        sp = {DEFAULT_OUTPUT: "SP"}
-    stem = columns.stem
-    if stem is None and columns.op is None and table.find("STEM") is not None:
-        stem = {DEFAULT_VALVE: "STEM"}
+    written = tagged_columns(table.header)
+    op = columns.op or written.get("op") or {DEFAULT_VALVE: "OP"}
+    pv = columns.pv or written.get("pv") or {DEFAULT_OUTPUT: "PV"}
+    sp, stem = columns.sp, columns.stem
+    if sp is None and columns.pv is None:
+        plain = {DEFAULT_OUTPUT: "SP"} if table.find("SP") is not None else None
+        sp = written.get("sp", plain)
+    if stem is None and columns.op is None:
+        plain = {DEFAULT_VALVE: "STEM"} if table.find("STEM") is not None else None
+        stem = written.get("stem", plain)
     _same_tags(sp, pv, "--sp", table.path)
     _same_tags(stem, op, "--stem", table.path)
     # The missing column is told before any bad cell: that is the likelier slip.

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.records import Record
@@ -21,33 +24,86 @@ def record(valves: tuple[str, ...], outputs: tuple[str, ...]) -> Record:
     return Record("r", 0.5, valves, outputs, op, pv, sp, stem)
 
 
-def options(pairs: tuple[str, ...]) -> dict[str, dict[str, str]]:
-    chosen: dict[str, dict[str, str]] = {}
-    for option, pair in zip(pairs[::2], pairs[1::2], strict=True):
-        tag, _, column = pair.partition("=")
-        chosen.setdefault(option.removeprefix("--"), {})[tag] = column
-    return chosen
+def facts(record: Record) -> tuple[object, ...]:
+    """Return all that a file keeps of a record, to be compared."""
+    signals = [getattr(record, key) for key in ("op", "pv", "sp", "stem")]
+    listed = [None if values is None else values.tolist() for values in signals]
+    return (record.valves, record.outputs, record.sample_time, record.start, *listed)
+
+
+NAMES = st.text(
+    st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1, max_size=6
+) | st.sampled_from(["OP", "a.PV", "V 1", "t", "1", "a;b;c;d", "a,b", 'say "x"', ".SP", "v1", "V1"])
+TAGS = st.lists(NAMES, min_size=1, max_size=3, unique=True).map(tuple)
+VALUES = st.floats(-1e12, 1e12)
+
+
+@st.composite
+def records(draw: st.DrawFn) -> Record:
+    valves, outputs = draw(TAGS), draw(TAGS)
+    count = draw(st.integers(2, 5))
+    size = 2 * count * (len(valves) + len(outputs))
+    values = np.array(draw(st.lists(VALUES, min_size=size, max_size=size)))
+    op, stem, pv, sp = np.split(
+        values, np.cumsum([count * len(valves), count * len(valves), count * len(outputs)])
+    )
+    return Record(
+        "r",
+        draw(st.sampled_from([0.25, 1.0, 60.0])),
+        valves,
+        outputs,
+        op.reshape(count, -1),
+        pv.reshape(count, -1),
+        sp.reshape(count, -1) if draw(st.booleans()) else None,
+        stem.reshape(count, -1) if draw(st.booleans()) else None,
+        draw(st.sampled_from([0.0, 30.5])),
+    )
+
+
+@given(records())
+@settings(max_examples=150, deadline=None)
+def test_what_is_written_is_read_back_without_naming_a_column(written: Record) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        write_csv(written, Path(folder) / "r.csv")
+        found = read_csv(Path(folder) / "r.csv")
+    assert facts(found) == facts(written)
+
+
+def test_a_loop_of_one_valve_gets_the_default_names(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    write_csv(record(("V1",), ("PV1",)), path)
+    assert path.read_text(encoding="utf-8").splitlines()[0] == "t,OP,PV,SP,STEM"
+
+
+def test_one_valve_is_chosen_and_the_rest_is_told_by_its_names(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    written = record(("V1", "V2"), ("C", "T"))
+    write_csv(written, path)
+    found = read_csv(path, op={"V2": "V2.OP"})
+    assert (found.valves, found.outputs, found.stem) == (("V2",), ("C", "T"), None)
+    assert np.array_equal(found.op[:, 0], written.op[:, 1])
 
 
 @pytest.mark.parametrize(
-    ("valves", "outputs"), [(("V1",), ("PV1",)), (("V1", "V2"), ("C", "T")), (("A",), ("PV1",))]
+    "header",
+    [
+        "t,A.OP,A.PV,B.OP,B.PV",  # two loops beside each other
+        "t,A.PV,A.OP",
+        "t,A.OP,C.PV,D.SP",
+        "t,A.OP,B.OP,C.PV,B.STEM,A.STEM",
+        "t,A.OP,A.OP,C.PV",
+        "t,A.OP,C.PV,C.MODE",
+        "t,A.op,C.pv",
+        "t,.OP,C.PV",
+        "t,A.OP,C.SP",
+    ],
 )
-def test_what_is_written_is_read_back(
-    tmp_path: Path, valves: tuple[str, ...], outputs: tuple[str, ...]
-) -> None:
-    written = record(valves, outputs)
+def test_other_names_want_to_be_chosen(tmp_path: Path, header: str) -> None:
     path = tmp_path / "r.csv"
-    found = read_csv(path, **options(write_csv(written, path)))
-    assert (found.valves, found.outputs) == (valves, outputs)
-    assert found.sample_time == 0.5
-    for key in ("op", "pv", "sp", "stem"):
-        assert np.array_equal(getattr(found, key), getattr(written, key))
-
-
-def test_default_names_need_no_options(tmp_path: Path) -> None:
-    path = tmp_path / "r.csv"
-    assert write_csv(record(("V1",), ("PV1",)), path) == ()
-    assert path.read_text(encoding="utf-8").splitlines()[0] == "t,OP,PV,SP,STEM"
+    rows = [f"{k}{',1' * header.count(',')}" for k in range(3)]
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"has no column OP; .*choose with --op TAG=COLUMN"):
+        read_csv(path)
 
 
 def test_what_is_not_known_is_left_out(tmp_path: Path) -> None:
