@@ -18,7 +18,7 @@ from stiction_ros.discrepancy.response_kernels import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification.scan_kernels import (
     DEPENDENT,
-    _without_projections,
+    without_projections,
     delay_energy,
 )
 
@@ -102,7 +102,7 @@ class StemScan:
             products[:, 0, d] = (self._masks @ (x * self.problem.late(x, d))).T
         products[:, :, 0] = products[:, :, 0] * (1.0 + DEPENDENT) + 1e-200
         for own, inner in zip(products[:, 0], projected, strict=True):
-            _without_projections(own, inner, inner)
+            without_projections(own, inner, inner)
         right = np.ascontiguousarray(projected[:, None, :, -1])
         return delay_energy(products, right, self.rest_energy)
 

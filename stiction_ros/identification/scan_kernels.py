@@ -131,7 +131,7 @@ def _plain_products(
 
 
 @compiled
-def _without_projections(products: FloatArray, one: FloatArray, two: FloatArray) -> None:
+def without_projections(products: FloatArray, one: FloatArray, two: FloatArray) -> None:
     """Subtract Σ_q one[l, q] two[l + d, q] from products[d, l], in place."""
     lags, columns = one.shape[0], one.shape[1] - 1
     for d in range(min(len(products), lags)):
@@ -173,7 +173,7 @@ def step_products(
                 out[g, 2 * c, 0, position] = value + value * DEPENDENT + 1e-200
         for one in range(channels):
             for two in range(channels):
-                _without_projections(out[g, one + two], projected[one], projected[two])
+                without_projections(out[g, one + two], projected[one], projected[two])
     return out, right
 
 
