@@ -18,8 +18,8 @@ from stiction_ros.discrepancy.response_kernels import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification.scan_kernels import (
     DEPENDENT,
-    without_projections,
     delay_energy,
+    without_projections,
 )
 
 _TINY = 1e-300
