@@ -1,4 +1,4 @@
-"""From starts to the end of a free-run fit: the descent over A and D, compiled."""
+"""The descent over A and D of a free-run fit, compiled, and the noise model it starts from."""
 
 from __future__ import annotations
 
@@ -13,21 +13,16 @@ from stiction_ros.identification.output_error_kernels import (
     Point,
     Problem,
     Room,
-    arx_polynomial,
     evaluate,
     normal_equations,
 )
 from stiction_ros.identification.row_kernels import lag_products
-from stiction_ros.identification.stability_kernels import is_stable, pulled_inside
 
 MAX_RADIUS = 0.9995
-START_RADIUS = 0.99
 HARDEST = 1e6  # damping
-REFINEMENTS = 4  # of the start, as Steiglitz and McBride
 
 
 FIRST, LEAST = 1e-4, 1e-9  # damping
-SURE = 0.1  # share of the least gain up to which a promise is not tried
 
 
 class Start(NamedTuple):
@@ -41,6 +36,27 @@ class Start(NamedTuple):
     a: FloatArray
     noise: FloatArray
     energy: float
+
+
+@compiled
+def is_stable(a: FloatArray, radius: float) -> bool:
+    """Return whether all roots of a monic polynomial lie inside a circle (Schur and Cohn)."""
+    order = len(a) - 1
+    now, before = np.empty(order + 1), np.empty(order + 1)
+    power = 1.0
+    for i in range(order + 1):
+        now[i] = a[i] / power
+        power *= radius
+    for size in range(order, 0, -1):
+        last = now[size]
+        if not abs(last) < 1.0:
+            return False
+        shrunk = 1.0 - last * last
+        for i in range(1, size):
+            before[i] = now[i]
+        for i in range(1, size):
+            now[i] = (before[i] - last * before[size - i]) / shrunk
+    return True
 
 
 @compiled
@@ -87,11 +103,13 @@ def _definite_solve(matrix: FloatArray, damping: float, right: FloatArray) -> Fl
 
 
 @compiled
-def descend(problem: Problem, room: Room, start: Start, most: int, least_gain: float) -> Point:
+def descend(
+    problem: Problem, room: Room, start: Start, most: int, gains: tuple[float, float]
+) -> Point:
     """Levenberg-Marquardt over (a, d) from ``start``, Σw² priced by its innovations.
 
-    Ends after ``most`` iterations, when one lowers the criterion by less than ``least_gain``,
-    or when a full step of Gauss and Newton promises less than a tenth of that.
+    Ends after ``most`` iterations, or when one lowers the criterion by less than the first of
+    ``gains``, or when a full step of Gauss and Newton promises less than the second.
     """
     count, order, table = len(problem.y) - problem.first, len(start.a) - 1, room.tables[1]
     a, noise, weight = start.a, start.noise, FREE_RUN_WEIGHT * start.energy / problem.energy
@@ -108,13 +126,13 @@ def descend(problem: Problem, room: Room, start: Start, most: int, least_gain: f
         if found or done < 0:
             point, done = candidate, done + 1
             damping = max(damping / 10.0, LEAST) if done else damping
-            little = (1.0 - point.total / before) * count < least_gain and damping < 1e-5
+            little = (1.0 - point.total / before) * count < gains[0] and damping < 1e-5
             if done == most or (done and little):
                 return point
             gram, gradient = normal_equations(problem, room, point)
             scale, before = _balance(gram, gradient), point.total
             step = _definite_solve(gram, LEAST, gradient)
-            if len(step) and count * np.dot(step, gradient) < SURE * least_gain * before:
+            if len(step) and count * np.dot(step, gradient) < gains[1] * before:
                 return point
         else:
             damping *= 5.0
@@ -148,25 +166,3 @@ def noise_model(w: FloatArray, order: int) -> FloatArray:
     for i in range(len(solution)):
         out[1 + i] = solution[i]
     return out
-
-
-@compiled
-def cold_starts(problem: Problem, room: Room, order: int, p: int) -> tuple[Start, Start]:
-    """Return the ARX model as it is, D = A, and refined for white noise, with D of what it leaves.
-
-    Refined by the ARX model of data filtered by 1/A, repeated, of which the best is kept.
-    """
-    a, white, arx = np.zeros(order + 1), np.zeros(p + 1), np.zeros(0)
-    a[0] = white[0] = 1.0
-    for i in range(REFINEMENTS + 1):
-        a = pulled_inside(arx_polynomial(problem, room, a), START_RADIUS)
-        last = evaluate(problem, room, a, white, 0.0)
-        if i == 0:
-            arx, best = a, last
-        elif last.energy < best.energy:
-            best = last
-    padded = np.zeros(p + 1)
-    for i in range(min(order, p) + 1):
-        padded[i] = arx[i]
-    noise = noise_model(problem.y[problem.begin :] - best.free_run, p)
-    return Start(arx, padded, 0.0), Start(best.a, noise, 0.0)

@@ -14,22 +14,28 @@ is n log(Σε²/n) + n κ Σw²/Σy² with a small κ: where the free run is goo
 from __future__ import annotations
 
 import dataclasses
+import functools
+import math
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.descent_kernels import Start, cold_starts, descend
+from stiction_ros.identification.descent_kernels import Start, descend, is_stable, noise_model
 from stiction_ros.identification.output_error_kernels import (
+    FREE_RUN_WEIGHT,
+    THIN,
     Point,
     Problem,
     Room,
-    innovations_of,
-    loss_of,
-    pose,
+    arx_polynomial,
+    evaluate,
 )
+from stiction_ros.identification.polynomials import stabilised
 
-ROUGH_GAIN = 0.3
-FINE_GAIN = 1e-3
+START_RADIUS = 0.99
+REFINEMENTS = 4  # of the start, as Steiglitz and McBride
+ROUGH = (0.3, 0.0)  # least gain of an iteration and least promised one
+FINE = (1e-3, 1e-4)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,6 +96,89 @@ class OutputFit:
         return self.loss + self.parameters * float(np.log(self.count))
 
 
+@functools.cache
+def _difference_table(count: int) -> FloatArray:
+    """Return T with differences = T · lags, shape (count, count)."""
+    table = np.zeros((count, count))
+    for i in range(count):
+        for j in range(i + 1):
+            table[i, j] = (-1.0) ** j * math.comb(i, j)
+    return table
+
+
+def pose(
+    y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders
+) -> tuple[Problem, Room]:
+    """Return the problem of one output and room for it.
+
+    Neighbouring lags of a slow signal are almost parallel, so each is replaced by its
+    differences: the same space, well conditioned, which allows normal equations. The unknown
+    initial state adds n_a lags of an impulse through 1/A; with them, a constant in the
+    equation is a constant in the free run.
+
+    Args:
+        y: shape (N,).
+        stems: shape (m, N).
+        delays: t_d per valve, samples.
+        orders: n_a, n_b, p and the window.
+    """
+    valves, samples = stems.shape
+    order, p, first = orders.output, orders.noise, orders.first
+    begin, count, lags = first - p, samples - first, np.array(delays) + 1
+    pad = int(lags.max()) + orders.input + order + p + 1
+    signals = np.zeros((valves + 2, pad + samples))
+    signals[:valves, pad:] = stems
+    signals[valves, pad + begin - order + 1] = 1.0
+    signals[valves + 1, pad:] = y
+    y = signals[valves + 1, pad:]
+    size, free = valves * orders.input + 1 + order, samples - begin
+    priced = p + (count + THIN - 1) // THIN
+    plain = np.empty((size, free))
+    plain[valves * orders.input] = 1.0
+    room = Room(
+        driven=np.empty(signals.shape),
+        plain=plain,
+        rows=np.zeros((size + 1 + order + p, count + priced)),
+        slope=np.zeros((2, pad + free)),
+        slopes=np.empty((order, free)),
+        moved=np.empty(pad + samples),
+        tables=(_difference_table(orders.input), _difference_table(order)),
+    )
+    energy = max(float(y[first:] @ y[first:]), 1e-300)
+    return Problem(y, signals, lags, orders.input, pad, begin, first, energy), room
+
+
+def loss_of(problem: Problem, point: Point) -> float:
+    """Return n log(Σε²/n) + n κ Σw²/Σy²."""
+    count, w = len(problem.y) - problem.first, problem.y[problem.begin :] - point.free_run
+    penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
+    return count * (math.log(max(point.energy, 1e-300) / count) + penalty)
+
+
+def _equation_error_start(problem: Problem, room: Room, a: FloatArray) -> FloatArray:
+    """Return A of the least-squares ARX model of data filtered by 1/A, (15), made stable."""
+    a = arx_polynomial(problem, room, a)
+    return a if is_stable(a, START_RADIUS) else stabilised(a, START_RADIUS)
+
+
+def cold_starts(problem: Problem, room: Room, orders: Orders) -> tuple[Start, Start]:
+    """Return the ARX model as it is, D = A, and refined for white noise, with D of what it leaves.
+
+    Refined by the ARX model of data filtered by 1/A, repeated, of which the best is kept.
+    """
+    white, padded = np.zeros((2, orders.noise + 1))
+    white[0] = 1.0
+    arx = _equation_error_start(problem, room, np.eye(1, orders.output + 1)[0])
+    best = last = evaluate(problem, room, arx, white, 0.0)
+    for _ in range(REFINEMENTS):
+        last = evaluate(problem, room, _equation_error_start(problem, room, last.a), white, 0.0)
+        best = min(best, last, key=lambda point: point.energy)
+    short = min(orders.output, orders.noise) + 1
+    padded[:short] = arx[:short]
+    noise = noise_model(problem.y[problem.begin :] - best.free_run, orders.noise)
+    return Start(arx, padded, 0.0), Start(best.a, noise, 0.0)
+
+
 def fit_output(
     y: FloatArray,
     stems: FloatArray,
@@ -108,24 +197,18 @@ def fit_output(
         start: a neighbouring fit of the same orders to start from; None starts from the ARX
             model with both noise placements and keeps the better.
     """
-    problem, room = pose(
-        np.array(y, dtype=float),
-        np.array(stems, dtype=float),
-        np.array(delays) + 1,
-        (orders.output, orders.input, orders.noise),
-        orders.first,
-    )
+    problem, room = pose(y, stems, delays, orders)
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
     starts: tuple[Start, ...]
     if start is not None:
         starts = (Start(start.a, start.noise, 0.0),)
     else:
-        starts = cold_starts(problem, room, orders.output, orders.noise)
-    rough = [descend(problem, room, one, max_iterations, ROUGH_GAIN) for one in starts]
+        starts = cold_starts(problem, room, orders)
+    rough = [descend(problem, room, one, max_iterations, ROUGH) for one in starts]
     best = min(rough, key=lambda point: loss_of(problem, point))
     again = Start(best.a, best.noise, best.energy)
-    point = descend(problem, room, again, max_iterations, FINE_GAIN)
+    point = descend(problem, room, again, max_iterations, FINE)
     return _finished(problem, room, (delays, orders), point)
 
 
@@ -134,16 +217,19 @@ def _finished(
 ) -> OutputFit:
     delays, orders = given
     level = len(delays) * orders.input
+    b = point.theta[:level].reshape(len(delays), orders.input)
+    w = problem.y[problem.begin :] - point.free_run
+    innovations = np.convolve(w, point.noise, mode="valid")
     return OutputFit(
         orders=orders,
         delays=delays,
         a=point.a,
-        b=point.theta[:level].reshape(len(delays), orders.input) @ room.tables[0],
+        b=b @ _difference_table(orders.input),
         constant=float(point.theta[level] * point.a.sum()),
         noise=point.noise,
         loss=loss_of(problem, point),
-        energy=max(point.energy, 1e-300),
-        count=len(problem.y) - problem.first,
+        energy=max(float(innovations @ innovations), 1e-300),
+        count=len(innovations),
         free_run=point.free_run,
-        innovations=innovations_of(problem, point),
+        innovations=innovations,
     )

@@ -101,61 +101,6 @@ class Point(NamedTuple):
 
 
 @compiled
-def _difference_table(count: int) -> FloatArray:
-    """Return T with differences = T · lags, shape (count, count)."""
-    table = np.zeros((count, count))
-    for i in range(count):
-        table[i, 0] = 1.0
-        for j in range(1, i + 1):
-            table[i, j] = table[i - 1, j] - table[i - 1, j - 1]
-    return table
-
-
-@compiled
-def pose(
-    y: FloatArray, stems: FloatArray, lags: IntArray, orders: tuple[int, int, int], first: int
-) -> tuple[Problem, Room]:
-    """Return the problem of one output and room for it.
-
-    Neighbouring lags of a slow signal are almost parallel, so each is replaced by its
-    differences: the same space, well conditioned, which allows normal equations. The unknown
-    initial state adds n_a lags of an impulse through 1/A; with them, a constant in the
-    equation is a constant in the free run.
-
-    Args:
-        y: shape (N,).
-        stems: shape (m, N).
-        lags: first lag of each stem, shape (m,).
-        orders: n_a, n_b and p.
-        first: first sample of the innovations.
-    """
-    order, inputs, p = orders
-    valves, samples = stems.shape
-    begin = first - p
-    pad = lags.max() + inputs + order + p + 1
-    signals = np.zeros((valves + 2, pad + samples))
-    for k in range(samples):
-        for j in range(valves):
-            signals[j, pad + k] = stems[j, k]
-        signals[valves + 1, pad + k] = y[k]
-    signals[valves, pad + begin - order + 1] = 1.0
-    count = samples - first
-    number = p + (count + THIN - 1) // THIN
-    energy = max(np.dot(y[first:], y[first:]), 1e-300)
-    size = valves * inputs + 1 + order
-    room = Room(
-        np.zeros((valves + 2, pad + samples)),
-        np.ones((size, samples - begin)),
-        np.zeros((size + 1 + order + p, count + number)),
-        np.zeros((2, pad + samples - begin)),
-        np.zeros((order, samples - begin)),
-        np.zeros(pad + samples),
-        (_difference_table(inputs), _difference_table(order)),
-    )
-    return Problem(y, signals, lags, inputs, pad, begin, first, energy), room
-
-
-@compiled
 def _price(problem: Problem, scale: float, x: FloatArray, row: FloatArray) -> None:
     """Write the priced samples of x, a signal from ``begin`` on, to the end of a row.
 
@@ -277,24 +222,6 @@ def normal_equations(problem: Problem, room: Room, point: Point) -> tuple[FloatA
     for c in range(order + p):
         gradient[c] = products[c, size]
     return gram, gradient
-
-
-@compiled
-def loss_of(problem: Problem, point: Point) -> float:
-    """Return n log(Σε²/n) + n κ Σw²/Σy²."""
-    count = len(problem.y) - problem.first
-    w = problem.y[problem.begin :] - point.free_run
-    penalty = FREE_RUN_WEIGHT * np.dot(w, w) / problem.energy
-    return float(count * (np.log(max(point.energy, 1e-300) / count) + penalty))
-
-
-@compiled
-def innovations_of(problem: Problem, point: Point) -> FloatArray:
-    """Return D w from sample ``first`` on."""
-    out = np.empty(len(problem.y) - problem.first)
-    w = problem.y[problem.begin :] - point.free_run
-    averaged(point.noise, w, problem.first - problem.begin, len(out), out)
-    return out
 
 
 @compiled

@@ -7,17 +7,10 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.output_error import Orders, fit_output
-from stiction_ros.identification.output_error_kernels import (
-    THIN,
-    evaluate,
-    innovations_of,
-    normal_equations,
-    pose,
-)
-from stiction_ros.identification.polynomials import stabilised
+from stiction_ros.identification.descent_kernels import is_stable
+from stiction_ros.identification.output_error import Orders, fit_output, pose
+from stiction_ros.identification.output_error_kernels import THIN, evaluate, normal_equations
 from stiction_ros.identification.row_kernels import driven_rows, lag_products
-from stiction_ros.identification.stability_kernels import is_stable, pulled_inside
 
 A = np.array([1.0, -1.5, 0.6])
 seeds = st.integers(0, 10_000)
@@ -54,7 +47,7 @@ def test_point_is_the_least_squares_solution_over_everything_linear(
     stem, y = driven(seed, 1, 200)
     y = y + generator.standard_normal(len(y))
     first, begin, d = 20, 19, np.array([1.0, -0.4])
-    problem, room = pose(y, stem[None, :], np.array([2]), (2, 2, 1), first)
+    problem, room = pose(y, stem[None, :], (1,), Orders(2, 2, 1, first))
     point = evaluate(problem, room, A, d, weight)
     initial = [np.eye(1, len(y), begin - i)[0] for i in (0, 1)]
     columns = [np.r_[np.zeros(i), stem[: len(y) - i]] for i in (2, 3)]
@@ -75,7 +68,7 @@ def test_point_is_the_least_squares_solution_over_everything_linear(
 def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> None:
     stem, y = driven(seed, 1, 200)
     y = y + np.random.default_rng(seed).standard_normal(len(y))
-    problem, room = pose(y, stem[None, :], np.array([2]), (2, 1, 2), 20)
+    problem, room = pose(y, stem[None, :], (1,), Orders(2, 1, 2, 20))
     d, way = np.array([1.0, -0.4, 0.1]), np.random.default_rng(seed + 1).standard_normal(4)
     point = evaluate(problem, room, A, d, weight)
     gradient = normal_equations(problem, room, point)[1]
@@ -86,26 +79,6 @@ def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> Non
         for h in (1e-6, -1e-6)
     ]
     assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(2.0 * gradient @ way, rel=1e-4, abs=1e-3)
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=seeds)
-def test_innovations_are_the_residual(seed: int) -> None:
-    stem, y = driven(seed, 1, 200)
-    y = y + np.random.default_rng(seed).standard_normal(len(y))
-    problem, room = pose(y, stem[None, :], np.array([2]), (2, 1, 2), 20)
-    point = evaluate(problem, room, A, np.array([1.0, -0.4, 0.1]), 0.0)
-    innovations = innovations_of(problem, point)
-    assert innovations @ innovations == pytest.approx(point.energy, rel=1e-9)
-
-
-@settings(max_examples=30, deadline=None)
-@given(roots=st.lists(st.complex_numbers(max_magnitude=3.0), min_size=1, max_size=3))
-def test_roots_are_pulled_inside_as_by_eigenvalues(roots: list[complex]) -> None:
-    pairs = np.r_[roots, np.conj(roots)]
-    polynomial = np.ascontiguousarray(np.poly(pairs).real)
-    expected = stabilised(polynomial, 0.9)
-    assert pulled_inside(polynomial, 0.9) == pytest.approx(expected, abs=1e-4)
 
 
 @settings(max_examples=20, deadline=None)
@@ -144,6 +117,8 @@ def test_coloured_noise_is_whitened(seed: int) -> None:
     y = y + lfilter([1.0], [1.0, -0.8], white)
     fit = fit_output(y, stem[None, :], (1,), Orders(2, 1, 1, 20))
     assert fit.noise == pytest.approx([1.0, -0.8], abs=0.06)
+    expected = lfilter(fit.noise, [1.0], y[19:] - fit.free_run)[1:]
+    assert fit.innovations == pytest.approx(expected, abs=1e-9)
     assert fit.innovations.std() == pytest.approx(0.1, rel=0.1)
 
 
