@@ -1,4 +1,4 @@
-"""The descent over A and D of a free-run fit, compiled, and the noise model it starts from."""
+"""The starts of a free-run fit and the descent over A and D, compiled."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from stiction_ros.identification.output_error_kernels import (
     Point,
     Problem,
     Room,
+    arx_polynomial,
     evaluate,
     normal_equations,
 )
 from stiction_ros.identification.row_kernels import lag_products
+from stiction_ros.identification.stability_kernels import is_stable, pulled_inside
 
 MAX_RADIUS = 0.9995
+START_RADIUS = 0.99
+REFINEMENTS = 4  # of the start, as Steiglitz and McBride
 HARDEST = 1e6  # damping
 
 
@@ -36,27 +40,6 @@ class Start(NamedTuple):
     a: FloatArray
     noise: FloatArray
     energy: float
-
-
-@compiled
-def is_stable(a: FloatArray, radius: float) -> bool:
-    """Return whether all roots of a monic polynomial lie inside a circle (Schur and Cohn)."""
-    order = len(a) - 1
-    now, before = np.empty(order + 1), np.empty(order + 1)
-    power = 1.0
-    for i in range(order + 1):
-        now[i] = a[i] / power
-        power *= radius
-    for size in range(order, 0, -1):
-        last = now[size]
-        if not abs(last) < 1.0:
-            return False
-        shrunk = 1.0 - last * last
-        for i in range(1, size):
-            before[i] = now[i]
-        for i in range(1, size):
-            now[i] = (before[i] - last * before[size - i]) / shrunk
-    return True
 
 
 @compiled
@@ -166,3 +149,25 @@ def noise_model(w: FloatArray, order: int) -> FloatArray:
     for i in range(len(solution)):
         out[1 + i] = solution[i]
     return out
+
+
+@compiled
+def cold_starts(problem: Problem, room: Room, order: int, p: int) -> tuple[Start, Start]:
+    """Return the ARX model as it is, D = A, and refined for white noise, with D of what it leaves.
+
+    Refined by the ARX model of data filtered by 1/A, repeated, of which the best is kept.
+    """
+    a, white, arx = np.zeros(order + 1), np.zeros(p + 1), np.zeros(0)
+    a[0] = white[0] = 1.0
+    for i in range(REFINEMENTS + 1):
+        a = pulled_inside(arx_polynomial(problem, room, a), START_RADIUS)
+        last = evaluate(problem, room, a, white, 0.0)
+        if i == 0:
+            arx, best = a, last
+        elif last.energy < best.energy:
+            best = last
+    padded = np.zeros(p + 1)
+    for i in range(min(order, p) + 1):
+        padded[i] = arx[i]
+    noise = noise_model(problem.y[problem.begin :] - best.free_run, p)
+    return Start(arx, padded, 0.0), Start(best.a, noise, 0.0)

@@ -20,20 +20,16 @@ import math
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.descent_kernels import Start, descend, is_stable, noise_model
+from stiction_ros.identification.descent_kernels import Start, cold_starts, descend
 from stiction_ros.identification.output_error_kernels import (
     FREE_RUN_WEIGHT,
     THIN,
     Point,
     Problem,
     Room,
-    arx_polynomial,
-    evaluate,
 )
-from stiction_ros.identification.polynomials import stabilised
+from stiction_ros.identification.row_kernels import averaged
 
-START_RADIUS = 0.99
-REFINEMENTS = 4  # of the start, as Steiglitz and McBride
 ROUGH = (0.3, 0.0)  # least gain of an iteration and least promised one
 FINE = (1e-3, 1e-4)
 
@@ -133,15 +129,13 @@ def pose(
     y = signals[valves + 1, pad:]
     size, free = valves * orders.input + 1 + order, samples - begin
     priced = p + (count + THIN - 1) // THIN
-    plain = np.empty((size, free))
-    plain[valves * orders.input] = 1.0
     room = Room(
-        driven=np.empty(signals.shape),
-        plain=plain,
+        driven=np.zeros(signals.shape),
+        plain=np.ones((size, free)),
         rows=np.zeros((size + 1 + order + p, count + priced)),
         slope=np.zeros((2, pad + free)),
-        slopes=np.empty((order, free)),
-        moved=np.empty(pad + samples),
+        slopes=np.zeros((order, free)),
+        moved=np.zeros(pad + samples),
         tables=(_difference_table(orders.input), _difference_table(order)),
     )
     energy = max(float(y[first:] @ y[first:]), 1e-300)
@@ -153,30 +147,6 @@ def loss_of(problem: Problem, point: Point) -> float:
     count, w = len(problem.y) - problem.first, problem.y[problem.begin :] - point.free_run
     penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
     return count * (math.log(max(point.energy, 1e-300) / count) + penalty)
-
-
-def _equation_error_start(problem: Problem, room: Room, a: FloatArray) -> FloatArray:
-    """Return A of the least-squares ARX model of data filtered by 1/A, (15), made stable."""
-    a = arx_polynomial(problem, room, a)
-    return a if is_stable(a, START_RADIUS) else stabilised(a, START_RADIUS)
-
-
-def cold_starts(problem: Problem, room: Room, orders: Orders) -> tuple[Start, Start]:
-    """Return the ARX model as it is, D = A, and refined for white noise, with D of what it leaves.
-
-    Refined by the ARX model of data filtered by 1/A, repeated, of which the best is kept.
-    """
-    white, padded = np.zeros((2, orders.noise + 1))
-    white[0] = 1.0
-    arx = _equation_error_start(problem, room, np.eye(1, orders.output + 1)[0])
-    best = last = evaluate(problem, room, arx, white, 0.0)
-    for _ in range(REFINEMENTS):
-        last = evaluate(problem, room, _equation_error_start(problem, room, last.a), white, 0.0)
-        best = min(best, last, key=lambda point: point.energy)
-    short = min(orders.output, orders.noise) + 1
-    padded[:short] = arx[:short]
-    noise = noise_model(problem.y[problem.begin :] - best.free_run, orders.noise)
-    return Start(arx, padded, 0.0), Start(best.a, noise, 0.0)
 
 
 def fit_output(
@@ -204,7 +174,7 @@ def fit_output(
     if start is not None:
         starts = (Start(start.a, start.noise, 0.0),)
     else:
-        starts = cold_starts(problem, room, orders)
+        starts = cold_starts(problem, room, orders.output, orders.noise)
     rough = [descend(problem, room, one, max_iterations, ROUGH) for one in starts]
     best = min(rough, key=lambda point: loss_of(problem, point))
     again = Start(best.a, best.noise, best.energy)
@@ -219,7 +189,8 @@ def _finished(
     level = len(delays) * orders.input
     b = point.theta[:level].reshape(len(delays), orders.input)
     w = problem.y[problem.begin :] - point.free_run
-    innovations = np.convolve(w, point.noise, mode="valid")
+    innovations = np.empty(len(w) - orders.noise)
+    averaged(point.noise, w, orders.noise, len(innovations), innovations)
     return OutputFit(
         orders=orders,
         delays=delays,

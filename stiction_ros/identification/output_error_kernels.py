@@ -234,7 +234,9 @@ def arx_polynomial(problem: Problem, room: Room, a: FloatArray) -> FloatArray:
     count, size, at = len(problem.y) - problem.first, len(room.plain), problem.pad + problem.first
     driven_rows(a, problem.signals, 0, valves + 2, room.driven)
     for row in range(size + 1):
-        _price(problem, 0.0, room.plain[0], rows[row])
+        priced = rows[row, count:]
+        for k in range(len(priced)):
+            priced[k] = 0.0
     differences(room.tables[1], room.driven[valves + 1], at - 1, count, rows, 0)
     for j in range(valves):
         row = order + j * problem.inputs

@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.descent_kernels import is_stable
 from stiction_ros.identification.output_error import Orders, fit_output, pose
 from stiction_ros.identification.output_error_kernels import THIN, evaluate, normal_equations
+from stiction_ros.identification.polynomials import stabilised
 from stiction_ros.identification.row_kernels import driven_rows, lag_products
+from stiction_ros.identification.stability_kernels import is_stable, pulled_inside
 
 A = np.array([1.0, -1.5, 0.6])
 seeds = st.integers(0, 10_000)
@@ -79,6 +80,14 @@ def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> Non
         for h in (1e-6, -1e-6)
     ]
     assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(2.0 * gradient @ way, rel=1e-4, abs=1e-3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(roots=st.lists(st.complex_numbers(max_magnitude=3.0), min_size=1, max_size=3))
+def test_roots_are_pulled_inside_as_by_eigenvalues(roots: list[complex]) -> None:
+    polynomial = np.ascontiguousarray(np.poly(np.r_[roots, np.conj(roots)]).real)
+    expected = stabilised(polynomial, 0.9)
+    assert pulled_inside(polynomial, 0.9) == pytest.approx(expected, abs=1e-4)
 
 
 @settings(max_examples=20, deadline=None)
