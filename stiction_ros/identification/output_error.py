@@ -16,28 +16,22 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from functools import partial
 
 import numpy as np
-from scipy.linalg import lapack
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.descent_kernels import Start, cold_starts, descend
 from stiction_ros.identification.output_error_kernels import (
+    FREE_RUN_WEIGHT,
+    THIN,
     Point,
     Problem,
-    arx_polynomial,
-    descend,
-    evaluate,
-    is_stable,
-    loss_of,
+    Room,
 )
-from stiction_ros.identification.polynomials import stabilised
-from stiction_ros.identification.side_by_side import together
+from stiction_ros.identification.row_kernels import averaged
 
-THIN = 4
-START_RADIUS = 0.99
-ROUGH_GAIN = 0.3
-FINE_GAIN = 1e-3
+ROUGH = (0.3, 0.0)  # least gain of an iteration and least promised one
+FINE = (1e-3, 1e-4)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,51 +92,6 @@ class OutputFit:
         return self.loss + self.parameters * float(np.log(self.count))
 
 
-def _equation_error_start(problem: Problem, a: FloatArray, order: int) -> FloatArray:
-    """Return A of the least-squares ARX model of data filtered by 1/A, (15), made stable."""
-    lags = -_difference_table(order).T @ arx_polynomial(problem, a, order)
-    a = np.concatenate([[1.0], lags])
-    return a if is_stable(a, START_RADIUS) else stabilised(a, START_RADIUS)
-
-
-def _problem(y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders) -> Problem:
-    """Return the problem of one output.
-
-    The linear columns are lagged signals. Neighbouring lags of a slow signal are almost
-    parallel, so each is replaced by its differences: the same space, well conditioned, which
-    allows normal equations.
-    """
-    count, valves = len(y), len(stems)
-    begin = orders.first - orders.noise
-    signals = np.zeros((valves + 2, count))
-    signals[:valves] = stems
-    signals[valves] = 1.0
-    signals[valves + 1, begin - orders.output + 1] = 1.0
-    groups = [(j, delay + 1, orders.input) for j, delay in enumerate(delays)]
-    groups += [(valves, 0, 1), (valves + 1, 0, orders.output)]
-    # Σw² is priced at all samples before the first innovation, as nothing else holds the
-    # initial state there, then at every THIN-th.
-    priced = np.r_[: orders.noise, orders.noise : count - begin : THIN]
-    prices = np.sqrt(np.where(priced < orders.noise, 1.0, float(THIN)))
-    return Problem(
-        np.ascontiguousarray(y), signals, np.array(groups), begin, orders.first, priced, prices
-    )
-
-
-def _coefficients(problem: Problem, theta: FloatArray) -> FloatArray:
-    """Return the coefficients of the lagged signals from those of their differences."""
-    out = np.zeros(len(theta))
-    row = 0
-    for count in problem.groups[:, 2].tolist():
-        out[row : row + count] = _difference_table(count).T @ theta[row : row + count]
-        row += count
-    return out
-
-
-def _innovations(problem: Problem, point: Point) -> FloatArray:
-    return point.residual[: len(problem.y) - problem.first]
-
-
 @functools.cache
 def _difference_table(count: int) -> FloatArray:
     """Return T with differences = T · lags, shape (count, count)."""
@@ -153,18 +102,51 @@ def _difference_table(count: int) -> FloatArray:
     return table
 
 
-def ar_fit(w: FloatArray, order: int) -> FloatArray:
-    """Return monic D of order ``order`` by least squares over w[order:]."""
-    if order == 0:
-        return np.ones(1)
-    columns = np.stack([w[order - i : len(w) - i] for i in range(1, order + 1)], axis=1)
-    gram = columns.T @ columns
-    gram[np.diag_indices(order)] *= 1.0 + 1e-10
-    gram[np.diag_indices(order)] += 1e-300
-    _, solution, info = lapack.dposv(gram, columns.T @ w[order:])
-    if info != 0:
-        return np.concatenate([[1.0], np.zeros(order)])
-    return np.concatenate([[1.0], -solution])
+def pose(
+    y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders
+) -> tuple[Problem, Room]:
+    """Return the problem of one output and room for it.
+
+    Neighbouring lags of a slow signal are almost parallel, so each is replaced by its
+    differences: the same space, well conditioned, which allows normal equations. The unknown
+    initial state adds n_a lags of an impulse through 1/A; with them, a constant in the
+    equation is a constant in the free run.
+
+    Args:
+        y: shape (N,).
+        stems: shape (m, N).
+        delays: t_d per valve, samples.
+        orders: n_a, n_b, p and the window.
+    """
+    valves, samples = stems.shape
+    order, p, first = orders.output, orders.noise, orders.first
+    begin, count, lags = first - p, samples - first, np.array(delays) + 1
+    pad = int(lags.max()) + orders.input + order + p + 1
+    signals = np.zeros((valves + 2, pad + samples))
+    signals[:valves, pad:] = stems
+    signals[valves, pad + begin - order + 1] = 1.0
+    signals[valves + 1, pad:] = y
+    y = signals[valves + 1, pad:]
+    size, free = valves * orders.input + 1 + order, samples - begin
+    priced = p + (count + THIN - 1) // THIN
+    room = Room(
+        driven=np.zeros(signals.shape),
+        plain=np.ones((size, free)),
+        rows=np.zeros((size + 1 + order + p, count + priced)),
+        slope=np.zeros((2, pad + free)),
+        slopes=np.zeros((order, free)),
+        moved=np.zeros(pad + samples),
+        tables=(_difference_table(orders.input), _difference_table(order)),
+    )
+    energy = max(float(y[first:] @ y[first:]), 1e-300)
+    return Problem(y, signals, lags, orders.input, pad, begin, first, energy), room
+
+
+def loss_of(problem: Problem, point: Point) -> float:
+    """Return n log(Σε²/n) + n κ Σw²/Σy²."""
+    count, w = len(problem.y) - problem.first, problem.y[problem.begin :] - point.free_run
+    penalty = FREE_RUN_WEIGHT * float(w @ w) / problem.energy
+    return count * (math.log(max(point.energy, 1e-300) / count) + penalty)
 
 
 def fit_output(
@@ -185,52 +167,36 @@ def fit_output(
         start: a neighbouring fit of the same orders to start from; None starts from the ARX
             model with both noise placements and keeps the better.
     """
-    problem = _problem(y, stems, delays, orders)
-    table = _difference_table(orders.output)
-    if start is not None:
-        starts = [evaluate(problem, start.a, start.noise, 0.0)]
-    else:
-        a = _equation_error_start(problem, np.ones(1), orders.output)
-        padded = np.zeros(orders.noise + 1)
-        short = min(len(a), len(padded))
-        padded[:short] = a[:short]
-        white = evaluate(problem, a, np.eye(1, orders.noise + 1)[0], 0.0)
-        refined = _steiglitz_mcbride(problem, white)
-        noise = ar_fit(y[problem.begin :] - refined.free_run, orders.noise)
-        starts = [evaluate(problem, a, padded, 0.0), evaluate(problem, refined.a, noise, 0.0)]
+    problem, room = pose(y, stems, delays, orders)
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
-    rough = together(
-        *(partial(descend, problem, point, table, max_iterations, ROUGH_GAIN) for point in starts)
-    )
+    starts: tuple[Start, ...]
+    if start is not None:
+        starts = (Start(start.a, start.noise, 0.0),)
+    else:
+        starts = cold_starts(problem, room, orders.output, orders.noise)
+    rough = [descend(problem, room, one, max_iterations, ROUGH) for one in starts]
     best = min(rough, key=lambda point: loss_of(problem, point))
-    return _finished(
-        problem, delays, orders, descend(problem, best, table, max_iterations, FINE_GAIN)
-    )
+    again = Start(best.a, best.noise, best.energy)
+    point = descend(problem, room, again, max_iterations, FINE)
+    return _finished(problem, room, (delays, orders), point)
 
 
-def _steiglitz_mcbride(problem: Problem, point: Point, iterations: int = 4) -> Point:
-    """Return a better white-noise start: ARX of data filtered by 1/A, repeated."""
-    best, energy = point, float(point.residual @ point.residual)
-    for _ in range(iterations):
-        a = _equation_error_start(problem, point.a, len(point.a) - 1)
-        point = evaluate(problem, a, point.noise, 0.0)
-        reached = float(point.residual @ point.residual)
-        if reached < energy:
-            best, energy = point, reached
-    return best
-
-
-def _finished(problem: Problem, delays: tuple[int, ...], orders: Orders, point: Point) -> OutputFit:
-    valves = len(delays)
-    theta = _coefficients(problem, point.theta)
-    innovations = _innovations(problem, point)
+def _finished(
+    problem: Problem, room: Room, given: tuple[tuple[int, ...], Orders], point: Point
+) -> OutputFit:
+    delays, orders = given
+    level = len(delays) * orders.input
+    b = point.theta[:level].reshape(len(delays), orders.input)
+    w = problem.y[problem.begin :] - point.free_run
+    innovations = np.empty(len(w) - orders.noise)
+    averaged(point.noise, w, orders.noise, len(innovations), innovations)
     return OutputFit(
         orders=orders,
         delays=delays,
         a=point.a,
-        b=theta[: valves * orders.input].reshape(valves, orders.input),
-        constant=float(theta[valves * orders.input]),
+        b=b @ _difference_table(orders.input),
+        constant=float(point.theta[level] * point.a.sum()),
         noise=point.noise,
         loss=loss_of(problem, point),
         energy=max(float(innovations @ innovations), 1e-300),

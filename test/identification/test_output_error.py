@@ -7,8 +7,11 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.output_error import Orders, fit_output
-from stiction_ros.identification.output_error_kernels import Problem, evaluate, is_stable
+from stiction_ros.identification.output_error import Orders, fit_output, pose
+from stiction_ros.identification.output_error_kernels import THIN, evaluate, normal_equations
+from stiction_ros.identification.polynomials import stabilised
+from stiction_ros.identification.row_kernels import driven_rows, lag_products
+from stiction_ros.identification.stability_kernels import is_stable, pulled_inside
 
 A = np.array([1.0, -1.5, 0.6])
 seeds = st.integers(0, 10_000)
@@ -45,20 +48,63 @@ def test_point_is_the_least_squares_solution_over_everything_linear(
     stem, y = driven(seed, 1, 200)
     y = y + generator.standard_normal(len(y))
     first, begin, d = 20, 19, np.array([1.0, -0.4])
-    priced, prices = np.arange(len(y) - begin), np.full(len(y) - begin, 0.7)
-    signals = np.stack([stem, np.ones(len(y))])
-    problem = Problem(y, signals, np.array([[0, 2, 2], [1, 0, 1]]), begin, first, priced, prices)
-    point = evaluate(problem, A, d, weight)
-    lags = [np.r_[np.zeros(i), stem[: len(y) - i]] for i in (2, 3)]
-    plain = np.stack([lfilter([1.0], A, x) for x in (*lags, np.ones(len(y)))], axis=1)
-    rows = [lfilter(d, [1.0], plain, axis=0)[first:]]
-    target = [lfilter(d, [1.0], y)[first:]]
-    if weight > 0.0:
-        rows.append(np.sqrt(weight) * 0.7 * plain[begin:])
-        target.append(np.sqrt(weight) * 0.7 * y[begin:])
+    problem, room = pose(y, stem[None, :], (1,), Orders(2, 2, 1, first))
+    point = evaluate(problem, room, A, d, weight)
+    initial = [np.eye(1, len(y), begin - i)[0] for i in (0, 1)]
+    columns = [np.r_[np.zeros(i), stem[: len(y) - i]] for i in (2, 3)]
+    columns += [np.ones(len(y)), *initial]
+    plain = np.stack([lfilter([1.0], A, x) for x in columns], axis=1)
+    rows, target = [lfilter(d, [1.0], plain, axis=0)[first:]], [lfilter(d, [1.0], y)[first:]]
+    prices = np.sqrt(weight) * np.r_[1.0, np.full(45, np.sqrt(THIN))]
+    priced = begin + np.r_[0, 1 : len(y) - begin : THIN]
+    rows.append(prices[:, None] * plain[priced])
+    target.append(prices * y[priced])
     matrix, right = np.vstack(rows), np.concatenate(target)
     residual = right - matrix @ np.linalg.lstsq(matrix, right)[0]
-    assert point.residual @ point.residual == pytest.approx(residual @ residual, rel=1e-9)
+    assert point.total == pytest.approx(residual @ residual, rel=1e-9)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, weight=st.floats(0.0, 1.0))
+def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> None:
+    stem, y = driven(seed, 1, 200)
+    y = y + np.random.default_rng(seed).standard_normal(len(y))
+    problem, room = pose(y, stem[None, :], (1,), Orders(2, 1, 2, 20))
+    d, way = np.array([1.0, -0.4, 0.1]), np.random.default_rng(seed + 1).standard_normal(4)
+    point = evaluate(problem, room, A, d, weight)
+    gradient = normal_equations(problem, room, point)[1]
+    # along differences of the lags of A: ∇_0 = a_1, ∇_1 = a_1 − a_2
+    slope_a, slope_d = np.r_[0.0, room.tables[1].T @ way[:2]], np.r_[0.0, way[2:]]
+    ends = [
+        evaluate(problem, room, A + h * slope_a, d + h * slope_d, weight).total
+        for h in (1e-6, -1e-6)
+    ]
+    assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(2.0 * gradient @ way, rel=1e-4, abs=1e-3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(roots=st.lists(st.complex_numbers(max_magnitude=3.0), min_size=1, max_size=3))
+def test_roots_are_pulled_inside_as_by_eigenvalues(roots: list[complex]) -> None:
+    polynomial = np.ascontiguousarray(np.poly(np.r_[roots, np.conj(roots)]).real)
+    expected = stabilised(polynomial, 0.9)
+    assert pulled_inside(polynomial, 0.9) == pytest.approx(expected, abs=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, order=st.integers(0, 6))
+def test_products_of_lags(seed: int, order: int) -> None:
+    w = np.random.default_rng(seed).standard_normal(50)
+    lags = np.stack([w[order - i : len(w) - i] for i in range(order + 1)])
+    assert lag_products(w, order) == pytest.approx(np.triu(lags @ lags.T), abs=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("signals", [1, 2, 3])
+def test_signals_through_any_order(order: int, signals: int) -> None:
+    x = np.random.default_rng(order).standard_normal((signals, 60))
+    a, out = np.poly(np.linspace(-0.5, 0.8, order)), np.zeros_like(x)
+    driven_rows(a, x, 0, signals, out)
+    assert out == pytest.approx(lfilter([1.0], a, x), rel=1e-9)
 
 
 @settings(max_examples=10, deadline=None)
@@ -80,6 +126,8 @@ def test_coloured_noise_is_whitened(seed: int) -> None:
     y = y + lfilter([1.0], [1.0, -0.8], white)
     fit = fit_output(y, stem[None, :], (1,), Orders(2, 1, 1, 20))
     assert fit.noise == pytest.approx([1.0, -0.8], abs=0.06)
+    expected = lfilter(fit.noise, [1.0], y[19:] - fit.free_run)[1:]
+    assert fit.innovations == pytest.approx(expected, abs=1e-9)
     assert fit.innovations.std() == pytest.approx(0.1, rel=0.1)
 
 
