@@ -49,7 +49,7 @@ def settings_of_run() -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSe
 def write_run(directory: Path) -> LiveRun:
     """Run the loop and write its bag."""
     scenario, estimator, controller = settings_of_run()
-    run = run_live(scenario, samples=SAMPLES, seed=1)
+    run = run_live(scenario, samples=SAMPLES, seed=4)
     bag = Bag(BagWriter(directory))
     _config(bag, "/estimator", estimator)
     _config(bag, "/controller", controller, {"model": scenario.process.to_mapping()})
