@@ -9,35 +9,51 @@ from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.lanes import LANES, put, row, spread
 
+IntArray = NDArray[np.int64]
+
 
 @compiled_fused
 def explained_stretches(
-    regressors: FloatArray, target: FloatArray, starts: NDArray[np.int64], width: int, error: float
+    own: FloatArray,
+    others: FloatArray,
+    lags: tuple[int, int],
+    starts: IntArray,
+    width: int,
+    error: float,
 ) -> NDArray[np.bool_]:
-    """Return which stretches may be explained up to ``error`` at every sample.
+    """Return which stretches of ``own`` may be explained up to ``error`` at every sample.
 
     The root of the sum of squares that orthogonalisation leaves is compared with what such an
     error allows. Columns that depend on others can only lower what is left, so no stretch that
     may count is passed over; others may come along.
 
     Args:
-        regressors: shape (N, q), columns of the size of ``target``.
-        target: shape (N,).
-        starts: first samples, shape (w,).
-        width: samples of a stretch, at least q.
+        own: shape (N,), explained by its own lags from 1 on and
+        others: of the same size, shape (q, N).
+        lags: the last lag, and the first one of the others.
+        starts: first samples of the stretches less the last lag, shape (w,).
+        width: samples of a stretch, at least as many as lags.
     """
-    columns = regressors.shape[1]
+    last, least = lags
+    columns = last + len(others) * (last + 1 - least)
     out = np.zeros(len(starts), dtype=np.bool_)
     rows = np.empty((columns + 1, width, LANES))  # of several stretches side by side
     left = np.empty((1, LANES))
     nothing = spread(1e-300)
     for begin in range(0, len(starts), LANES):
         for lane in range(LANES):
-            start = starts[min(begin + lane, len(starts) - 1)]
+            first = starts[min(begin + lane, len(starts) - 1)] + last
             for k in range(width):
-                for q in range(columns):
-                    rows[q, k, lane] = regressors[start + k, q]
-                rows[columns, k, lane] = target[start + k]
+                rows[columns, k, lane] = own[first + k]
+            for lag in range(1, last + 1):
+                for k in range(width):
+                    rows[lag - 1, k, lane] = own[first + k - lag]
+            q = last
+            for other in others:
+                for lag in range(least, last + 1):
+                    for k in range(width):
+                        rows[q, k, lane] = other[first + k - lag]
+                    q += 1
         for q in range(columns + 1):
             length = nothing
             for k in range(width):

@@ -184,9 +184,9 @@ def _controller_ratio(record: Record) -> float | None:
     Both sums are :func:`_share`; several relations must agree, the least clear is returned.
     """
     part = record.part(0, min(len(record), MAX_SAMPLES))
-    op, pv = np.diff(part.op, axis=0), np.diff(part.pv, axis=0)
-    of_op = [_exact_relation(column, pv) for column in op.T]
-    of_pv = [_exact_relation(column, op) for column in pv.T]
+    op, pv = _scaled_changes(part.op), _scaled_changes(part.pv)
+    of_op = [_exact_relation(column, pv) for column in op]
+    of_pv = [_exact_relation(column, op) for column in pv]
     ratios = [_over(found.others, found.own) for found in of_op if found is not None]
     ratios += [_over(found.own, found.others) for found in of_pv if found is not None]
     if ratios and _follows_from_the_past(op, pv):
@@ -196,9 +196,20 @@ def _controller_ratio(record: Record) -> float | None:
     return min(ratios) if ratios and min(ratios) >= SIDES else None
 
 
+def _scaled_changes(columns: FloatArray) -> FloatArray:
+    """Return differences over their standard deviation, shape (columns, N); 0 without one.
+
+    Differences know no set-point but its moves.
+    """
+    changes = np.diff(columns, axis=0)
+    size = changes.std(axis=0)
+    scaled = np.where(size > 0.0, changes / np.where(size > 0.0, size, 1.0), 0.0)
+    return np.ascontiguousarray(scaled.T)
+
+
 def _follows_from_the_past(op: FloatArray, pv: FloatArray) -> bool:
     """Tell whether a column is an exact function of earlier samples alone."""
-    directions = [(column, pv) for column in op.T] + [(column, op) for column in pv.T]
+    directions = [(column, pv) for column in op] + [(column, op) for column in pv]
     return any(
         _fit(own, others, order, _Past.ALONE) is not None
         for own, others in directions
@@ -214,19 +225,17 @@ def _exact_relation(own: FloatArray, others: FloatArray) -> _Relation | None:
     """Return the exact relation of lowest order with an integrator on one side, or None.
 
     Args:
-        own: differences of one column, shape (N,); differences know no set-point but its moves.
-        others: differences of the columns that it is computed from, shape (N, q).
+        own: scaled changes of one column, shape (N,).
+        others: those of the columns that it is computed from, shape (q, N).
     """
-    if own.std() == 0.0 or np.any(others.std(axis=0) == 0.0):
+    if not own.any() or not others.any(axis=1).all():
         return None
     for order in range(1, MAX_ORDER + 1):
         theta = _fit(own, others, order)
         if theta is None:
             continue
-        a = np.concatenate([[1.0], -theta[:order]])
-        b = theta[order:].reshape(others.shape[1], order + 1)
-        scaled = np.abs(b) * others.std(axis=0)[:, None] / own.std()
-        if scaled[:, 0].max() < AT_ONCE * max(float(scaled.max()), 1e-3):
+        a, b = np.concatenate([[1.0], -theta[:order]]), theta[order:].reshape(-1, order + 1)
+        if np.abs(b[:, 0]).max() < AT_ONCE * max(float(np.abs(b).max()), 1e-3):
             continue
         found = _Relation(_share(a), max(_share(row) for row in b))
         low, high = sorted((found.own, found.others))
@@ -252,28 +261,27 @@ def _fit(
     from stiction_ros.identification.exact_relation import explained_stretches
 
     count = len(own) - order
+    width = max(3 * (order + len(others) * (order + 1 - past.value)), 30)
+    if count < 2 * width:
+        return None
+    starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
+    may = explained_stretches(own, others, (order, past.value), starts, width, EXACT)
+    if not may.any():
+        return None
     columns = [own[order - i : order - i + count] for i in range(1, order + 1)]
     columns += [
         other[order - i : order - i + count]
-        for other in others.T
+        for other in others
         for i in range(past.value, order + 1)
     ]
-    width = max(3 * len(columns), 30)
-    if count < 2 * width:
-        return None
-    sizes = [own.std()] * order
-    sizes += [size for size in others.std(axis=0) for _ in range(past.value, order + 1)]
-    scale = np.array(sizes) + 1e-300
-    regressors, target = np.column_stack(columns) / scale, own[order:] / sizes[0]
-    moving = target != 0.0
-    starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
-    starts = starts[explained_stretches(regressors, target, starts, width, EXACT)]
+    regressors, target = np.column_stack(columns), own[order:]
+    moving, starts = target != 0.0, starts[may]
     for begin in range(0, len(starts), FEW):  # mostly the first few will do
         rows = starts[begin : begin + FEW, None] + np.arange(width)
         for theta in _solutions(regressors[rows], target[rows], past):
             error = np.abs(regressors[moving] @ theta - target[moving])
             if np.mean(error < CLOSE) >= SHARE:
-                return np.asarray(theta * own.std() / scale)
+                return np.asarray(theta)
     return None
 
 
