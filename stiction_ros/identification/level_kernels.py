@@ -85,17 +85,23 @@ def best_levels(
     for g in range(size):
         low, high = ranges[g]
         step, best, middle, bend = 0.0, 0, 1, 0.0
-        for _ in range(ZOOMS):
+        for zoom in range(ZOOMS):
             for i in range(POINTS):
-                at[i] = low + 0.25 * i * (high - low)
-                loss[i] = _loss(products[g], rights[g], scales, at[i], now[i])
+                if zoom == 0 or i % 2 == 1:
+                    at[i] = low + 0.25 * i * (high - low)
+                    loss[i] = _loss(products[g], rights[g], scales, at[i], now[i])
             best = int(loss.argmin())
             middle = min(max(best, 1), POINTS - 2)
             step = max(0.25 * (high - low), 1e-300)
-            low, high = at[middle - 1], at[middle + 1]
             bend = max(loss[middle - 1] - 2.0 * loss[middle] + loss[middle + 1], 0.0)
-            if bend < EXACT_ENOUGH:
+            if bend < EXACT_ENOUGH or zoom == ZOOMS - 1:
                 break
+            low, high = at[middle - 1], at[middle + 1]
+            # The ends and the middle of the next range are known; in this order none is lost.
+            for to, known in ((0, middle - 1), (POINTS - 1, middle + 1), (POINTS // 2, middle)):
+                at[to], loss[to] = at[known], loss[known]
+                for p in range(outputs):
+                    now[to, p] = now[known, p]
         slope = 0.5 * (loss[middle - 1] - loss[middle + 1])
         level[g], lowest[g] = at[best], loss[best]
         for p in range(outputs):

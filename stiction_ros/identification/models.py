@@ -123,6 +123,11 @@ class ValveScan:
     delays: FloatArray
     moves: FloatArray
 
+    def part(self, begin: int, end: int) -> ValveScan:
+        """Return the rows from ``begin`` to before ``end``."""
+        rows = slice(begin, end)
+        return ValveScan(self.grid[rows], self.loss[rows], self.delays[rows], self.moves[rows])
+
     def best(self, count: int, min_moves: int, apart: float) -> list[int]:
         """Return up to ``count`` best rows at least ``apart`` from each other."""
         loss = np.where(self.moves < min_moves, np.inf, self.loss)
@@ -224,7 +229,7 @@ def scan_stems(
                 loss[c, rows] += criterion.loss(energy.min(axis=1), scan.count)
 
     shared = len(grid) * len(u) >= WORTHWHILE
-    batch = min(BATCH, len(grid) // 2 + 1) if shared else BATCH
+    batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH
     begins = range(0, len(grid), batch)
     together(*(partial(scanned, slice(begin, begin + batch)) for begin in begins))
     return [ValveScan(grid, loss[c], best[c], moves) for c in range(len(scans))]

@@ -44,7 +44,7 @@ from stiction_ros.identification.pattern_search import (
 )
 from stiction_ros.identification.patterns import has_cells
 from stiction_ros.identification.polygon_search import refine_near
-from stiction_ros.identification.side_by_side import at_once, together
+from stiction_ros.identification.side_by_side import together
 
 STEPS = 80
 LINES = 14
@@ -129,30 +129,24 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
     """Scan the whole triangle of one valve, its first row without friction."""
     limit, start = float(data.limit[valve]), float(model.start[valve])
     fine = np.vstack([np.zeros((1, 2)), first_grid(limit, data.y.shape[1])])
+    points = WORK / (data.y.shape[1] * len(BEGINNINGS))
+    away = even_grid(limit, min(STEPS // 2, int(np.sqrt(points))))
+    starts = [np.full(len(fine), start), *(start + share * away[:, 0] for share in BEGINNINGS)]
+    grid = np.vstack([fine, *(away for _ in BEGINNINGS)])
+    everywhere = scan_valve(
+        data, model, orders, valve, grid, np.concatenate(starts), Criterion.ONE_STEP
+    )
+    ends = np.cumsum([len(part) for part in starts])
+    elsewhere = tuple(
+        Elsewhere(part, everywhere.part(int(end) - len(part), int(end)))
+        for part, end in zip(starts[1:], ends[1:], strict=True)
+    )
     coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
     filtered = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-    plain = (Criterion.ONE_STEP,)
-    (scans, closer), others = at_once(
-        lambda: together(
-            partial(scan_criteria, data, model, orders, valve, fine, start, plain),
-            partial(scan_criteria, data, model, orders, valve, coarse, start, filtered),
-        ),
-        lambda: _elsewhere(data, model, orders, valve),
-    )
-    by_criterion = dict(zip((*plain, *filtered), (*scans, *closer), strict=True))
-    return FirstScan(model, valve, by_criterion, others)
-
-
-def _elsewhere(data: Data, model: Model, orders: Orders, valve: int) -> tuple[Elsewhere, ...]:
-    limit, start = float(data.limit[valve]), float(model.start[valve])
-    points = WORK / (data.y.shape[1] * len(BEGINNINGS))
-    grid = even_grid(limit, min(STEPS // 2, int(np.sqrt(points))))
-    found = []
-    for share in BEGINNINGS:
-        starts = start + share * grid[:, 0]
-        scan = scan_valve(data, model, orders, valve, grid, starts, Criterion.ONE_STEP)
-        found.append(Elsewhere(starts, scan))
-    return tuple(found)
+    scans = scan_criteria(data, model, orders, valve, coarse, start, filtered)
+    by_criterion = dict(zip(filtered, scans, strict=True))
+    one_step = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
+    return FirstScan(model, valve, one_step | by_criterion, elsewhere)
 
 
 def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:

@@ -15,19 +15,20 @@ from stiction_ros.effects.behaviour import FloatArray
 IntArray = NDArray[np.int64]
 Rows = tuple[IntArray, IntArray, FloatArray]
 
-BLOCK = 16
+BLOCK = 8
+MANY = 8  # blocks that are passed over at once where OP stays in the band
 SPARE = 24  # rows per signal for which there is room at first
 
 
 @compiled
-def _extremes(u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the highest and the lowest OP of every block."""
-    blocks = (len(u) + BLOCK - 1) // BLOCK
+def _extremes(highest: FloatArray, lowest: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
+    """Return the highest and the lowest value of every ``size`` in a row."""
+    blocks = (len(highest) + size - 1) // size
     highs, lows = np.empty(blocks), np.empty(blocks)
     for b in range(blocks):
-        high = low = u[b * BLOCK]
-        for k in range(b * BLOCK + 1, min((b + 1) * BLOCK, len(u))):
-            high, low = max(high, u[k]), min(low, u[k])
+        high, low = highest[b * size], lowest[b * size]
+        for k in range(b * size + 1, min((b + 1) * size, len(highest))):
+            high, low = max(high, highest[k]), min(low, lowest[k])
         highs[b], lows[b] = high, low
     return highs, lows
 
@@ -80,7 +81,8 @@ def he_steps(static: FloatArray, dynamic: FloatArray, u: FloatArray, start: Floa
         u: OP, %, shape (N,).
     """
     count, size = len(u), len(static)
-    highs, lows = _extremes(u)
+    highs, lows = _extremes(u, u, BLOCK)
+    wide_highs, wide_lows = _extremes(highs, lows, MANY)
     offsets = np.zeros(size + 1, dtype=np.int64)
     places = np.empty(SPARE * size + count, dtype=np.int64)
     values = np.empty((len(places), 1))
@@ -90,7 +92,14 @@ def he_steps(static: FloatArray, dynamic: FloatArray, u: FloatArray, start: Floa
         stem, f_s, f_d = start[g], static[g], dynamic[g]
         places[total], values[total, 0] = 0, stem
         total += 1
-        for b in range(len(highs)):
+        b = -1
+        while b + 1 < len(highs):
+            b += 1
+            if b % MANY == 0:
+                wide = b // MANY
+                if not (wide_highs[wide] - stem > f_s or wide_lows[wide] - stem < -f_s):
+                    b += MANY - 1
+                    continue
             if not (highs[b] - stem > f_s or lows[b] - stem < -f_s):
                 continue
             for k in range(b * BLOCK, min((b + 1) * BLOCK, count)):
@@ -130,7 +139,8 @@ def he_pattern_steps(
         direction: of the first slip.
     """
     count, size = len(u), len(jump)
-    highs, lows = _extremes(u)
+    highs, lows = _extremes(u, u, BLOCK)
+    wide_highs, wide_lows = _extremes(highs, lows, MANY)
     offsets = np.zeros(size + 1, dtype=np.int64)
     places = np.empty(SPARE * size + count, dtype=np.int64)
     values = np.empty((len(places), 2))
@@ -143,10 +153,18 @@ def he_pattern_steps(
         j_low, j_high, s_low, s_high = 0.0, np.inf, 0.0, np.inf
         places[total], values[total, 0], values[total, 1] = 0, base, 0.0
         total += 1
-        for b in range(max(first, 0) // BLOCK, len(highs)):
-            if b * BLOCK > first and not (highs[b] > high or lows[b] < low):
+        b = max(first, 0) // BLOCK - 1
+        while b + 1 < len(highs):
+            b += 1
+            top, bottom, passed = highs[b], lows[b], 0
+            if b % MANY == 0:
+                wide_top, wide_bottom = wide_highs[b // MANY], wide_lows[b // MANY]
+                if not (wide_top > high or wide_bottom < low):
+                    top, bottom, passed = wide_top, wide_bottom, MANY - 1
+            if b * BLOCK > first and not (top > high or bottom < low):
+                b += passed
                 if sign != 0.0:
-                    above, below = highs[b] - base, base - lows[b]
+                    above, below = top - base, base - bottom
                     j_low = max(j_low, above if sign > 0.0 else below)
                     s_low = max(s_low, below if sign > 0.0 else above)
                 continue
