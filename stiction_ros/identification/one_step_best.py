@@ -161,16 +161,22 @@ class _Search:
             friction = scan.grid[index]
             for begin in _beginnings(u, friction, 0.003 * limit):
                 if not any(_holds(known, begin, friction) for known in enumerated):
-                    near = self._neighbourhood(search, friction, begin)
+                    known = [near for other, near in enumerated if _alike(other, begin)]
+                    near = self._neighbourhood(search, friction, begin, known)
                     enumerated.append((begin, near))
                     best = self._in_cells(best, search, valve, near.scan, begin)
         return best
 
     def _neighbourhood(
-        self, search: PatternSearch, friction: FloatArray, begin: Beginning
+        self,
+        search: PatternSearch,
+        friction: FloatArray,
+        begin: Beginning,
+        known: list[PatternMap],
     ) -> PatternMap:
         most = min(MOST_CELLS, int(0.5 * CELL_SAMPLES / len(search.u)))
-        near = neighbourhood(search, begin, friction, 0.0, most)
+        closed = [near for near in known if near.closed]
+        near = neighbourhood(search, begin, friction, 0.0, most, closed)
         self.points += near.patterns
         return near
 
@@ -267,8 +273,12 @@ def _holds(known: tuple[Beginning, PatternMap], begin: Beginning, friction: Floa
     before, near = known
     jl, jh, sl, sh = near.rectangle
     jump, reverse = points_of(friction[None, :])[0]
-    same = (before.first, before.direction) == (begin.first, begin.direction)
-    return bool(near.closed and same and jl <= jump <= jh and sl <= reverse <= sh)
+    inside = jl <= jump <= jh and sl <= reverse <= sh
+    return bool(near.closed and _alike(before, begin) and inside)
+
+
+def _alike(one: Beginning, other: Beginning) -> bool:
+    return (one.first, one.direction) == (other.first, other.direction)
 
 
 def _small(limit: float) -> FloatArray:

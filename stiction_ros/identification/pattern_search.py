@@ -9,6 +9,7 @@ remaining frictions are searched on grids (:mod:`.search`).
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -262,13 +263,20 @@ class PatternMap:
 
 
 def neighbourhood(
-    search: PatternSearch, begin: Beginning, friction: FloatArray, threshold: float, most: int
+    search: PatternSearch,
+    begin: Beginning,
+    friction: FloatArray,
+    threshold: float,
+    most: int,
+    known: Sequence[PatternMap] = (),
 ) -> PatternMap:
     """Enumerate round (f_S, f_D), outwards until all patterns at the edge are rejected.
 
     Args:
         threshold: excess of the loss over the best from which a pattern is rejected.
         most: largest number of cells.
+        known: closed neighbourhoods of the same beginning; where one of them is met the
+            enumeration ends, as beyond it there is nothing better.
     """
     centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
     scan = search.evaluate(cells_at(search.u, begin, centre[None, :], search.law))
@@ -285,6 +293,8 @@ def neighbourhood(
         wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
         if (wider == rectangle).all():
             return PatternMap(scan, rectangle, closed=True)
+        if any(_overlap(wider, other.rectangle) for other in known):
+            return PatternMap(scan, rectangle, closed=False)
         for strip in _remainders(wider[None, :], rectangle[None, :]):
             more = search.enumerate(begin, strip, most - len(scan.loss))
             if more is None:
@@ -292,6 +302,10 @@ def neighbourhood(
             scan = PatternScan.joined([scan, more])
         rectangle = wider
     return PatternMap(scan, rectangle, closed=False)
+
+
+def _overlap(one: FloatArray, other: FloatArray) -> bool:
+    return bool((one[[0, 2]] < other[[1, 3]]).all() and (other[[0, 2]] < one[[1, 3]]).all())
 
 
 def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float) -> FloatArray:
