@@ -16,6 +16,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from stiction_ros.identification.output_error_kernels import (
     Room,
 )
 from stiction_ros.identification.row_kernels import averaged
+from stiction_ros.identification.side_by_side import together
 
 ROUGH = (0.3, 0.0)  # least gain of an iteration and least promised one
 FINE = (1e-3, 1e-4)
@@ -102,10 +104,8 @@ def _difference_table(count: int) -> FloatArray:
     return table
 
 
-def pose(
-    y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders
-) -> tuple[Problem, Room]:
-    """Return the problem of one output and room for it.
+def pose(y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: Orders) -> Problem:
+    """Return the problem of one output.
 
     Neighbouring lags of a slow signal are almost parallel, so each is replaced by its
     differences: the same space, well conditioned, which allows normal equations. The unknown
@@ -120,26 +120,31 @@ def pose(
     """
     valves, samples = stems.shape
     order, p, first = orders.output, orders.noise, orders.first
-    begin, count, lags = first - p, samples - first, np.array(delays) + 1
+    begin, lags = first - p, np.array(delays) + 1
     pad = int(lags.max()) + orders.input + order + p + 1
     signals = np.zeros((valves + 2, pad + samples))
     signals[:valves, pad:] = stems
     signals[valves, pad + begin - order + 1] = 1.0
     signals[valves + 1, pad:] = y
     y = signals[valves + 1, pad:]
-    size, free = valves * orders.input + 1 + order, samples - begin
-    priced = p + (count + THIN - 1) // THIN
-    room = Room(
-        driven=np.zeros(signals.shape),
+    energy = max(float(y[first:] @ y[first:]), 1e-300)
+    return Problem(y, signals, lags, orders.input, pad, begin, first, energy)
+
+
+def room_for(problem: Problem, orders: Orders) -> Room:
+    """Return room for the evaluations of a problem, one at a time."""
+    valves, free, order = len(problem.lags), len(problem.y) - problem.begin, orders.output
+    count = len(problem.y) - problem.first
+    size, priced = valves * orders.input + 1 + order, orders.noise + (count + THIN - 1) // THIN
+    return Room(
+        driven=np.zeros(problem.signals.shape),
         plain=np.ones((size, free)),
-        rows=np.zeros((size + 1 + order + p, count + priced)),
-        slope=np.zeros((2, pad + free)),
+        rows=np.zeros((size + 1 + order + orders.noise, count + priced)),
+        slope=np.zeros((2, problem.pad + free)),
         slopes=np.zeros((order, free)),
-        moved=np.zeros(pad + samples),
+        moved=np.zeros(problem.signals.shape[1]),
         tables=(_difference_table(orders.input), _difference_table(order)),
     )
-    energy = max(float(y[first:] @ y[first:]), 1e-300)
-    return Problem(y, signals, lags, orders.input, pad, begin, first, energy), room
 
 
 def loss_of(problem: Problem, point: Point) -> float:
@@ -167,24 +172,26 @@ def fit_output(
         start: a neighbouring fit of the same orders to start from; None starts from the ARX
             model with both noise placements and keeps the better.
     """
-    problem, room = pose(y, stems, delays, orders)
+    problem = pose(y, stems, delays, orders)
+    room = room_for(problem, orders)
     # The starts are told apart by a rough descent; the best goes on to the end, with Σw²
     # priced anew by the innovations of a good model.
-    starts: tuple[Start, ...]
     if start is not None:
-        starts = (Start(start.a, start.noise, 0.0),)
+        rough = [descend(problem, room, Start(start.a, start.noise, 0.0), max_iterations, ROUGH)]
     else:
+        rooms = (room, room_for(problem, orders))
         starts = cold_starts(problem, room, orders.output, orders.noise)
-    rough = [descend(problem, room, one, max_iterations, ROUGH) for one in starts]
+        pairs = zip(rooms, starts, strict=True)
+        rough = together(
+            *(partial(descend, problem, own, one, max_iterations, ROUGH) for own, one in pairs)
+        )
     best = min(rough, key=lambda point: loss_of(problem, point))
     again = Start(best.a, best.noise, best.energy)
     point = descend(problem, room, again, max_iterations, FINE)
-    return _finished(problem, room, (delays, orders), point)
+    return _finished(problem, (delays, orders), point)
 
 
-def _finished(
-    problem: Problem, room: Room, given: tuple[tuple[int, ...], Orders], point: Point
-) -> OutputFit:
+def _finished(problem: Problem, given: tuple[tuple[int, ...], Orders], point: Point) -> OutputFit:
     delays, orders = given
     level = len(delays) * orders.input
     b = point.theta[:level].reshape(len(delays), orders.input)

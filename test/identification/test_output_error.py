@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.output_error import Orders, fit_output, pose
+from stiction_ros.identification.output_error import Orders, fit_output, pose, room_for
 from stiction_ros.identification.output_error_kernels import THIN, evaluate, normal_equations
 from stiction_ros.identification.polynomials import stabilised
 from stiction_ros.identification.row_kernels import driven_rows, lag_products
@@ -48,7 +48,9 @@ def test_point_is_the_least_squares_solution_over_everything_linear(
     stem, y = driven(seed, 1, 200)
     y = y + generator.standard_normal(len(y))
     first, begin, d = 20, 19, np.array([1.0, -0.4])
-    problem, room = pose(y, stem[None, :], (1,), Orders(2, 2, 1, first))
+    orders = Orders(2, 2, 1, first)
+    problem = pose(y, stem[None, :], (1,), orders)
+    room = room_for(problem, orders)
     point = evaluate(problem, room, A, d, weight)
     initial = [np.eye(1, len(y), begin - i)[0] for i in (0, 1)]
     columns = [np.r_[np.zeros(i), stem[: len(y) - i]] for i in (2, 3)]
@@ -69,7 +71,9 @@ def test_point_is_the_least_squares_solution_over_everything_linear(
 def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> None:
     stem, y = driven(seed, 1, 200)
     y = y + np.random.default_rng(seed).standard_normal(len(y))
-    problem, room = pose(y, stem[None, :], (1,), Orders(2, 1, 2, 20))
+    orders = Orders(2, 1, 2, 20)
+    problem = pose(y, stem[None, :], (1,), orders)
+    room = room_for(problem, orders)
     d, way = np.array([1.0, -0.4, 0.1]), np.random.default_rng(seed + 1).standard_normal(4)
     point = evaluate(problem, room, A, d, weight)
     gradient = normal_equations(problem, room, point)[1]
