@@ -7,9 +7,6 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 
-ROUNDS = 500
-CLOSE = 1e-13
-
 
 @compiled
 def is_stable(a: FloatArray, radius: float) -> bool:
@@ -34,36 +31,20 @@ def is_stable(a: FloatArray, radius: float) -> bool:
 
 @compiled
 def pulled_inside(a: FloatArray, radius: float) -> FloatArray:
-    """Return A with roots outside ``radius`` pulled back onto it, angles kept.
-
-    The roots come from the simultaneous iteration of Durand and Kerner.
-    """
+    """Return A with roots outside ``radius`` pulled back onto it, angles kept."""
     order = len(a) - 1
     if is_stable(a, radius):
         return a
-    roots = np.empty(order, dtype=np.complex128)
+    companion = np.zeros((order, order), dtype=np.complex128)
     for i in range(order):
-        roots[i] = (0.4 + 0.9j) ** i
-    for _ in range(ROUNDS):
-        largest = 0.0
-        for i in range(order):
-            value, apart = roots[i] + a[1], 1.0 + 0.0j
-            for j in range(2, order + 1):
-                value = value * roots[i] + a[j]
-            for j in range(order):
-                if j != i:
-                    apart *= roots[i] - roots[j]
-            change = value / apart
-            roots[i] -= change
-            largest = max(largest, abs(change))
-        if largest < CLOSE:
-            break
+        companion[0, i] = -a[1 + i]
+        if i > 0:
+            companion[i, i - 1] = 1.0
     out = np.zeros(order + 1, dtype=np.complex128)
     out[0] = 1.0
-    for i in range(order):
-        size = abs(roots[i])
-        if size > radius:
-            roots[i] *= radius / size
-        for j in range(i + 1, 0, -1):
-            out[j] -= roots[i] * out[j - 1]
+    for root in np.linalg.eigvals(companion):
+        size = abs(root)
+        inside = root * (radius / size) if size > radius else root
+        for j in range(order, 0, -1):
+            out[j] -= inside * out[j - 1]
     return out.real.copy()
