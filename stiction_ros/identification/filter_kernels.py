@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.row_kernels import averaged
 from stiction_ros.lanes import LANES, halves_swapped, put, row, spread
 
 IntArray = NDArray[np.int64]
@@ -88,17 +89,6 @@ def _recursion(a: FloatArray, z: FloatArray) -> None:
 
 
 @compiled
-def averaged(x: FloatArray, d: FloatArray) -> FloatArray:
-    """Return D x, from rest and until it is at rest again, shape (n + p,)."""
-    out = np.zeros(len(x) + len(d) - 1)
-    for i in range(len(d)):
-        part = out[i : i + len(x)]
-        for k in range(len(x)):
-            part[k] += d[i] * x[k]
-    return out
-
-
-@compiled
 def tails_of(
     rows: FloatArray, numerator: FloatArray, denominator: FloatArray, samples: int, length: int
 ) -> FloatArray:
@@ -111,17 +101,20 @@ def tails_of(
         samples: N.
         length: at least N; 0 from there on.
     """
-    count = len(rows)
+    count, order, size = len(rows), len(numerator) - 1, rows.shape[1]
     out = np.zeros((length, count))
     z = np.empty((samples, LANES))
+    backwards, moved = np.zeros(size + 2 * order), np.empty(size + order)
     for begin in range(0, count, LANES):
         for k in range(samples):
             put(z, k, spread(0.0))
         width = min(LANES, count - begin)
         for lane in range(width):
-            now = averaged(rows[begin + lane, ::-1], numerator)
-            for k in range(len(now)):
-                z[k, lane] = now[k]
+            for k in range(size):
+                backwards[order + k] = rows[begin + lane, size - 1 - k]
+            averaged(numerator, backwards, order, size + order, moved)
+            for k in range(size + order):
+                z[k, lane] = moved[k]
         _recursion(denominator, z)
         for k in range(samples):
             for lane in range(width):

@@ -20,7 +20,13 @@ def _short_pair(
     a: FloatArray, x: FloatArray, z: FloatArray, first: FloatArray, second: FloatArray
 ) -> None:
     """Write x / A and z / A for n_a ≤ 3, side by side, as each waits for its last value."""
-    a1, a2, a3 = a[1], a[2] if len(a) > 2 else 0.0, a[3] if len(a) > 3 else 0.0
+    a1, a2, a3 = 0.0, 0.0, 0.0
+    if len(a) > 1:
+        a1 = a[1]
+    if len(a) > 2:
+        a2 = a[2]
+    if len(a) > 3:
+        a3 = a[3]
     p0 = p1 = q0 = q1 = r0 = r1 = 0.0  # one, two and three samples before
     for k in range(len(x)):
         y0 = (x[k] - a3 * r0 - a2 * q0) - a1 * p0

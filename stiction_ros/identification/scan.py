@@ -9,15 +9,14 @@ n_b × n_b systems built from lagged correlations.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.filter_kernels import Window, tails_of
+from stiction_ros.identification.filter_kernels import Window
 from stiction_ros.identification.level_kernels import pattern_energy
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
     delay_energy,
-    orthonormal,
+    remaining_tails,
     step_products,
 )
 from stiction_ros.identification.step_signals import StepSignals
@@ -51,44 +50,34 @@ class OutputScan:
         denominator: FloatArray,
         free: FloatArray | None = None,
     ) -> None:
-        self._numerator = np.asarray(numerator, dtype=float)
-        self._denominator = np.asarray(denominator, dtype=float)
-        first, count = orders.first, len(y)
-        target = self._filtered(y)
-        columns = [target[first - i : count - i] for i in range(1, orders.output + 1)]
-        for stem, lag in zip(self._filtered(others), other_delays, strict=True):
-            columns += [stem[first - lag - i : count - lag - i] for i in range(1, orders.input + 1)]
-        columns.append(self._filtered(np.ones(count))[first:])
-        lags = range(delay[0] + 1, delay[1] + orders.input + 1)
+        first, count, lags = orders.first, len(y), range(delay[0] + 1, delay[1] + orders.input + 1)
+        numerator = np.ascontiguousarray(numerator, dtype=float)
+        denominator = np.ascontiguousarray(denominator, dtype=float)
+        # Columns that every stem has beside its own: a signal by its index, and its lag.
+        signals = np.zeros((len(others) + 4, len(numerator) - 1 + count))
+        y_row, ones, impulse, left_free = 0, *range(len(others) + 1, len(others) + 4)
+        rows = signals[:, len(numerator) - 1 :]
+        rows[y_row], rows[1:ones], rows[ones] = y, others, 1.0
+        rows[impulse, first - orders.noise - len(denominator)] = 1.0
+        columns = [(y_row, lag) for lag in range(1, orders.output + 1)]
+        for j, skipped in enumerate(other_delays):
+            columns += [(1 + j, skipped + lag) for lag in range(1, orders.input + 1)]
+        columns.append((ones, 0))
         if free is not None:
-            filtered = self._filtered(free)
-            columns += [filtered[first - lag : count - lag] for lag in lags]
-        impulse = np.zeros(count)
-        impulse[first - orders.noise - len(denominator)] = 1.0
-        impulse = self._filtered(impulse)
-        columns += [impulse[first - i : count - i] for i in range(len(denominator) - 1)]
-        basis = orthonormal(np.stack(columns), EXPLAINED)
-        rest = target[first:] - (basis @ target[first:]) @ basis
-        self.count = count - first
-        self.rest_energy = max(float(rest @ rest), 1e-300)
-        rows = np.vstack([basis, rest])
-        tails = tails_of(rows, self._numerator, self._denominator, count, count + lags[-1] + 1)
-        self._window = Window(
-            count,
-            first,
-            lags[0],
-            len(lags),
-            orders.input,
-            tails,
-            self._numerator,
-            self._denominator,
+            rows[left_free] = free
+            columns += [(left_free, lag) for lag in lags]
+        columns += [(impulse, lag) for lag in range(len(denominator) - 1)]
+        tails, self.rest_energy = remaining_tails(
+            signals,
+            np.array(columns),
+            (first, count + lags[-1] + 1),
+            (numerator, denominator),
+            EXPLAINED,
         )
-
-    def _filtered(self, x: FloatArray) -> FloatArray:
-        """Return what the prefilter makes of signals, time along the last axis."""
-        if len(self._numerator) == 1 and len(self._denominator) == 1:
-            return x
-        return np.asarray(lfilter(self._numerator, self._denominator, x, axis=-1))
+        self.count = count - first
+        self._window = Window(
+            count, first, lags[0], len(lags), orders.input, tails, numerator, denominator
+        )
 
     def energy(self, stems: StepSignals) -> FloatArray:
         """Return SE, shape (G, T), for G stems and T delays."""

@@ -104,7 +104,7 @@ def test_products_of_lags(seed: int, order: int) -> None:
     assert lag_products(w, order) == pytest.approx(np.triu(lags @ lags.T), abs=1e-12)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("order", [0, 1, 2, 3, 4, 5])
 @pytest.mark.parametrize("signals", [1, 2, 3])
 def test_signals_through_any_order(order: int, signals: int) -> None:
     x = np.random.default_rng(order).standard_normal((signals, 60))
