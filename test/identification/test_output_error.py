@@ -108,7 +108,7 @@ def test_products_of_lags(seed: int, order: int) -> None:
 @pytest.mark.parametrize("signals", [1, 2, 3])
 def test_signals_through_any_order(order: int, signals: int) -> None:
     x = np.random.default_rng(order).standard_normal((signals, 60))
-    a, out = np.poly(np.linspace(-0.5, 0.8, order)), np.zeros_like(x)
+    a, out = np.atleast_1d(np.poly(np.linspace(-0.5, 0.8, order))), np.zeros_like(x)
     driven_rows(a, x, 0, signals, out)
     assert out == pytest.approx(lfilter([1.0], a, x), rel=1e-9)
 
