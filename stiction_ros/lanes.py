@@ -66,8 +66,7 @@ def _row(typing: Any, array: Any, at: Any) -> Any:
         return None
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        index = builder.mul(arguments[1], cgutils.intp_t(LANES))
-        place = _memory(context, builder, signature.args[0], arguments[0], index)
+        place = _memory(context, builder, signature.args[0], arguments[0], arguments[1])
         return builder.load(place, align=8)
 
     return _ROW(array, types.intp), generate
@@ -79,8 +78,7 @@ def _put(typing: Any, array: Any, at: Any, value: Any) -> Any:
         return None
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        index = builder.mul(arguments[1], cgutils.intp_t(LANES))
-        place = _memory(context, builder, signature.args[0], arguments[0], index)
+        place = _memory(context, builder, signature.args[0], arguments[0], arguments[1])
         builder.store(arguments[2], place, align=8)
         return context.get_dummy_value()
 
@@ -104,8 +102,17 @@ def _halves_swapped(typing: Any, value: Any) -> Any:
     return _ROW(_ROW), generate
 
 
+@_compiled_in_place
+def _larger(typing: Any, one: Any, two: Any, yes: Any, no: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        one, two, yes, no = arguments
+        return builder.select(builder.fcmp_ordered(">", one, two), yes, no)
+
+    return _ROW(_ROW, _ROW, _ROW, _ROW), generate
+
+
 row = cast(Callable[[FloatArray, int], FloatArray], _row)
-"""Return row ``at`` of a C-contiguous array: LANES numbers from its element LANES · at on."""
+"""Return LANES numbers of a C-contiguous array from its element ``at`` on, its flat index."""
 
 put = cast(Callable[[FloatArray, int, FloatArray], None], _put)
 """Write a row where :func:`row` reads it."""
@@ -115,6 +122,9 @@ spread = cast(Callable[[float], FloatArray], _spread)
 
 halves_swapped = cast(Callable[[FloatArray], FloatArray], _halves_swapped)
 """Return a row with its second half before its first."""
+
+where_larger = cast(Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray], _larger)
+"""Return the third row where the first is larger than the second, elsewhere the fourth."""
 
 
 def _by_lanes(method: str) -> Any:

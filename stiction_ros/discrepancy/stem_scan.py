@@ -16,11 +16,8 @@ from stiction_ros.discrepancy.free_run import end_to_end
 from stiction_ros.discrepancy.noise import left_by, projector
 from stiction_ros.discrepancy.response_kernels import filtered
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.scan_kernels import (
-    DEPENDENT,
-    delay_energy,
-    without_projections,
-)
+from stiction_ros.identification.delay_kernels import DEPENDENT, delay_energy
+from stiction_ros.identification.scan_kernels import without_projections
 
 _TINY = 1e-300
 

@@ -55,19 +55,18 @@ def explained_stretches(
                         rows[q, k, lane] = other[first + k - lag]
                     q += 1
         for q in range(columns + 1):
-            length = nothing
-            for k in range(width):
-                now = row(rows, q * width + k)
+            of, length = LANES * q * width, nothing
+            for k in range(0, LANES * width, LANES):
+                now = row(rows, of + k)
                 length = length + now * now
             put(left, 0, length)
             for other in range(q + 1, columns + 1):
-                share = spread(0.0)
-                for k in range(width):
-                    share = share + row(rows, q * width + k) * row(rows, other * width + k)
+                to, share = LANES * other * width, spread(0.0)
+                for k in range(0, LANES * width, LANES):
+                    share = share + row(rows, of + k) * row(rows, to + k)
                 share = share / length
-                for k in range(width):
-                    rest = row(rows, other * width + k) - share * row(rows, q * width + k)
-                    put(rows, other * width + k, rest)
+                for k in range(0, LANES * width, LANES):
+                    put(rows, to + k, row(rows, to + k) - share * row(rows, of + k))
         for lane in range(min(LANES, len(starts) - begin)):
             out[begin + lane] = np.sqrt(left[0, lane]) <= 2.0 * error * np.sqrt(width)
     return out

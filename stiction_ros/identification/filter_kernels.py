@@ -79,12 +79,12 @@ def _recursion(a: FloatArray, z: FloatArray) -> None:
         a3 = a[3]
     driving, one, two, three = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
     for k in range(len(z)):
-        driving = driving + row(z, k)
+        driving = driving + row(z, LANES * k)
         now = driving - a3 * three - a2 * two
         for i in range(min(order, k), 3, -1):
-            now = now - a[i] * row(z, k - i)
+            now = now - a[i] * row(z, LANES * (k - i))
         now = now - a1 * one
-        put(z, k, now)
+        put(z, LANES * k, now)
         three, two, one = two, one, now
 
 
@@ -107,7 +107,7 @@ def tails_of(
     backwards, moved = np.zeros(size + 2 * order), np.empty(size + order)
     for begin in range(0, count, LANES):
         for k in range(samples):
-            put(z, k, spread(0.0))
+            put(z, LANES * k, spread(0.0))
         width = min(LANES, count - begin)
         for lane in range(width):
             for k in range(size):
@@ -134,21 +134,22 @@ def _products(window: Window, z: FloatArray, crossed: int, out: FloatArray) -> N
         two, three = min(one + 1, width - 1), min(one + 2, width - 1)
         a, b, c = spread(0.0), spread(0.0), spread(0.0)
         for k in range(begin, end):
-            now = row(z, k)
+            now = row(z, LANES * k)
             if crossed:
                 now = halves_swapped(now)
-            a = a + now * row(z, k - one)
-            b = b + now * row(z, k - two)
-            c = c + now * row(z, k - three)
+            a = a + now * row(z, LANES * (k - one))
+            b = b + now * row(z, LANES * (k - two))
+            c = c + now * row(z, LANES * (k - three))
         for d, total in ((one, a), (two, b), (three, c)):
-            put(out, d * lags, total)
+            put(out, LANES * d * lags, total)
             for position in range(1, lags - d):
-                before, last = row(z, begin - position), row(z, end - position)
+                before = row(z, LANES * (begin - position))
+                last = row(z, LANES * (end - position))
                 if crossed:
                     before, last = halves_swapped(before), halves_swapped(last)
-                gained = before * row(z, begin - position - d)
-                total = total + (gained - last * row(z, end - position - d))
-                put(out, d * lags + position, total)
+                gained = before * row(z, LANES * (begin - position - d))
+                total = total + (gained - last * row(z, LANES * (end - position - d)))
+                put(out, LANES * (d * lags + position), total)
 
 
 @compiled

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.scan_kernels import left_over
+from stiction_ros.identification.delay_kernels import Room, pattern_energy, room_for
 
 IntArray = NDArray[np.int64]
 
@@ -17,33 +17,12 @@ EXACT_ENOUGH = 1.0  # second difference of the loss from which a parabola is exa
 
 
 @compiled
-def pattern_energy(
-    products: FloatArray, right: FloatArray, level: float, rest: float, out: FloatArray
-) -> None:
-    """Write SE of one pattern base − level · sign at every delay, shape (T,).
-
-    Args:
-        products: of base with itself, base with sign, sign with itself, shape (3, width, L).
-        right: of base and sign with the rest, shape (2, L).
-    """
-    width, lags = products.shape[1], products.shape[2]
-    mixed, side = np.empty((width, lags)), np.empty(lags)
-    for position in range(lags):
-        side[position] = right[0, position] - level * right[1, position]
-        for d in range(width):
-            now = products[0, d, position] - level * products[1, d, position]
-            mixed[d, position] = now + level * level * products[2, d, position]
-    room = np.empty((width + 2, width))
-    for t in range(len(out)):
-        out[t] = left_over(mixed, side, t, rest, room)
-
-
-@compiled
 def _loss(
     products: FloatArray,
     rights: FloatArray,
     scales: FloatArray,
     level: float,
+    room: Room,
     delays: IntArray,
 ) -> float:
     """Return the loss of one pattern over all outputs, and write its delays.
@@ -56,7 +35,7 @@ def _loss(
     for p in range(len(products)):
         rest, count = scales[p, 0], scales[p, 1]
         energy = np.empty(int(scales[p, 2]))
-        pattern_energy(products[p], rights[p], level, rest, energy)
+        pattern_energy(products[p], rights[p], level, rest, room, energy)
         best = int(energy.argmin())
         delays[p] = best
         total += count * np.log(energy[best] / count) if count > 0.0 else energy[best]
@@ -82,6 +61,7 @@ def best_levels(
     lowest, delays = np.empty(size), np.empty((size, outputs), dtype=np.int64)
     at, loss = np.empty(POINTS), np.empty(POINTS)
     now = np.empty((POINTS, outputs), dtype=np.int64)
+    room = room_for(products.shape[3], products.shape[4])
     for g in range(size):
         low, high = ranges[g]
         step, best, middle, bend = 0.0, 0, 1, 0.0
@@ -89,7 +69,7 @@ def best_levels(
             for i in range(POINTS):
                 if zoom == 0 or i % 2 == 1:
                     at[i] = low + 0.25 * i * (high - low)
-                    loss[i] = _loss(products[g], rights[g], scales, at[i], now[i])
+                    loss[i] = _loss(products[g], rights[g], scales, at[i], room, now[i])
             best = int(loss.argmin())
             middle = min(max(best, 1), POINTS - 2)
             step = max(0.25 * (high - low), 1e-300)

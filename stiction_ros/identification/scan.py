@@ -8,14 +8,15 @@ n_b × n_b systems built from lagged correlations.
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.delay_kernels import delay_energy
 from stiction_ros.identification.filter_kernels import Window
-from stiction_ros.identification.level_kernels import pattern_energy
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
-    delay_energy,
     remaining_tails,
     step_products,
 )
@@ -85,15 +86,16 @@ class OutputScan:
         return delay_energy(products, right, self.rest_energy)
 
     def patterns(self, patterns: StepSignals) -> PatternEnergy:
-        """Return SE of the stems base − level · sign, the two channels, by the level."""
+        """Return what SE of the stems base − level · sign is computed from, the two channels."""
         products, rights = step_products(
             self._window, patterns.offsets, patterns.places, patterns.values
         )
-        return PatternEnergy(products, rights, self.rest_energy)
+        return PatternEnergy(products, rights)
 
 
+@dataclasses.dataclass(frozen=True)
 class PatternEnergy:
-    """SE of switching patterns as a function of f_D; the stem is affine in it.
+    """What SE of switching patterns is computed from; the stem is affine in f_D.
 
     Attributes:
         products: of what the columns leave of base with base, base with sign and sign with
@@ -101,20 +103,10 @@ class PatternEnergy:
         rights: of base and sign with the rest, shape (G, 2, L).
     """
 
-    def __init__(self, products: FloatArray, rights: FloatArray, rest_energy: float) -> None:
-        self.products, self.rights, self._rest_energy = products, rights, rest_energy
+    products: FloatArray
+    rights: FloatArray
 
     @property
     def delays(self) -> int:
         """T, number of delays."""
         return int(self.products.shape[3] - self.products.shape[2] + 1)
-
-    def __call__(self, levels: FloatArray) -> FloatArray:
-        """Return SE, shape (G, F, T), for f_D of shape (G, F)."""
-        out = np.empty((*levels.shape, self.delays))
-        for g, row in enumerate(levels):
-            for f, level in enumerate(row.tolist()):
-                pattern_energy(
-                    self.products[g], self.rights[g], level, self._rest_energy, out[g, f]
-                )
-        return out

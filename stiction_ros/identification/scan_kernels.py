@@ -1,4 +1,4 @@
-"""Lagged products and the small least-squares problems of many stems and switching patterns.
+"""Lagged products of many stems and switching patterns with themselves and with fixed signals.
 
 Signals come as rows of moves, see :mod:`.step_signals`. Products with fixed signals are sums
 over moves: a fixed signal, filtered backwards in time and summed up from its end, says at every
@@ -13,14 +13,11 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.delay_kernels import DEPENDENT
 from stiction_ros.identification.filter_kernels import Window, filtered_products, tails_of
 from stiction_ros.identification.row_kernels import averaged, driven_rows
 
 IntArray = NDArray[np.int64]
-
-DEPENDENT = 1e-13
-RIDGE = 1e-12
-SAME = 1e-9
 
 
 @compiled
@@ -222,59 +219,6 @@ def step_products(
             for two in range(channels):
                 without_projections(out[g, one + two], projected[one], projected[two])
     return out, right
-
-
-@compiled
-def left_over(
-    products: FloatArray, right: FloatArray, delay: int, rest: float, matrix: FloatArray
-) -> float:
-    """Return SE at one delay: the rest's energy less bᵀ M⁻¹ b.
-
-    M holds the lagged products of the lags from ``delay`` on. What the projected columns leave
-    nothing of is rounding and explains nothing, and so does what explains more than all.
-
-    Args:
-        products: shape (width, L).
-        right: shape (L,).
-        matrix: room for the problem, shape (width + 2, width).
-    """
-    width = len(products)
-    vector, diagonal = matrix[width], matrix[width + 1]
-    for i in range(width):
-        diagonal[i] = products[0, delay + i]
-        if not diagonal[i] > 0.0:
-            return rest
-        vector[i] = right[delay + i]
-        for j in range(i):
-            matrix[i, j] = products[i - j, delay + j]
-        matrix[i, i] = diagonal[i] * (1.0 + RIDGE * (1.0 + i))
-    total = 0.0
-    for i in range(width):
-        pivot = matrix[i, i]
-        if pivot <= DEPENDENT * diagonal[i]:
-            continue
-        inverse = 1.0 / pivot
-        total += vector[i] * vector[i] * inverse
-        for j in range(i + 1, width):
-            factor = matrix[j, i] * inverse
-            vector[j] -= factor * vector[i]
-            for below in range(i + 1, j + 1):
-                matrix[j, below] -= factor * matrix[below, i]
-    if total > rest * (1.0 + SAME):
-        return rest
-    return max(rest - total, 1e-12 * rest)
-
-
-@compiled
-def delay_energy(products: FloatArray, right: FloatArray, rest: float) -> FloatArray:
-    """Return SE of stems at every delay, shape (G, T), from what :func:`step_products` gives."""
-    width, lags = products.shape[2], products.shape[3]
-    room = np.empty((width + 2, width))
-    out = np.empty((len(products), lags - width + 1))
-    for g in range(len(out)):
-        for t in range(out.shape[1]):
-            out[g, t] = left_over(products[g, 0], right[g, 0], t, rest, room)
-    return out
 
 
 @compiled

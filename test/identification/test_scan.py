@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from stiction_ros.identification.delay_kernels import pattern_energy, room_for
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan import OutputScan
 from stiction_ros.identification.step_signals import StepSignals
@@ -40,10 +41,14 @@ def test_pattern_energy_is_that_of_the_stem_it_stands_for(seed: int, nb: int, p:
     levels = generator.random((4, 3))
     a, d = np.array([1.0, -0.8]), np.array([1.0, 0.3, 0.1])[: p + 1]
     scan = OutputScan(y, other, (1,), Orders(1, nb, p, 20), (0, 3), d, a)
-    energy = scan.patterns(StepSignals.of(bases, signs))(levels)
+    found = scan.patterns(StepSignals.of(bases, signs))
+    energy, room = np.empty((4, found.delays)), room_for(nb, 3 + nb)
     for f in range(3):
+        for g in range(4):
+            parts = found.products[g], found.rights[g]
+            pattern_energy(*parts, levels[g, f], scan.rest_energy, room, energy[g])
         expected = scan.energy(StepSignals.of(bases - levels[:, f] * signs))
-        assert energy[:, f] == pytest.approx(expected, rel=1e-7)
+        assert energy == pytest.approx(expected, rel=1e-7)
 
 
 def test_stem_that_the_rest_explains_to_the_last_digit_explains_nothing() -> None:
