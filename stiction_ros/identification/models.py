@@ -224,9 +224,9 @@ def scan_stems(
         moves[rows] = stems.moves
         for c, (criterion, outputs) in enumerate(scans):
             for i, scan in enumerate(outputs):
-                energy = scan.energy(stems)
-                best[c, rows, i] = energy.argmin(axis=1) + ranges[i][0]
-                loss[c, rows] += criterion.loss(energy.min(axis=1), scan.count)
+                energy, delays = scan.least_energy(stems)
+                best[c, rows, i] = delays + ranges[i][0]
+                loss[c, rows] += criterion.loss(energy, scan.count)
 
     shared = len(grid) * len(u) >= WORTHWHILE
     batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH

@@ -17,12 +17,14 @@ from stiction_ros.identification.delay_kernels import delay_energy
 from stiction_ros.identification.filter_kernels import Window
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
+    IntArray,
+    least_energy,
     remaining_tails,
     step_products,
 )
 from stiction_ros.identification.step_signals import StepSignals
 
-BATCH = 2000  # signals that are worked on together
+BATCH = 500  # signals that are worked on together
 EXPLAINED = 1e-7  # of a column, below which the others explain it
 
 
@@ -84,6 +86,11 @@ class OutputScan:
         """Return SE, shape (G, T), for G stems and T delays."""
         products, right = step_products(self._window, stems.offsets, stems.places, stems.values)
         return delay_energy(products, right, self.rest_energy)
+
+    def least_energy(self, stems: StepSignals) -> tuple[FloatArray, IntArray]:
+        """Return the least SE over the delays and the place of its delay, shape (G,) each."""
+        rows = stems.offsets, stems.places, stems.values
+        return least_energy(self._window, *rows, self.rest_energy)
 
     def patterns(self, patterns: StepSignals) -> PatternEnergy:
         """Return what SE of the stems base − level · sign is computed from, the two channels."""

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.delay_kernels import DEPENDENT
+from stiction_ros.identification.delay_kernels import DEPENDENT, delay_energy
 from stiction_ros.identification.filter_kernels import Window, filtered_products, tails_of
 from stiction_ros.identification.row_kernels import averaged, driven_rows
 
 IntArray = NDArray[np.int64]
+
+TOGETHER = 64  # stems whose products are kept at a time
 
 
 @compiled
@@ -219,6 +221,22 @@ def step_products(
             for two in range(channels):
                 without_projections(out[g, one + two], projected[one], projected[two])
     return out, right
+
+
+@compiled
+def least_energy(
+    window: Window, offsets: IntArray, places: IntArray, values: FloatArray, rest: float
+) -> tuple[FloatArray, IntArray]:
+    """Return the least SE of every stem over the delays, and that delay, both shape (G,)."""
+    size = len(offsets) - 1
+    least, delays = np.empty(size), np.empty(size, dtype=np.int64)
+    for begin in range(0, size, TOGETHER):
+        part = offsets[begin : min(begin + TOGETHER, size) + 1]
+        energy = delay_energy(*step_products(window, part, places, values), rest)
+        for g in range(len(energy)):
+            delays[begin + g] = energy[g].argmin()
+            least[begin + g] = energy[g, delays[begin + g]]
+    return least, delays
 
 
 @compiled

@@ -15,15 +15,22 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar, cast
 
+import numpy as np
+
 Result = TypeVar("Result")
 One = TypeVar("One")
 Two = TypeVar("Two")
+
+KEPT = 1 << 21  # numbers, 16 MB
 
 _free = threading.Lock()  # held as long as the helper has work
 
 
 @functools.cache
 def _helper() -> ThreadPoolExecutor:
+    # The system's allocator hands large arrays back one by one, which stops both threads each
+    # time, until it has seen a larger one freed; from then on it keeps up to twice as much.
+    np.empty(KEPT)
     return ThreadPoolExecutor(1, thread_name_prefix="identification")
 
 
