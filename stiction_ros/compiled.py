@@ -1,8 +1,9 @@
 """Loops over samples, compiled to machine code at their first call.
 
 The machine code is kept beside the sources, or in the user's cache directory, so only the
-first run on a machine pays for it. Importing this module costs half a second: only what
-loops over whole records does so.
+first run on a machine pays for it. It is made anew when the file of a function changes, but not
+when the file of a function that it calls does: after that, delete ``__pycache__/*.nb?``.
+Importing this module costs half a second: only what loops over whole records does so.
 """
 
 from __future__ import annotations

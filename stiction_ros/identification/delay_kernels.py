@@ -15,7 +15,7 @@ RIDGE = 1e-12
 SAME = 1e-9
 
 
-class Room(NamedTuple):
+class DelayRoom(NamedTuple):
     """One problem at a time.
 
     Attributes:
@@ -31,15 +31,15 @@ class Room(NamedTuple):
 
 
 @compiled
-def room_for(width: int, lags: int) -> Room:
+def delay_room(width: int, lags: int) -> DelayRoom:
     """Return room for n_b and the number of lags."""
     size = max(lags, LANES + width - 1)
     solving = np.zeros((width + 3, width, LANES))
-    return Room(np.zeros((width, size)), np.zeros(size), solving)
+    return DelayRoom(np.zeros((width, size)), np.zeros(size), solving)
 
 
 @compiled
-def left_over(room: Room, rest: float, out: FloatArray) -> None:
+def left_over(room: DelayRoom, rest: float, out: FloatArray) -> None:
     """Write SE at every delay, shape (T,): the rest's energy less bᵀ M⁻¹ b.
 
     M holds the lagged products of the lags from the delay on, b those with the rest. What the
@@ -80,7 +80,7 @@ def left_over(room: Room, rest: float, out: FloatArray) -> None:
         used = where_larger(usable, nothing, used, nothing)
         left, floor = spread(rest) - used, spread(1e-12 * rest)
         end = (width + 2) * last
-        put(matrix, end, where_larger(left, floor, left, floor))
+        put(matrix, end, where_larger(floor, left, floor, left))
         for t in range(first, min(first + LANES, len(out))):
             out[t] = matrix[width + 2, 0, t - first]
 
@@ -95,7 +95,7 @@ def delay_energy(products: FloatArray, right: FloatArray, rest: float) -> FloatA
         rest: sum of squares of what the columns leave of the output.
     """
     width, lags = products.shape[2], products.shape[3]
-    room = room_for(width, lags)
+    room = delay_room(width, lags)
     out = np.empty((len(products), lags - width + 1))
     for g in range(len(out)):
         for position in range(lags):
@@ -112,7 +112,7 @@ def pattern_energy(
     right: FloatArray,
     level: float,
     rest: float,
-    room: Room,
+    room: DelayRoom,
     out: FloatArray,
 ) -> None:
     """Write SE of one pattern base − level · sign at every delay, shape (T,).

@@ -23,10 +23,7 @@ from stiction_ros.identification.stability_kernels import is_stable, pulled_insi
 MAX_RADIUS = 0.9995
 START_RADIUS = 0.99
 REFINEMENTS = 4  # of the start, as Steiglitz and McBride
-HARDEST = 1e6  # damping
-
-
-FIRST, LEAST = 1e-4, 1e-9  # damping
+FIRST, LEAST, HARDEST = 1e-4, 1e-9, 1e6  # damping
 
 
 class Start(NamedTuple):
@@ -96,15 +93,15 @@ def descend(
     """
     count, order, table = len(problem.y) - problem.first, len(start.a) - 1, room.tables[1]
     a, noise, weight = start.a, start.noise, FREE_RUN_WEIGHT * start.energy / problem.energy
-    damping, before, done = FIRST, np.inf, -1
+    damping, before, done, priced = FIRST, np.inf, -1, weight > 0.0
     gram, gradient, scale = np.empty((0, 0)), np.empty(0), np.empty(0)
     while True:
         found = False
         if done < 0 or is_stable(a, MAX_RADIUS):
             candidate = evaluate(problem, room, a, noise, weight)
             found = candidate.total < before
-        if found and done < 0 and weight == 0.0:
-            weight = FREE_RUN_WEIGHT * candidate.energy / problem.energy
+        if not priced:
+            weight, priced = FREE_RUN_WEIGHT * candidate.energy / problem.energy, True
             continue
         if found or done < 0:
             point, done = candidate, done + 1
@@ -114,7 +111,7 @@ def descend(
                 return point
             gram, gradient = normal_equations(problem, room, point)
             scale, before = _balance(gram, gradient), point.total
-            step = _definite_solve(gram, LEAST, gradient)
+            step = _definite_solve(gram, LEAST, gradient)  # nearly that of Gauss and Newton
             if len(step) and count * np.dot(step, gradient) < gains[1] * before:
                 return point
         else:

@@ -128,7 +128,7 @@ def _products(window: Window, z: FloatArray, crossed: int, out: FloatArray) -> N
 
     Unless ``crossed`` is 0, the second factor comes from the lane half of the lanes further on.
     """
-    lags, width = window.lags, min(window.width, window.lags)
+    lags, width = window.lags, window.width
     begin, end = window.first - window.lag, window.samples - window.lag
     for one in range(0, width, 3):  # three d at a time, at the end the last one repeatedly
         two, three = min(one + 1, width - 1), min(one + 2, width - 1)

@@ -276,6 +276,8 @@ def _fit(
     ]
     regressors, target = np.column_stack(columns), own[order:]
     moving, starts = target != 0.0, starts[may]
+    if not moving.any():
+        return None
     for begin in range(0, len(starts), FEW):  # mostly the first few will do
         rows = starts[begin : begin + FEW, None] + np.arange(width)
         for theta in _solutions(regressors[rows], target[rows], past):

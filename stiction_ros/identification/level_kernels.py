@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.delay_kernels import Room, pattern_energy, room_for
+from stiction_ros.identification.delay_kernels import DelayRoom, delay_room, pattern_energy
 
 IntArray = NDArray[np.int64]
 
@@ -22,7 +22,7 @@ def _loss(
     rights: FloatArray,
     scales: FloatArray,
     level: float,
-    room: Room,
+    room: DelayRoom,
     delays: IntArray,
 ) -> float:
     """Return the loss of one pattern over all outputs, and write its delays.
@@ -61,7 +61,7 @@ def best_levels(
     lowest, delays = np.empty(size), np.empty((size, outputs), dtype=np.int64)
     at, loss = np.empty(POINTS), np.empty(POINTS)
     now = np.empty((POINTS, outputs), dtype=np.int64)
-    room = room_for(products.shape[3], products.shape[4])
+    room = delay_room(products.shape[3], products.shape[4])
     for g in range(size):
         low, high = ranges[g]
         step, best, middle, bend = 0.0, 0, 1, 0.0

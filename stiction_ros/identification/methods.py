@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.input_checks import swapped_columns
+from stiction_ros.identification.input_checks import Evidence, swapped_columns
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.results import Identification
 from stiction_ros.identification.side_by_side import at_once
@@ -58,19 +58,26 @@ def identify(
             does not have, or OP and PV that are clearly swapped.
     """
     options = options or IdentificationOptions()
-    found, evidence = at_once(
-        partial(_attempt, record, options, progress),
-        lambda: swapped_columns(record) if options.check_columns else None,
-    )
+    checked = partial(swapped_columns, record)
+    found: Identification | InputError
+    if options.check_columns and options.method == "exact":  # as long as the check itself
+        found, evidence = at_once(partial(_attempt, record, options, progress), checked)
+        _refuse_swapped(record, evidence)
+    else:
+        _refuse_swapped(record, checked() if options.check_columns else None)
+        found = _attempt(record, options, progress)
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def _refuse_swapped(record: Record, evidence: Evidence | None) -> None:
     if evidence is not None:
         raise InputError(
             f"OP and PV look swapped: {evidence.reason}",
             where=record.name,
             fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
         )
-    if isinstance(found, InputError):
-        raise found
-    return found
 
 
 def _attempt(

@@ -1,8 +1,8 @@
 """What the descent over A and D of :mod:`.output_error` evaluates, compiled.
 
 A *problem* is what stays the same during a fit, a *point* what (A, D) gives: the solution of
-everything linear, what it leaves and what its derivative needs. Long rows live in a *room*
-that all evaluations of a fit share, so that none of them asks for memory.
+everything linear. What that leaves and what its derivative needs are long rows, which live in
+a *room* that all evaluations of a descent share, so that none of them asks for memory.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Room(NamedTuple):
             residual replaces; then the derivatives, shape (q + 1 + n_a + p, n').
         slope: the free run through 1/A after zeros, shape (2, pad + n).
         slopes: its differences, shape (n_a, n).
-        moved: a signal through D, shape (pad + n,).
+        moved: a signal through D, shape (pad + N,).
         tables: of the differences of n_b and of n_a lags: differences = table · lags.
     """
 

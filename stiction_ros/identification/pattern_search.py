@@ -52,6 +52,7 @@ FEW = 60  # cells too few to tell how many there will be
 ROUNDS = 4
 MOST_LEVELS = 30
 LEAST_GAIN = 0.3
+EDGES = range(4)  # J low, J high, S low, S high
 
 
 class PatternSearch:
@@ -275,8 +276,8 @@ def neighbourhood(
     Args:
         threshold: excess of the loss over the best from which a pattern is rejected.
         most: largest number of cells.
-        known: closed neighbourhoods of the same beginning; where one of them is met the
-            enumeration ends, as beyond it there is nothing better.
+        known: closed neighbourhoods of the same beginning; an edge that meets one of them
+            stays where it is.
     """
     centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
     scan = search.evaluate(cells_at(search.u, begin, centre[None, :], search.law))
@@ -291,10 +292,10 @@ def neighbourhood(
     scan = PatternScan.joined([scan, first])
     for _ in range(GROWTHS):
         wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
+        met = [any(_reaches(rectangle, wider, edge, k.rectangle) for k in known) for edge in EDGES]
+        wider = np.where(met, rectangle, wider)
         if (wider == rectangle).all():
-            return PatternMap(scan, rectangle, closed=True)
-        if any(_overlap(wider, other.rectangle) for other in known):
-            return PatternMap(scan, rectangle, closed=False)
+            return PatternMap(scan, rectangle, closed=not any(met))
         for strip in _remainders(wider[None, :], rectangle[None, :]):
             more = search.enumerate(begin, strip, most - len(scan.loss))
             if more is None:
@@ -304,8 +305,12 @@ def neighbourhood(
     return PatternMap(scan, rectangle, closed=False)
 
 
-def _overlap(one: FloatArray, other: FloatArray) -> bool:
-    return bool((one[[0, 2]] < other[[1, 3]]).all() and (other[[0, 2]] < one[[1, 3]]).all())
+def _reaches(rectangle: FloatArray, wider: FloatArray, edge: int, other: FloatArray) -> bool:
+    """Return whether what the rectangle gains at one edge meets another rectangle."""
+    strip = rectangle.copy()
+    strip[edge], strip[edge ^ 1] = wider[edge], rectangle[edge]
+    low, high = strip[[0, 2]], strip[[1, 3]]
+    return bool((low < high).all() and (low < other[[1, 3]]).all() and (other[[0, 2]] < high).all())
 
 
 def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float) -> FloatArray:

@@ -40,6 +40,9 @@ class OutputScan:
         numerator, denominator: D and A of the prefilter; ones for the one-step criterion.
         free: a signal in the stem whose size is unknown, shape (N,); what it explains at any
             delay is projected out.
+
+    Raises:
+        ValueError: a window that begins too early for the lags.
     """
 
     def __init__(
@@ -54,6 +57,10 @@ class OutputScan:
         free: FloatArray | None = None,
     ) -> None:
         first, count, lags = orders.first, len(y), range(delay[0] + 1, delay[1] + orders.input + 1)
+        reach = [lags[-1], orders.noise + len(denominator), orders.output]
+        reach += [skipped + orders.input for skipped in other_delays]
+        if first < max(reach):
+            raise ValueError(f"the window begins at {first}, before what its lags need")
         numerator = np.ascontiguousarray(numerator, dtype=float)
         denominator = np.ascontiguousarray(denominator, dtype=float)
         # Columns that every stem has beside its own: a signal by its index, and its lag.

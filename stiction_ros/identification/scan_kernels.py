@@ -19,7 +19,7 @@ from stiction_ros.identification.row_kernels import averaged, driven_rows
 
 IntArray = NDArray[np.int64]
 
-TOGETHER = 64  # stems whose products are kept at a time
+STEMS = 64  # whose products are kept at a time
 
 
 @compiled
@@ -162,7 +162,7 @@ def _plain_products(
     begin, end = window.first - window.lag, window.samples - window.lag
     _samples(places, values, begin - lags + 1, begin, room)
     _samples(places, values, end - lags + 1, end, room)
-    first = np.empty(min(window.width, lags))
+    first = np.empty(window.width)
     for one in range(channels):
         for two in range(channels):
             _first_products(window, places, values[:, one], values[:, two], first)
@@ -180,7 +180,7 @@ def _plain_products(
 def without_projections(products: FloatArray, one: FloatArray, two: FloatArray) -> None:
     """Subtract Σ_q one[l, q] two[l + d, q] from products[d, l], in place."""
     lags, columns = one.shape[0], one.shape[1] - 1
-    for d in range(min(len(products), lags)):
+    for d in range(len(products)):
         for position in range(lags - d):
             total = 0.0
             for q in range(columns):
@@ -230,8 +230,8 @@ def least_energy(
     """Return the least SE of every stem over the delays, and that delay, both shape (G,)."""
     size = len(offsets) - 1
     least, delays = np.empty(size), np.empty(size, dtype=np.int64)
-    for begin in range(0, size, TOGETHER):
-        part = offsets[begin : min(begin + TOGETHER, size) + 1]
+    for begin in range(0, size, STEMS):
+        part = offsets[begin : min(begin + STEMS, size) + 1]
         energy = delay_energy(*step_products(window, part, places, values), rest)
         for g in range(len(energy)):
             delays[begin + g] = energy[g].argmin()

@@ -51,8 +51,9 @@ def at_once(one: Callable[[], One], two: Callable[[], Two]) -> tuple[One, Two]:
 def together(*parts: Callable[[], Result]) -> list[Result]:
     """Return the results of all parts, in their order.
 
-    The calling thread takes the parts from the first on, the other one from the last on. Parts
-    may call this as well: where no thread is free all run in the calling one.
+    The calling thread takes the parts from the first on, and that one in any case; the other
+    thread takes them from the last on. Parts may call this as well: where no thread is free
+    all run in the calling one.
 
     Raises:
         Exception: of the first part, in their order, that raised one.
@@ -62,16 +63,19 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
     results: list[Future[Result]] = [Future() for _ in parts]
     waiting = collections.deque(zip(parts, results, strict=True))
 
+    def settle(part: Callable[[], Result], result: Future[Result]) -> None:
+        try:
+            result.set_result(part())
+        except Exception as error:
+            result.set_exception(error)
+
     def work(take: Callable[[], tuple[Callable[[], Result], Future[Result]]]) -> None:
         while waiting:
             try:
-                part, result = take()
+                taken = take()
             except IndexError:  # the other thread took the last part
                 return
-            try:
-                result.set_result(part())
-            except Exception as error:
-                result.set_exception(error)
+            settle(*taken)
 
     def help_out() -> None:
         try:
@@ -79,7 +83,9 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
         finally:
             _free.release()
 
+    own = waiting.popleft()
     helping = _helper().submit(help_out)
+    settle(*own)
     work(waiting.popleft)
     helping.result()  # so that it is free for the next call
     return [result.result() for result in results]

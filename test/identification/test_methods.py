@@ -10,8 +10,9 @@ import pytest
 import simulated_loops as loops
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification import METHODS, IdentificationOptions, engine, identify
+from stiction_ros.identification import METHODS, IdentificationOptions, engine, identify, methods
 from stiction_ros.identification.options import METHOD_NAMES
+from stiction_ros.records.record import Record
 
 SMALL = IdentificationOptions(
     output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0
@@ -83,3 +84,29 @@ def test_casadi_is_left_alone_by_all_but_the_nonlinear_programme() -> None:
         "sys.exit('casadi' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def _swapped() -> Record:
+    record = loops.example1(1, samples=900)
+    return dataclasses.replace(record, op=record.pv, pv=record.op)
+
+
+def test_swapped_columns_are_refused_before_a_slow_method_begins(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(methods, "METHODS", {"nlp": lambda *_: pytest.fail("it began")})
+    with pytest.raises(InputError, match="look swapped"):
+        identify(_swapped(), IdentificationOptions(method="nlp"))
+
+
+def test_swapped_columns_are_a_better_reason_than_what_the_method_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> None:
+        raise InputError("too short")
+
+    monkeypatch.setattr(methods, "METHODS", {"exact": refuse})
+    with pytest.raises(InputError, match="look swapped"):
+        identify(_swapped())
+    with pytest.raises(InputError, match="too short"):
+        identify(loops.example1(1, samples=900))

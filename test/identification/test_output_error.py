@@ -151,3 +151,10 @@ def test_a_neighbouring_fit_is_a_start_that_ends_no_worse() -> None:
     cold = fit_output(y, stem[None, :], (2,), orders)
     warm = fit_output(y, stem[None, :], (2,), orders, cold)
     assert warm.loss <= cold.loss + 1e-6
+
+
+@pytest.mark.parametrize("level", [0.0, 3.0])
+def test_an_output_at_rest_is_fitted(level: float) -> None:
+    stem = np.random.default_rng(0).standard_normal(200).cumsum()
+    fit = fit_output(np.full(200, level), stem[None, :], (1,), Orders(1, 1, 0, 20))
+    assert fit.energy <= 1e-20 * max(level, 1.0)

@@ -29,6 +29,12 @@ def test_without_a_second_core_all_runs_in_one_thread(monkeypatch: pytest.Monkey
     assert set(together(*[threading.get_ident] * 9)) == {threading.get_ident()}
 
 
+def test_the_first_part_runs_in_the_calling_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(side_by_side, "_may_help", lambda: True)
+    for _ in range(50):
+        assert at_once(threading.get_ident, lambda: None)[0] == threading.get_ident()
+
+
 def test_parts_may_have_parts() -> None:
     def sums(base: int) -> int:
         return sum(together(*(partial(int, base + n) for n in range(5))))
