@@ -87,13 +87,12 @@ def test_gradient_is_the_slope_of_the_criterion(seed: int, weight: float) -> Non
 
 
 @settings(max_examples=30, deadline=None)
-@given(roots=st.lists(st.complex_numbers(max_magnitude=3.0), min_size=1, max_size=3))
-def test_roots_are_pulled_inside(roots: list[complex]) -> None:
-    polynomial = np.ascontiguousarray(np.poly(np.r_[roots, np.conj(roots)]).real)
-    found = np.roots(polynomial)
-    size = np.abs(found)
-    inside = np.where(size > 0.9, found / np.maximum(size, 1e-12) * 0.9, found)
-    assert stabilised(polynomial, 0.9) == pytest.approx(np.poly(inside).real, abs=1e-6)
+@given(sizes=st.lists(st.floats(0.1, 3.0), min_size=1, max_size=3))
+def test_roots_are_pulled_inside(sizes: list[float]) -> None:
+    rays = np.exp(1j * np.array([0.4, 1.4, 2.6])[: len(sizes)])  # apart from each other
+    given, inside = (x * rays for x in (np.array(sizes), np.minimum(sizes, 0.9)))
+    polynomial, expected = (np.poly(np.r_[roots, roots.conj()]).real for roots in (given, inside))
+    assert stabilised(polynomial, 0.9) == pytest.approx(expected, abs=1e-9)
 
 
 @settings(max_examples=20, deadline=None)
