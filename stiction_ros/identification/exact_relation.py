@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.step_kernels import IntArray
 from stiction_ros.lanes import LANES, put, row, spread
-
-IntArray = NDArray[np.int64]
 
 
 @compiled_fused

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.row_kernels import averaged
+from stiction_ros.identification.step_kernels import IntArray
 from stiction_ros.lanes import LANES, halves_swapped, put, row, spread
-
-IntArray = NDArray[np.int64]
 
 
 class Window(NamedTuple):

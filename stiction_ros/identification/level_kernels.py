@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.delay_kernels import DelayRoom, delay_room, pattern_energy
-
-IntArray = NDArray[np.int64]
+from stiction_ros.identification.step_kernels import IntArray
 
 ZOOMS = 16
 POINTS = 5

@@ -14,7 +14,6 @@ import numpy as np
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.row_kernels import (
-    IntArray,
     averaged,
     differences,
     driven_rows,
@@ -22,6 +21,7 @@ from stiction_ros.identification.row_kernels import (
     lag_products,
     solved,
 )
+from stiction_ros.identification.step_kernels import IntArray
 
 FREE_RUN_WEIGHT = 0.02
 THIN = 4

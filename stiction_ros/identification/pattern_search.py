@@ -39,6 +39,14 @@ from stiction_ros.identification.patterns import (
     levels_of,
     resting_cells,
 )
+from stiction_ros.identification.rectangles import (
+    EDGES,
+    area,
+    gain_meets,
+    overlapping,
+    points_inside,
+    remainders,
+)
 from stiction_ros.identification.side_by_side import together
 from stiction_ros.identification.step_signals import StepSignals
 
@@ -52,7 +60,6 @@ FEW = 60  # cells too few to tell how many there will be
 ROUNDS = 4
 MOST_LEVELS = 30
 LEAST_GAIN = 0.3
-EDGES = range(4)  # J low, J high, S low, S high
 
 
 class PatternSearch:
@@ -183,14 +190,14 @@ class PatternSearch:
         """
         todo = self._admissible(rectangle[None, :])
         met: list[Cells] = []
-        count, whole = 0, _area(todo)
+        count, whole = 0, area(todo)
         while len(todo):
-            covered = whole - _area(todo)
+            covered = whole - area(todo)
             if count + len(todo) > most or (count > FEW and count * whole > 2.0 * most * covered):
                 return None
             count += len(todo)
-            met.append(cells_at(self.u, begin, _points(todo), self.law))
-            todo = self._admissible(_remainders(todo, met[-1].bounds))
+            met.append(cells_at(self.u, begin, points_inside(todo), self.law))
+            todo = self._admissible(remainders(todo, met[-1].bounds))
         return self.evaluate(Cells.joined(met)) if met else self._nothing()
 
     def _nothing(self) -> PatternScan:
@@ -211,36 +218,6 @@ def points_of(friction: FloatArray) -> FloatArray:
     """Return rows (J, S) of rows (f_S, f_D)."""
     static, dynamic = friction[:, 0], friction[:, 1]
     return np.column_stack([static - dynamic, static + dynamic])
-
-
-def _area(rectangles: FloatArray) -> float:
-    jl, jh, sl, sh = rectangles.T
-    return float((jh - jl) @ (sh - sl))
-
-
-def _points(rectangles: FloatArray) -> FloatArray:
-    """Return one point (J, S) with S ≥ J inside every rectangle, the middle where possible."""
-    jl, jh, sl, sh = rectangles.T
-    jump, reverse = 0.5 * (jl + jh), 0.5 * (sl + sh)
-    outside = reverse < jump
-    jump = np.where(outside, jl + 0.1 * (np.minimum(jh, sh) - jl), jump)
-    reverse = np.where(outside, sh - 0.1 * (sh - np.maximum(sl, jl)), reverse)
-    return np.column_stack([jump, reverse])
-
-
-def _remainders(rectangles: FloatArray, cells: FloatArray) -> FloatArray:
-    """Return up to four rectangles per row: what its cell does not cover."""
-    jl, jh, sl, sh = rectangles.T
-    cl, ch = np.maximum(cells[:, 0], jl), np.minimum(cells[:, 1], jh)
-    dl, dh = np.maximum(cells[:, 2], sl), np.minimum(cells[:, 3], sh)
-    return np.concatenate(
-        [
-            np.column_stack([jl, cl, sl, sh]),
-            np.column_stack([ch, jh, sl, sh]),
-            np.column_stack([cl, ch, sl, dl]),
-            np.column_stack([cl, ch, dh, sh]),
-        ]
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -292,11 +269,13 @@ def neighbourhood(
     scan = PatternScan.joined([scan, first])
     for _ in range(GROWTHS):
         wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
-        met = [any(_reaches(rectangle, wider, edge, k.rectangle) for k in known) for edge in EDGES]
+        met = [
+            any(gain_meets(rectangle, wider, edge, k.rectangle) for k in known) for edge in EDGES
+        ]
         wider = np.where(met, rectangle, wider)
         if (wider == rectangle).all():
             return PatternMap(scan, rectangle, closed=not any(met))
-        for strip in _remainders(wider[None, :], rectangle[None, :]):
+        for strip in remainders(wider[None, :], rectangle[None, :]):
             more = search.enumerate(begin, strip, most - len(scan.loss))
             if more is None:
                 return PatternMap(scan, rectangle, closed=False)
@@ -305,25 +284,11 @@ def neighbourhood(
     return PatternMap(scan, rectangle, closed=False)
 
 
-def _reaches(rectangle: FloatArray, wider: FloatArray, edge: int, other: FloatArray) -> bool:
-    """Return whether what the rectangle gains at one edge meets another rectangle."""
-    strip = rectangle.copy()
-    strip[edge], strip[edge ^ 1] = wider[edge], rectangle[edge]
-    low, high = strip[[0, 2]], strip[[1, 3]]
-    return bool((low < high).all() and (low < other[[1, 3]]).all() and (other[[0, 2]] < high).all())
-
-
 def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float) -> FloatArray:
     """Return the rectangle with every edge moved out that an accepted cell touches."""
     accepted = scan.bounds[scan.loss <= scan.loss.min() + threshold]
+    accepted = accepted[overlapping(accepted, rectangle)]
     jl, jh, sl, sh = rectangle
-    meets = (
-        (accepted[:, 0] < jh)
-        & (accepted[:, 1] > jl)
-        & (accepted[:, 2] < sh)
-        & (accepted[:, 3] > sl)
-    )
-    accepted = accepted[meets]
     wide, high = max(0.3 * (jh - jl), 1e-6 * limit), max(0.3 * (sh - sl), 1e-6 * limit)
     out = rectangle.copy()
     if len(accepted):

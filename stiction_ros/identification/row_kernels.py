@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.effects.behaviour import FloatArray
-
-IntArray = NDArray[np.int64]
+from stiction_ros.identification.step_kernels import IntArray
 
 SHORT = 3  # largest n_a for which the recursion is written out
 DEPENDENT = 1e-6  # pivot of a scaled column, as a root, below which it depends on the others

@@ -17,11 +17,11 @@ from stiction_ros.identification.delay_kernels import delay_energy
 from stiction_ros.identification.filter_kernels import Window
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.scan_kernels import (
-    IntArray,
     least_energy,
     remaining_tails,
     step_products,
 )
+from stiction_ros.identification.step_kernels import IntArray
 from stiction_ros.identification.step_signals import StepSignals
 
 BATCH = 500  # signals that are worked on together

@@ -9,15 +9,13 @@ as well where there is no prefilter, otherwise over samples.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.delay_kernels import DEPENDENT, delay_energy
 from stiction_ros.identification.filter_kernels import Window, filtered_products, tails_of
 from stiction_ros.identification.row_kernels import averaged, driven_rows
-
-IntArray = NDArray[np.int64]
+from stiction_ros.identification.step_kernels import IntArray
 
 STEMS = 64  # whose products are kept at a time
 

@@ -9,14 +9,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import simulate
-from stiction_ros.identification.step_kernels import dense_steps, he_steps
-
-IntArray = NDArray[np.int64]
+from stiction_ros.identification.step_kernels import IntArray, dense_steps, he_steps
 
 
 @dataclasses.dataclass(frozen=True)
