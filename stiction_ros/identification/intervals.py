@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
-from stiction_ros.identification.growing_search import swarm_round
+from stiction_ros.identification.growing_swarm import swarm_round
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_scan import PatternScan

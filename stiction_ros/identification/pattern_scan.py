@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.step_kernels import IntArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +38,11 @@ class PatternScan:
         """Return all cells of several scans."""
         names = [field.name for field in dataclasses.fields(PatternScan)]
         return PatternScan(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+    def chosen(self, cells: IntArray) -> PatternScan:
+        """Return some of the cells, by their indices."""
+        names = [field.name for field in dataclasses.fields(PatternScan)]
+        return PatternScan(*(getattr(self, name)[cells] for name in names))
 
     def static_range(self, index: int, dynamic: tuple[float, float]) -> tuple[float, float]:
         """Return the values of f_S in a cell for f_D in a range, %."""

@@ -9,7 +9,7 @@ remaining frictions are searched on grids (:mod:`.search`).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -60,6 +60,7 @@ FEW = 60  # cells too few to tell how many there will be
 ROUNDS = 4
 MOST_LEVELS = 30
 LEAST_GAIN = 0.3
+INSIDE = 1e-9  # of a range; how far from its edge
 
 
 class PatternSearch:
@@ -89,23 +90,36 @@ class PatternSearch:
         return scan_stems(self.data, self.valve, grid, starts, by, self.ranges)[0]
 
     def evaluate(self, cells: Cells) -> PatternScan:
-        """Return the loss of every cell at its best f_D."""
+        """Return the loss of every cell at its best f_D.
+
+        At the very edge of a cell there is no f_S, so f_D stays a little inside.
+        """
         dynamic = cells.dynamic
         dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
-        level, curvature, loss, delays = self._minimised(cells.steps, dynamic)
+        edges = INSIDE * (dynamic[:, 1:] - dynamic[:, :1]) * np.array([1.0, -1.0])
+        level, curvature, loss, delays = self._minimised(cells.steps, dynamic + edges)
         moves = cells.steps.moves.astype(float)
         return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
 
-    def best_level(self, friction: FloatArray) -> float:
-        """Return the stem before the first sample that suits (f_S, f_D) best, %."""
+    def best_level(self, friction: FloatArray, begin: Beginning | None = None) -> float:
+        """Return the stem before the first sample that suits (f_S, f_D) best, %.
+
+        Args:
+            friction: f_S and f_D, shape (2,).
+            begin: where the first slip has to be, if it can be there.
+        """
         f_s, f_d = (float(value) for value in friction)
         ranges = levels_of(self.u, f_s, MOST_LEVELS, self.law)
+        if begin is not None:
+            firsts = [beginning_of(self.u, x, f_s, self.law).first for x in ranges.mean(axis=1)]
+            there = np.array(firsts) == begin.first
+            ranges = ranges[there] if there.any() else ranges
         point = np.array([[f_s - f_d, f_s + f_d]])
         points = np.repeat(point, len(ranges), axis=0)
         cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)
         level, loss = self._levels_before(cells, f_d, ranges)
         best = int(loss.argmin())
-        inside = 1e-9 * (ranges[best, 1] - ranges[best, 0])
+        inside = INSIDE * (ranges[best, 1] - ranges[best, 0])
         return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
 
     def realised(self, scan: PatternScan, index: int, begin: Beginning) -> tuple[FloatArray, float]:
@@ -113,7 +127,7 @@ class PatternSearch:
 
         The best level under the given first slip is taken, and of the cell's f_S the middle
         of those with which a valve at that level first slips there; if there is none, the
-        middle of all with their own best level.
+        middle of all with the best level from which it slips there.
         """
         f_d = float(scan.level[index])
         low, high = scan.static_range(index, (f_d, f_d))
@@ -127,7 +141,7 @@ class PatternSearch:
             static = 0.5 * (max(low, least) + min(high, most))
         else:
             static = 0.5 * (low + high)
-            level = self.best_level(np.array([static, f_d]))
+            level = self.best_level(np.array([static, f_d]), begin)
         return np.array([static, f_d]), level - float(self.u[0])
 
     def _levels_before(
@@ -189,16 +203,41 @@ class PatternSearch:
                 twice as many if the rest were covered by cells as large as those met so far.
         """
         todo = self._admissible(rectangle[None, :])
+        if len(todo) > most:
+            return None
         met: list[Cells] = []
         count, whole = 0, area(todo)
-        while len(todo):
-            covered = whole - area(todo)
-            if count + len(todo) > most or (count > FEW and count * whole > 2.0 * most * covered):
+        for cells, left in self._layers(begin, todo):
+            met.append(cells)
+            count += len(cells.bounds)
+            covered = whole - area(left)
+            too_many = count + len(left) > most
+            if len(left) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
                 return None
-            count += len(todo)
-            met.append(cells_at(self.u, begin, points_inside(todo), self.law))
-            todo = self._admissible(remainders(todo, met[-1].bounds))
         return self.evaluate(Cells.joined(met)) if met else self._nothing()
+
+    def some_cells(self, begin: Beginning, rectangles: FloatArray, most: int) -> PatternScan:
+        """Return cells that meet the rectangles, shape (R, 4), each once.
+
+        Args:
+            most: number of cells from which on no more are looked for.
+        """
+        inside = np.clip(rectangles, 0.0, 2.0 * self.limit)
+        met: list[Cells] = []
+        for cells, _ in self._layers(begin, self._admissible(inside)):
+            met.append(cells)
+            if sum(len(part.bounds) for part in met) >= most:
+                break
+        return self.evaluate(Cells.joined(met).distinct()) if met else self._nothing()
+
+    def _layers(
+        self, begin: Beginning, rectangles: FloatArray
+    ) -> Iterator[tuple[Cells, FloatArray]]:
+        """Yield one cell of every rectangle and what they leave, until nothing is left."""
+        while len(rectangles):
+            cells = cells_at(self.u, begin, points_inside(rectangles), self.law)
+            rectangles = self._admissible(remainders(rectangles, cells.bounds))
+            yield cells, rectangles
 
     def _nothing(self) -> PatternScan:
         flat = np.empty(0)

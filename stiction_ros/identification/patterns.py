@@ -63,6 +63,12 @@ class Cells:
         steps = StepSignals.joined([part.steps for part in parts])
         return Cells(np.concatenate([part.bounds for part in parts]), steps)
 
+    def distinct(self) -> Cells:
+        """Return every cell once."""
+        rows = np.ascontiguousarray(self.bounds).view([("", float)] * 4)[:, 0]
+        _, first = np.unique(rows, return_index=True)
+        return Cells(self.bounds[first], self.steps.chosen(first))
+
     @property
     def bases(self) -> FloatArray:
         """OP at the last slip, before the first slip the stem's level, shape (N, G)."""

@@ -22,7 +22,8 @@ from stiction_ros.identification.friction_grid import (
     finer_grid,
     line_grid,
 )
-from stiction_ros.identification.growing_search import growing_search
+from stiction_ros.identification.growing_patterns import LONGEST, growing_patterns
+from stiction_ros.identification.growing_swarm import growing_swarm
 from stiction_ros.identification.models import (
     Criterion,
     Data,
@@ -153,9 +154,10 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
     """Return the best model over the whole triangle of one valve, never worse than before."""
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
     if not has_cells(data.law):
-        grown = growing_search(data, model, orders, valve)
+        grown = growing_swarm(data, model, orders, valve)
         if grown is not None and grown.loss < model.loss:
             return grown
+    short = has_cells(data.law) and data.y.shape[1] <= LONGEST
 
     def from_scan(criterion: Criterion) -> Model:
         scan = first.scans[criterion]
@@ -174,6 +176,7 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
         return descend(data, moved, orders, valve, parents, criterion, ranges, False)
 
     rivals = together(
+        *(partial(growing_patterns, data, model, orders, valve) for _ in range(short)),
         *(partial(from_scan, criterion) for criterion in first.scans),
         lambda: _from_fitted(data, first, orders),
         *(partial(from_elsewhere, other) for other in first.better_beginnings),

@@ -59,6 +59,13 @@ class StepSignals:
         offsets = self.offsets[begin : end + 1] - self.offsets[begin]
         return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
 
+    def chosen(self, signals: IntArray) -> StepSignals:
+        """Return some of the signals, by their indices."""
+        lengths = np.diff(self.offsets)[signals]
+        offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(lengths)])
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[signals] - offsets[:-1], lengths)
+        return StepSignals(self.count, offsets, self.places[rows], self.values[rows])
+
     @property
     def size(self) -> int:
         """G, number of signals."""

@@ -8,7 +8,7 @@ import simulated_loops as loops
 
 from stiction_ros.effects import SemiPhysicalStiction
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.growing_search import growing_search, swarm_round
+from stiction_ros.identification.growing_swarm import growing_swarm, swarm_round
 from stiction_ros.identification.models import Data, Model, linear_model, scan_valve, with_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import nearby_delays
@@ -63,7 +63,7 @@ def test_valve_without_friction_has_no_polygons(at_truth: tuple[Data, Model, Ord
 
 def test_growing_windows_end_at_the_truth(at_truth: tuple[Data, Model, Orders]) -> None:
     data, model, orders = at_truth
-    found = growing_search(data, linear_model(data, orders), orders, 0)
+    found = growing_swarm(data, linear_model(data, orders), orders, 0)
     assert found is not None
     assert found.friction[0] == pytest.approx(TRUTH, abs=0.05)
     assert found.loss < model.loss + 20.0
@@ -74,7 +74,7 @@ def test_a_record_shorter_than_the_first_window_is_given_up(
 ) -> None:
     data, _, orders = at_truth
     short = dataclasses.replace(data, y=data.y[:, :60], u=data.u[:, :60])
-    assert growing_search(short, linear_model(short, orders), orders, 0) is None
+    assert growing_swarm(short, linear_model(short, orders), orders, 0) is None
 
 
 def test_swarm_stays_in_the_triangle(at_truth: tuple[Data, Model, Orders]) -> None:

@@ -20,9 +20,15 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import coarse_grid, even_grid
+from stiction_ros.identification.growing_windows import (
+    beginning_of_data,
+    beginning_of_model,
+    sample_of_turn,
+    shortest_window,
+    window_lengths,
+)
 from stiction_ros.identification.models import (
     Criterion,
     Data,
@@ -39,12 +45,10 @@ from stiction_ros.identification.pattern_search import nearby_delays
 
 SEED = 20
 FIRST_TURNS = (4, 6, 9)
-TURN = 0.1
 STEPS = 30
 LEVELS = 9
 KEPT, LEAST_KEPT = 150, 20
 CHILDREN = 30
-GROWTH = 1.2
 ROUNDS = 4
 WIDTH, WIDE = 0.03, 0.1
 SHRINK = 0.6
@@ -70,7 +74,7 @@ class Swarm:
     width: float
 
 
-def growing_search(data: Data, model: Model, orders: Orders, valve: int) -> Model | None:
+def growing_swarm(data: Data, model: Model, orders: Orders, valve: int) -> Model | None:
     """Return the best model found on growing windows; None when the pattern is lost.
 
     Args:
@@ -78,7 +82,7 @@ def growing_search(data: Data, model: Model, orders: Orders, valve: int) -> Mode
     """
     samples = data.y.shape[1]
     for turns in FIRST_TURNS:
-        first = max(_sample_of_turn(data, valve, turns), _shortest(data, orders))
+        first = max(sample_of_turn(data, valve, turns), shortest_window(data, orders))
         if first > samples:
             return None
         found = _grown(data, model, orders, valve, first)
@@ -87,31 +91,17 @@ def growing_search(data: Data, model: Model, orders: Orders, valve: int) -> Mode
     return None
 
 
-def _shortest(data: Data, orders: Orders) -> int:
-    """Return the fewest samples that a window may have."""
-    free = 2 * orders.output + len(data.u) * orders.input + orders.noise + 3
-    return orders.first + 5 * free
-
-
-def _sample_of_turn(data: Data, valve: int, turns: int) -> int:
-    """Return how many samples hold so many reversals of OP by a tenth of the limit."""
-    band = TURN * float(data.limit[valve])
-    u = data.u[valve]
-    moves = np.diff(HeStiction.simulate_grid(np.array([[band, band]]), u, float(u[0]))[:, 0])
-    at = np.flatnonzero(moves)
-    reversed_at = at[1:][np.sign(moves[at[1:]]) != np.sign(moves[at[:-1]])]
-    return int(reversed_at[turns - 1]) + 1 if len(reversed_at) >= turns else len(u)
-
-
 def _grown(data: Data, model: Model, orders: Orders, valve: int, first: int) -> Model | None:
     samples, limit = data.y.shape[1], float(data.limit[valve])
     generator = np.random.default_rng(SEED)
-    window = _beginning(data, first)
-    best = linear_model(window, orders, _shown(model, first) if len(data.u) > 1 else None)
+    window = beginning_of_data(data, first)
+    best = linear_model(
+        window, orders, beginning_of_model(model, first) if len(data.u) > 1 else None
+    )
     swarm = _first_swarm(window, best, orders, valve)
     least = np.inf
-    for count in _windows(first, samples):
-        window = _beginning(data, count)
+    for count in window_lengths(first, samples):
+        window = beginning_of_data(data, count)
         ranges = data.delays if count < ALL_DELAYS * first else nearby_delays(data, best, valve)
         kept = max(LEAST_KEPT, int(KEPT * first / count))
         if count > first:
@@ -134,22 +124,6 @@ def _grown(data: Data, model: Model, orders: Orders, valve: int, first: int) -> 
         least = min(least, mean)
         swarm.width *= SHRINK ** (2 - ROUNDS)
     return best
-
-
-def _windows(first: int, samples: int) -> list[int]:
-    """Return the lengths of the windows, up to the whole record."""
-    counts = [first]
-    while counts[-1] < samples:
-        counts.append(min(samples, int(GROWTH * counts[-1]) + 1))
-    return counts
-
-
-def _beginning(data: Data, count: int) -> Data:
-    return dataclasses.replace(data, y=data.y[:, :count], u=data.u[:, :count])
-
-
-def _shown(model: Model, count: int) -> Model:
-    return dataclasses.replace(model, stems=model.stems[:, :count])
 
 
 def _on_window(window: Data, model: Model, best: Model, orders: Orders, valve: int) -> Model:
