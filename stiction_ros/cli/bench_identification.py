@@ -13,7 +13,7 @@ import numpy as np
 
 from stiction_ros.cli.bench_row import Row, row
 from stiction_ros.errors import InputError
-from stiction_ros.examples import Example, coupled_loop, example1, example2
+from stiction_ros.examples import Example, coupled_loop, example1, example2_of_one_round
 from stiction_ros.identification import FitStatus, Identification, IdentificationOptions, identify
 from stiction_ros.identification.equation_error import ArxOrders, squared_error
 from stiction_ros.identification.grid_search import count_points
@@ -89,14 +89,14 @@ LENGTHS = (2500, 5000, 10_000, 25_000, 50_000, 100_000)
 FULL = Plan(
     duels=(
         Duel(example1, "Example 1", 7, 0.5, 0.1),
-        Duel(example2, "Example 2", 5, 2.0, 1.0),
+        Duel(example2_of_one_round, "Example 2", 5, 2.0, 1.0),
     ),
     lengths=LENGTHS,
 )
 QUICK = Plan(
     duels=(
         Duel(example1, "Example 1", 1, 2.0, 0.1),
-        Duel(example2, "Example 2", 1, 5.0, 1.0),
+        Duel(example2_of_one_round, "Example 2", 1, 5.0, 1.0),
     ),
     lengths=LENGTHS,
     delay=(4, 6),

@@ -46,7 +46,7 @@ VARIANTS = {
     "example2": ("plant", PLANTS),
     "healthy": ("family", FAMILIES),
 }
-MAKERS: Mapping[str, Callable[[int, str], Example]] = {
+MAKERS: Mapping[str, Callable[..., Example]] = {
     "example1": example1,
     "example2": example2,
     "healthy": healthy_loop,
@@ -61,6 +61,7 @@ class Choice:
         name, variant: of the example.
         output_order, input_order: in place of the example's own, None to keep them.
         method: search of the identification.
+        samples: length of the record, None for the example's own.
     """
 
     name: str
@@ -68,10 +69,12 @@ class Choice:
     output_order: int | None = None
     input_order: int | None = None
     method: str = "exact"
+    samples: int | None = None
 
     def make(self, seed: int) -> Example:
         """Return the example of one seed with the orders and the method chosen."""
-        example = MAKERS[self.name](seed, self.variant)
+        length = {} if self.samples is None else {"samples": self.samples}
+        example = MAKERS[self.name](seed, self.variant, **length)
         changes: dict[str, Any] = {}
         if self.output_order is not None:
             changes |= {"output_order": self.output_order, "input_order": self.input_order}
@@ -119,6 +122,9 @@ def add(commands: Any) -> None:
     add_jobs(parser)
     for name, (option, known) in VARIANTS.items():
         parser.add_argument(f"--{option}", choices=known, help=f"{name} (default: {known[0]})")
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="of examples 1 (2500) and 2 (1240)"
+    )
     parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: the example's)")
     parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
     parser.add_argument("--method", default="exact", choices=METHODS, help="search (exact)")
@@ -155,7 +161,9 @@ def _choice(options: argparse.Namespace) -> Choice:
     variant = getattr(options, option) or known[0]
     if options.seed < 0:
         raise InputError(f"{options.seed} is negative", where="--seed")
-    return Choice(name, variant, options.na, options.nb, options.method)
+    if options.samples is not None and name == "healthy":
+        raise InputError("belongs to examples 1 and 2", where="--samples", fix="leave it out")
+    return Choice(name, variant, options.na, options.nb, options.method, options.samples)
 
 
 def _run_one(choice: Choice, options: argparse.Namespace) -> int:

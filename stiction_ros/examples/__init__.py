@@ -6,7 +6,13 @@ from stiction_ros.examples.comparison import Comparison, compare
 from stiction_ros.examples.coupled import coupled_loop
 from stiction_ros.examples.example import Example
 from stiction_ros.examples.healthy import FAMILIES, healthy_loop
-from stiction_ros.examples.paper import NOISES, PLANTS, example1, example2
+from stiction_ros.examples.paper import (
+    NOISES,
+    PLANTS,
+    example1,
+    example2,
+    example2_of_one_round,
+)
 from stiction_ros.examples.tally import Finding, tally
 
 __all__ = [
@@ -20,6 +26,7 @@ __all__ = [
     "coupled_loop",
     "example1",
     "example2",
+    "example2_of_one_round",
     "healthy_loop",
     "tally",
 ]

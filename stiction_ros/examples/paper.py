@@ -16,7 +16,8 @@ from stiction_ros.records import Record
 NOISES = tuple(entry.value for entry in NoiseEntry)
 PLANTS = ("linear", "tank")
 EXAMPLE1_SAMPLES = 2500
-EXAMPLE2_SAMPLES = 620
+EXAMPLE2_ROUND = 620
+EXAMPLE2_SAMPLES = 2 * EXAMPLE2_ROUND
 
 
 def example1(seed: int, noise: str = "measurement", samples: int = EXAMPLE1_SAMPLES) -> Example:
@@ -46,15 +47,18 @@ def example1(seed: int, noise: str = "measurement", samples: int = EXAMPLE1_SAMP
     return Example("example1", noise, seed, record, plant, options)
 
 
-def example2(seed: int, plant: str = "linear") -> Example:
-    """Return Example 2: two valves, V1 with f_S = 8 and f_D = 1, 620 samples of 1 min.
+def example2(seed: int, plant: str = "linear", samples: int = EXAMPLE2_SAMPLES) -> Example:
+    """Return Example 2: two valves, V1 with f_S = 8 and f_D = 1, 1240 samples of 1 min.
 
     The stiction-unaware MPC on (A.3) controls, with set-point moves of both outputs and
     white noise of variance 1e-4 on both. Delays are known to be 0, orders are left to BIC.
+    The schedule of set-points lasts 620 min and is gone through twice: in a few of 100 records
+    of one round the valve never slips twice in the same direction, and J = f_S − f_D stays open.
 
     Args:
         seed: of the noise.
         plant: ``linear`` is (A.3), ``tank`` the nonlinear tank (A.1).
+        samples: N; a longer record repeats the set-points every 620 min.
 
     Raises:
         InputError: unknown ``plant``.
@@ -65,8 +69,15 @@ def example2(seed: int, plant: str = "linear") -> Example:
     if plant == "linear":
         frictions = {valve.name: valve.effects for valve in model.valves}
         model = scenario.process.with_valve_effects(frictions)
-    record = _record(dataclasses.replace(scenario, plant=model), seed, EXAMPLE2_SAMPLES)
+    schedule = dataclasses.replace(scenario.set_points, repeat=EXAMPLE2_ROUND * model.sample_time)
+    scenario = dataclasses.replace(scenario, plant=model, set_points=schedule)
+    record = _record(scenario, seed, samples)
     return Example("example2", plant, seed, record, model, IdentificationOptions(delay=(0, 0)))
+
+
+def example2_of_one_round(seed: int, plant: str = "linear") -> Example:
+    """Return Example 2 with the schedule gone through once, 620 samples; see :func:`example2`."""
+    return example2(seed, plant, EXAMPLE2_ROUND)
 
 
 def _record(scenario: Scenario, seed: int, samples: int) -> Record:

@@ -37,7 +37,7 @@ from stiction_ros.identification.results import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.search import SearchOutcome, search
+from stiction_ros.identification.search import SearchOutcome, improve, search
 from stiction_ros.identification.search_log import SearchLog
 from stiction_ros.identification.side_by_side import at_once, together
 from stiction_ros.identification.verdict import evidence, judge
@@ -139,7 +139,8 @@ def choose(
     orders, best = min(rivals, key=lambda rival: rival[1].bic)
     if orders != start:
         linear = linear_model(data, orders)
-        found = search(data, linear, orders)
+        found = search(data, linear, orders, growing=False)
+        best = improve(data, best, orders)
     better = min(best, found.model, key=lambda candidate: candidate.loss)
     return orders, linear, dataclasses.replace(found, model=better), table
 

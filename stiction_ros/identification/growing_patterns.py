@@ -34,12 +34,12 @@ from stiction_ros.identification.step_kernels import IntArray
 
 LONGEST = 1500  # samples of a record that is searched so
 FIRST_TURNS = 3
-FIRST_SLIPS = 4
+FIRST_SLIPS = 3
 STEPS = 60
 THIN = 1e-7  # of the limit
 PARENTS = 20
 CROSSES = 10
-CELLS_EACH = 60
+CELLS_EACH = 50
 MOST_CELLS = 1000
 KEPT = 60
 BIN = 0.03  # of the limit; squares of the (J, S) plane that may hold few of the cells kept

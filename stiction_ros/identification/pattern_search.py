@@ -109,11 +109,12 @@ class PatternSearch:
             begin: where the first slip has to be, if it can be there.
         """
         f_s, f_d = (float(value) for value in friction)
-        ranges = levels_of(self.u, f_s, MOST_LEVELS, self.law)
+        most = MOST_LEVELS if begin is None else len(self.u)
+        ranges = levels_of(self.u, f_s, most, self.law)
         if begin is not None:
             firsts = [beginning_of(self.u, x, f_s, self.law).first for x in ranges.mean(axis=1)]
             there = np.array(firsts) == begin.first
-            ranges = ranges[there] if there.any() else ranges
+            ranges = ranges[there] if there.any() else ranges[:MOST_LEVELS]
         point = np.array([[f_s - f_d, f_s + f_d]])
         points = np.repeat(point, len(ranges), axis=0)
         cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)

@@ -64,9 +64,9 @@ class Cells:
         return Cells(np.concatenate([part.bounds for part in parts]), steps)
 
     def distinct(self) -> Cells:
-        """Return every cell once."""
-        rows = np.ascontiguousarray(self.bounds).view([("", float)] * 4)[:, 0]
-        _, first = np.unique(rows, return_index=True)
+        """Return every cell once; cells do not overlap, so their lower corners tell them."""
+        corners = self.bounds[:, 0] + 1j * self.bounds[:, 2]
+        _, first = np.unique(corners, return_index=True)
         return Cells(self.bounds[first], self.steps.chosen(first))
 
     @property

@@ -150,14 +150,18 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
     return FirstScan(model, valve, one_step | by_criterion, elsewhere)
 
 
-def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
-    """Return the best model over the whole triangle of one valve, never worse than before."""
+def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) -> Model:
+    """Return the best model over the whole triangle of one valve, never worse than before.
+
+    Args:
+        growing: take a short record in piece by piece as well.
+    """
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
     if not has_cells(data.law):
         grown = growing_swarm(data, model, orders, valve)
         if grown is not None and grown.loss < model.loss:
             return grown
-    short = has_cells(data.law) and data.y.shape[1] <= LONGEST
+    growing = growing and has_cells(data.law) and data.y.shape[1] <= LONGEST
 
     def from_scan(criterion: Criterion) -> Model:
         scan = first.scans[criterion]
@@ -176,7 +180,7 @@ def first_search(data: Data, orders: Orders, first: FirstScan) -> Model:
         return descend(data, moved, orders, valve, parents, criterion, ranges, False)
 
     rivals = together(
-        *(partial(growing_patterns, data, model, orders, valve) for _ in range(short)),
+        *(partial(growing_patterns, data, model, orders, valve) for _ in range(growing)),
         *(partial(from_scan, criterion) for criterion in first.scans),
         lambda: _from_fitted(data, first, orders),
         *(partial(from_elsewhere, other) for other in first.better_beginnings),
@@ -353,27 +357,38 @@ class SearchOutcome:
     rivals: tuple[tuple[int, int], ...] = ()
 
 
-def search(data: Data, model: Model, orders: Orders) -> SearchOutcome:
-    """Coordinate search over all valves: the most promising first, until nothing changes."""
+def search(data: Data, model: Model, orders: Orders, growing: bool = True) -> SearchOutcome:
+    """Coordinate search over all valves: the most promising first, until nothing changes.
+
+    Args:
+        growing: take a short record in piece by piece as well (:mod:`.growing_patterns`).
+    """
     left, rivals = list(range(len(data.u))), []
     while left:
         scans = together(*(partial(first_scan, data, model, orders, valve) for valve in left))
         first = max(scans, key=lambda scan: scan.gain)
-        model = improve_valve(data, first_search(data, orders, first), orders, first.valve)
+        found = first_search(data, orders, first, growing)
+        model = improve_valve(data, found, orders, first.valve)
         left.remove(first.valve)
         for scan in scans:
             if scan is not first and scan.gain > ALIKE * first.gain > EQUAL:
-                other = improve_valve(data, first_search(data, orders, scan), orders, scan.valve)
+                other = first_search(data, orders, scan, growing)
+                other = improve_valve(data, other, orders, scan.valve)
                 if other.loss < model.loss + EQUAL:
                     rivals.append((first.valve, scan.valve))
-    sticky = np.flatnonzero(model.friction[:, 0])
-    if len(sticky) > 1:
-        for _ in range(ROUNDS):
-            gains = []
-            for valve in sticky:
-                better = improve_valve(data, model, orders, int(valve))
-                gains.append(model.loss - better.loss)
-                model = better
-            if max(gains) < LEAST_GAIN:
-                break
+    if np.count_nonzero(model.friction[:, 0]) > 1:
+        model = improve(data, model, orders)
     return SearchOutcome(model, tuple(rivals))
+
+
+def improve(data: Data, model: Model, orders: Orders) -> Model:
+    """Improve the friction of one sticky valve after the other until nothing changes."""
+    for _ in range(ROUNDS):
+        gains = [0.0]
+        for valve in np.flatnonzero(model.friction[:, 0]):
+            better = improve_valve(data, model, orders, int(valve))
+            gains.append(model.loss - better.loss)
+            model = better
+        if max(gains) < LEAST_GAIN:
+            break
+    return model

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import simulated_loops as loops
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.identification.models import Data, Model, linear_model, with_valve
+from stiction_ros.identification.growing_patterns import first_slips
+from stiction_ros.identification.models import Criterion, Data, Model, linear_model, with_valve
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
     PatternSearch,
@@ -49,6 +50,23 @@ def test_enumerated_cells_fill_the_rectangle(near_truth: tuple[Data, Model, Orde
     area = ((corners[:, 1] - corners[:, 0]) * (corners[:, 3] - corners[:, 2])).sum()
     assert area == pytest.approx(0.01, rel=1e-6)
     assert search.enumerate(search.begin, rectangle, 2) is None
+
+
+@settings(max_examples=40, deadline=None)
+@given(jump=st.floats(0.5, 6.0), more=st.floats(0.2, 6.0), first=st.integers(0, 3))
+def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
+    near_truth: tuple[Data, Model, Orders], jump: float, more: float, first: int
+) -> None:
+    data, model, orders = near_truth
+    begin = first_slips(data.u[0])[first]
+    search = PatternSearch(data, model, orders, 0, ((5, 5),), begin, Criterion.ONE_STEP)
+    scan = search.evaluate(cells_at(search.u, begin, np.array([[jump, jump + more]])))
+    friction, start = search.realised(scan, 0, begin)
+    level = float(search.u[0]) + start
+    assume(friction[0] > 0.5 * np.ptp(search.u[: begin.first]))  # else it slipped before
+    again = beginning_of(search.u, level, float(friction[0]))
+    assert (again.first, again.direction) == (begin.first, begin.direction)
+    assert (cells_at(search.u, again, points_of(friction[None, :])).bounds == scan.bounds).all()
 
 
 @settings(max_examples=30, deadline=None)

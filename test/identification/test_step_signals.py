@@ -47,3 +47,12 @@ def test_joined_signals_are_those_of_the_parts(
     parts = [generator.integers(0, 2, (samples, size)).astype(float) for size in sizes]
     joined = StepSignals.joined([StepSignals.of(part) for part in parts])
     assert (joined.dense(0) == np.hstack(parts)).all()
+
+
+@given(seed=st.integers(0, 10_000), samples=st.integers(1, 40), chosen=st.lists(st.integers(0, 4)))
+@settings(deadline=None)
+def test_chosen_signals_are_those_asked_for(seed: int, samples: int, chosen: list[int]) -> None:
+    dense = np.random.default_rng(seed).integers(0, 2, (samples, 5)).astype(float)
+    steps = StepSignals.of(dense, 2.0 * dense).chosen(np.array(chosen, dtype=np.int64))
+    assert (steps.dense(0) == dense[:, chosen]).all()
+    assert (steps.dense(1) == 2.0 * dense[:, chosen]).all()
