@@ -156,14 +156,14 @@ class _Search:
             return best
         scan = search.scan(rows, 0.0)
         self.points += len(rows)
-        enumerated: list[tuple[Beginning, PatternMap]] = []
+        enumerated: list[PatternMap] = []
         for index in scan.best(2, 0, 2.0 * step):
             friction = scan.grid[index]
             for begin in _beginnings(u, friction, 0.003 * limit):
                 if not any(_holds(known, begin, friction) for known in enumerated):
-                    known = [near for other, near in enumerated if _alike(other, begin)]
+                    known = [near for near in enumerated if near.begin.slips_alike(begin)]
                     near = self._neighbourhood(search, friction, begin, known)
-                    enumerated.append((begin, near))
+                    enumerated.append(near)
                     best = self._in_cells(best, search, valve, near.scan, begin)
         return best
 
@@ -268,17 +268,12 @@ def _beginnings(u: FloatArray, friction: FloatArray, reach: float) -> list[Begin
     return list({begin.first: begin for begin in reversed(found)}.values())
 
 
-def _holds(known: tuple[Beginning, PatternMap], begin: Beginning, friction: FloatArray) -> bool:
+def _holds(known: PatternMap, begin: Beginning, friction: FloatArray) -> bool:
     """Return whether a friction lies where all patterns of its beginning are known."""
-    before, near = known
-    jl, jh, sl, sh = near.rectangle
+    jl, jh, sl, sh = known.rectangle
     jump, reverse = points_of(friction[None, :])[0]
     inside = jl <= jump <= jh and sl <= reverse <= sh
-    return bool(near.closed and _alike(before, begin) and inside)
-
-
-def _alike(one: Beginning, other: Beginning) -> bool:
-    return (one.first, one.direction) == (other.first, other.direction)
+    return bool(known.closed and known.begin.slips_alike(begin) and inside)
 
 
 def _small(limit: float) -> FloatArray:

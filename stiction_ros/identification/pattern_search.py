@@ -196,17 +196,17 @@ class PatternSearch:
         levels, second, loss, delays = best_levels(products, rights, scales, ranges)
         return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
 
-    def enumerate(self, begin: Beginning, rectangle: FloatArray, most: int) -> PatternScan | None:
-        """Return all cells that meet the rectangle (J low, J high, S low, S high).
+    def enumerate(self, begin: Beginning, rectangles: FloatArray, most: int) -> Cells | None:
+        """Return all cells that meet the rectangles, shape (R, 4).
 
         Args:
             most: largest number of cells; None comes back when there are more, or would be
                 twice as many if the rest were covered by cells as large as those met so far.
         """
-        todo = self._admissible(rectangle[None, :])
+        todo = self._admissible(rectangles)
         if len(todo) > most:
             return None
-        met: list[Cells] = []
+        met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
         count, whole = 0, area(todo)
         for cells, left in self._layers(begin, todo):
             met.append(cells)
@@ -215,7 +215,7 @@ class PatternSearch:
             too_many = count + len(left) > most
             if len(left) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
                 return None
-        return self.evaluate(Cells.joined(met)) if met else self._nothing()
+        return Cells.joined(met)
 
     def some_cells(self, begin: Beginning, rectangles: FloatArray, most: int) -> PatternScan:
         """Return cells that meet the rectangles, shape (R, 4), each once.
@@ -224,12 +224,12 @@ class PatternSearch:
             most: number of cells from which on no more are looked for.
         """
         inside = np.clip(rectangles, 0.0, 2.0 * self.limit)
-        met: list[Cells] = []
+        met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
         for cells, _ in self._layers(begin, self._admissible(inside)):
             met.append(cells)
             if sum(len(part.bounds) for part in met) >= most:
                 break
-        return self.evaluate(Cells.joined(met).distinct()) if met else self._nothing()
+        return self.evaluate(Cells.joined(met).distinct())
 
     def _layers(
         self, begin: Beginning, rectangles: FloatArray
@@ -239,11 +239,6 @@ class PatternSearch:
             cells = cells_at(self.u, begin, points_inside(rectangles), self.law)
             rectangles = self._admissible(remainders(rectangles, cells.bounds))
             yield cells, rectangles
-
-    def _nothing(self) -> PatternScan:
-        flat = np.empty(0)
-        delays = np.empty((0, len(self.scans)), dtype=int)
-        return PatternScan(np.empty((0, 4)), np.empty((0, 2)), flat, flat, flat, delays, flat)
 
     def _admissible(self, rectangles: FloatArray) -> FloatArray:
         """Return the rectangles that hold frictions 0 ≤ f_D ≤ f_S ≤ limit."""
@@ -265,11 +260,15 @@ class PatternMap:
     """The enumerated neighbourhood of a model.
 
     Attributes:
-        scan: all cells met.
+        begin: the first slip.
+        cells: all that were met.
+        scan: of these.
         rectangle: (J low, J high, S low, S high) that was enumerated, %.
         closed: whether every pattern at its edge is rejected.
     """
 
+    begin: Beginning
+    cells: Cells
     scan: PatternScan
     rectangle: FloatArray
     closed: bool
@@ -287,6 +286,7 @@ def neighbourhood(
     threshold: float,
     most: int,
     known: Sequence[PatternMap] = (),
+    before: PatternMap | None = None,
 ) -> PatternMap:
     """Enumerate round (f_S, f_D), outwards until all patterns at the edge are rejected.
 
@@ -295,18 +295,23 @@ def neighbourhood(
         most: largest number of cells.
         known: closed neighbourhoods of the same beginning; an edge that meets one of them
             stays where it is.
+        before: the closed neighbourhood that holds (f_S, f_D), under another criterion; if its
+            beginning is the same, its cells are evaluated again and not listed again.
     """
-    centre = np.array([friction[0] - friction[1], friction[0] + friction[1]])
-    scan = search.evaluate(cells_at(search.u, begin, centre[None, :], search.law))
-    reach = 0.002 * search.limit * min(1.0, SAMPLES / len(search.u))
-    rectangle = np.array(
-        [centre[0] - reach, centre[0] + reach, centre[1] - reach, centre[1] + reach]
-    )
-    rectangle[[0, 2]] = np.maximum(rectangle[[0, 2]], 0.0)
-    first = search.enumerate(begin, rectangle, most)
-    if first is None:
-        return PatternMap(scan, np.repeat(centre, 2), closed=False)
-    scan = PatternScan.joined([scan, first])
+    if before is not None and before.begin.slips_alike(begin):
+        cells, rectangle = [before.cells], before.rectangle
+    else:
+        centre = points_of(friction[None, :])
+        cells = [cells_at(search.u, begin, centre, search.law)]
+        reach = 0.002 * search.limit * min(1.0, SAMPLES / len(search.u))
+        rectangle = np.repeat(centre[0], 2) + reach * np.array([-1.0, 1.0, -1.0, 1.0])
+        rectangle[[0, 2]] = np.maximum(rectangle[[0, 2]], 0.0)
+        first = search.enumerate(begin, rectangle[None, :], most)
+        if first is None:
+            scan = search.evaluate(cells[0])
+            return PatternMap(begin, cells[0], scan, np.repeat(centre[0], 2), closed=False)
+        cells.append(first)
+    scan, closed = search.evaluate(Cells.joined(cells)), False
     for _ in range(GROWTHS):
         wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
         met = [
@@ -314,14 +319,16 @@ def neighbourhood(
         ]
         wider = np.where(met, rectangle, wider)
         if (wider == rectangle).all():
-            return PatternMap(scan, rectangle, closed=not any(met))
-        for strip in remainders(wider[None, :], rectangle[None, :]):
-            more = search.enumerate(begin, strip, most - len(scan.loss))
-            if more is None:
-                return PatternMap(scan, rectangle, closed=False)
-            scan = PatternScan.joined([scan, more])
+            closed = not any(met)
+            break
+        strips = remainders(wider[None, :], rectangle[None, :])
+        more = search.enumerate(begin, strips, most - len(scan.loss))
+        if more is None:
+            break
+        cells.append(more)
+        scan = PatternScan.joined([scan, search.evaluate(more)])
         rectangle = wider
-    return PatternMap(scan, rectangle, closed=False)
+    return PatternMap(begin, Cells.joined(cells), scan, rectangle, closed)
 
 
 def _grown(scan: PatternScan, rectangle: FloatArray, threshold: float, limit: float) -> FloatArray:
@@ -370,7 +377,10 @@ def refine(
             return model, None
         search = PatternSearch(data, model, orders, valve, ranges, begin)
         most = min(MOST_CELLS, int(CELL_SAMPLES / len(plain.u)))
-        reachable = neighbourhood(search, begin, model.friction[valve], threshold, most)
+        before = reachable if reachable is not None and reachable.closed else None
+        reachable = neighbourhood(
+            search, begin, model.friction[valve], threshold, most, before=before
+        )
         found = reachable.scan
         loss = np.where(found.moves >= data.min_moves, found.loss, np.inf)
         best = int(loss.argmin())

@@ -42,6 +42,10 @@ class Beginning:
     first: int
     direction: float
 
+    def slips_alike(self, other: Beginning) -> bool:
+        """Return whether another beginning has the same first slip, from whatever level."""
+        return (self.first, self.direction) == (other.first, other.direction)
+
 
 @dataclasses.dataclass(frozen=True)
 class Cells:

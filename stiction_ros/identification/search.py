@@ -57,7 +57,7 @@ COMB = 0.0012
 FIRST_PARENTS = 20
 RIVALS = 2
 PARENTS = 6
-FITTED = 4
+FITTED = 3
 SWEEPS = 5
 ROUNDS = 3
 CROSS = 200
@@ -65,6 +65,7 @@ LEAST_GAIN = 0.5
 ALIKE = 0.9
 EQUAL = 10.0
 BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of the stem, shares of f_S away from OP
+AWAY_STEPS = 30  # of their grids
 FURTHER = 2  # beginnings that are searched further
 
 
@@ -131,7 +132,7 @@ def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstSca
     limit, start = float(data.limit[valve]), float(model.start[valve])
     fine = np.vstack([np.zeros((1, 2)), first_grid(limit, data.y.shape[1])])
     points = WORK / (data.y.shape[1] * len(BEGINNINGS))
-    away = even_grid(limit, min(STEPS // 2, int(np.sqrt(points))))
+    away = even_grid(limit, min(AWAY_STEPS, int(np.sqrt(points))))
     starts = [np.full(len(fine), start), *(start + share * away[:, 0] for share in BEGINNINGS)]
     grid = np.vstack([fine, *(away for _ in BEGINNINGS)])
     everywhere = scan_valve(
