@@ -161,6 +161,8 @@ def _choice(options: argparse.Namespace) -> Choice:
     variant = getattr(options, option) or known[0]
     if options.seed < 0:
         raise InputError(f"{options.seed} is negative", where="--seed")
+    if options.samples is not None and options.samples < 1:
+        raise InputError(f"{options.samples} is no length", where="--samples", fix="use 1240")
     if options.samples is not None and name == "healthy":
         raise InputError("belongs to examples 1 and 2", where="--samples", fix="leave it out")
     return Choice(name, variant, options.na, options.nb, options.method, options.samples)

@@ -63,22 +63,6 @@ def even_grid(limit: float, steps: int) -> FloatArray:
     return _rows(jump, reverse, limit)
 
 
-def line_grid(limit: float, lines: int, steps: int) -> FloatArray:
-    """Return dense lines through the triangle, along S at few J and along J at few S.
-
-    A valve that slips seldom has patterns that are narrow in one direction only.
-
-    Args:
-        lines: number of lines in either direction.
-        steps: points on limit %.
-    """
-    fine = (np.arange(2 * steps) + 0.5) * (limit / steps)
-    few = (np.arange(lines) + 0.5) / lines
-    pairs = [np.meshgrid(few * limit, fine), np.meshgrid(fine, 2.0 * few * limit)]
-    jump, reverse = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in (0, 1))
-    return _rows(jump, reverse, limit)
-
-
 def cross_grid(jumps: FloatArray, reverses: FloatArray, limit: float, steps: int) -> FloatArray:
     """Return lines of the given J, along S, and of the given S, along J, limit / steps apart."""
     fine = (np.arange(2 * steps) + 0.5) * (limit / steps)

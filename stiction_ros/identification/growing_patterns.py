@@ -1,18 +1,19 @@
 """Search for a switching pattern that is narrow: the record is taken in piece by piece.
 
-In a long record the right pattern may be less than a thousandth of the span wide, and its
+The right pattern of a record may be less than a thousandth of the span wide, and its
 neighbours, which slip once at another sample, much worse than wrong ones far away: no grid leads
 there. In the first few slips the same pattern is a wide cell of the (J, S) plane. So cells are
 searched on a beginning of the record; the best ones, and no others, are divided into the cells
-of a longer beginning, listed exactly (:mod:`.patterns`), and so on up to the whole record.
+of a longer beginning (:mod:`.patterns`), and so on up to the whole record.
 
 The stem before its first slip is left free, so only the sample of that slip has to be tried.
+Few are: where OP is noisy, or the valve rests all through the first window, the right one may
+not be among them, and the grids of :mod:`.search` are what is left.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
 
 import numpy as np
 
@@ -69,7 +70,9 @@ def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Mo
         model: gives the stems of the other valves.
     """
     samples, apart = data.y.shape[1], BIN * float(data.limit[valve])
-    first = max(sample_of_turn(data, valve, FIRST_TURNS), shortest_window(data, orders))
+    lags = data.delay[1] - data.delay[0] + orders.input  # in each, the first level is free
+    shortest = shortest_window(data, orders, lags)
+    first = max(sample_of_turn(data, valve, FIRST_TURNS), shortest)
     lengths = window_lengths(min(first, samples), samples)
 
     def search(begin: Beginning, count: int) -> PatternSearch:
@@ -78,6 +81,8 @@ def growing_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Mo
         return PatternSearch(window, shown, orders, valve, data.delays, begin, criterion)
 
     begins = first_slips(data.u[valve][: lengths[0]])
+    if not begins:
+        return model
     kept = [first_branch(search(begin, lengths[0]), begin) for begin in begins]
     for count in lengths[1:]:
         kept = [divided(branch, search(branch.begin, count)) for branch in thinned(kept, apart)]
@@ -103,8 +108,8 @@ def first_slips(u: FloatArray) -> list[Beginning]:
 def first_branch(search: PatternSearch, begin: Beginning) -> Branch:
     """Return cells of the whole triangle.
 
-    Those of an even grid, all round the best of them, and all on the lines of the same J and of
-    the same S through what is then best.
+    Those of an even grid, those round the best of them, and those on the lines of the same J
+    and of the same S through what is then best, as far as ``CELLS_EACH`` goes.
     """
     apart, step = BIN * search.limit, search.limit / STEPS
     grid = points_of(even_grid(search.limit, STEPS))
@@ -131,7 +136,10 @@ def cross(rectangles: FloatArray, limit: float) -> FloatArray:
 
 
 def divided(branch: Branch, longer: PatternSearch) -> Branch:
-    """Return the cells of a longer window that the cells of a branch are made of."""
+    """Return the cells of a longer window that the cells of a branch are made of.
+
+    A cell of very small friction may be made of more than ``MOST_CELLS``; some are left out then.
+    """
     cells = longer.some_cells(branch.begin, branch.scan.bounds, MOST_CELLS)
     return Branch(longer, branch.begin, cells)
 
@@ -155,17 +163,14 @@ def spread(scan: PatternScan, apart: float, count: int, alike: int) -> IntArray:
         apart: side of the squares, %.
         count: largest number of cells.
     """
-    squares = np.floor(scan.bounds[:, [0, 2]].clip(0.0) / apart).astype(int).tolist()
-    held: Counter[tuple[int, ...]] = Counter()
-    best: list[int] = []
-    for index in np.argsort(scan.loss, kind="stable").tolist():
-        square = tuple(squares[index])
-        held[square] += 1
-        if held[square] <= alike:
-            best.append(index)
-            if len(best) == count:
-                break
-    return np.array(best, dtype=np.int64)
+    order = np.argsort(scan.loss, kind="stable")
+    corners = np.floor(scan.bounds[order][:, [0, 2]].clip(0.0) / apart)
+    _, square = np.unique(corners @ np.array([1.0, 1.0j]), return_inverse=True)
+    together = np.argsort(square, kind="stable")
+    first_of_square = np.searchsorted(square[together], square)
+    place = np.empty(len(order), dtype=np.int64)
+    place[together] = np.arange(len(order))
+    return order[place - first_of_square < alike][:count]
 
 
 def _fitted(data: Data, model: Model, orders: Orders, valve: int, branches: list[Branch]) -> Model:

@@ -14,9 +14,13 @@ TURN = 0.1
 GROWTH = 1.2
 
 
-def shortest_window(data: Data, orders: Orders) -> int:
-    """Return the fewest samples that a window may have."""
-    free = 2 * orders.output + len(data.u) * orders.input + orders.noise + 3
+def shortest_window(data: Data, orders: Orders, more: int = 0) -> int:
+    """Return the fewest samples that a window may have.
+
+    Args:
+        more: free parameters beside those of the model.
+    """
+    free = 2 * orders.output + len(data.u) * orders.input + orders.noise + 3 + more
     return orders.first + 5 * free
 
 

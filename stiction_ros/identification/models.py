@@ -335,16 +335,8 @@ def improve_delays(
             if delays == model.delays or delays in tried:
                 continue
             tried.add(delays)
-            rival = with_valve(
-                data,
-                model,
-                orders,
-                valve,
-                friction[0],
-                model.start[valve],
-                scan.delays[0],
-                warm=False,
-            )
+            start, best = float(model.start[valve]), scan.delays[0]
+            rival = with_valve(data, model, orders, valve, friction[0], start, best, warm=False)
             model = min(model, rival, key=lambda candidate: candidate.loss)
     return model
 

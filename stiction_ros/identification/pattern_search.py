@@ -37,6 +37,7 @@ from stiction_ros.identification.patterns import (
     first_slip_range,
     has_cells,
     levels_of,
+    levels_with,
     resting_cells,
 )
 from stiction_ros.identification.rectangles import (
@@ -95,7 +96,8 @@ class PatternSearch:
         At the very edge of a cell there is no f_S, so f_D stays a little inside.
         """
         dynamic = cells.dynamic
-        dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], max(self.limit, 1e-12))
+        most = np.maximum(self.limit - cells.bounds[:, 0], 1e-12)  # f_S = J + f_D is limited
+        dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], np.maximum(most, dynamic[:, 0]))
         edges = INSIDE * (dynamic[:, 1:] - dynamic[:, :1]) * np.array([1.0, -1.0])
         level, curvature, loss, delays = self._minimised(cells.steps, dynamic + edges)
         moves = cells.steps.moves.astype(float)
@@ -109,12 +111,11 @@ class PatternSearch:
             begin: where the first slip has to be, if it can be there.
         """
         f_s, f_d = (float(value) for value in friction)
-        most = MOST_LEVELS if begin is None else len(self.u)
-        ranges = levels_of(self.u, f_s, most, self.law)
+        ranges = np.empty((0, 2))
         if begin is not None:
-            firsts = [beginning_of(self.u, x, f_s, self.law).first for x in ranges.mean(axis=1)]
-            there = np.array(firsts) == begin.first
-            ranges = ranges[there] if there.any() else ranges[:MOST_LEVELS]
+            ranges = levels_with(self.u, f_s, begin, self.law)
+        if not len(ranges):
+            ranges = levels_of(self.u, f_s, MOST_LEVELS, self.law)
         point = np.array([[f_s - f_d, f_s + f_d]])
         points = np.repeat(point, len(ranges), axis=0)
         cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)
@@ -141,7 +142,7 @@ class PatternSearch:
         if max(low, least) < min(high, most):
             static = 0.5 * (max(low, least) + min(high, most))
         else:
-            static = 0.5 * (low + high)
+            static = min(0.5 * (low + high), self.limit)
             level = self.best_level(np.array([static, f_d]), begin)
         return np.array([static, f_d]), level - float(self.u[0])
 
@@ -197,7 +198,7 @@ class PatternSearch:
         return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
 
     def enumerate(self, begin: Beginning, rectangles: FloatArray, most: int) -> Cells | None:
-        """Return all cells that meet the rectangles, shape (R, 4).
+        """Return all cells that meet the rectangles, shape (R, 4), each once.
 
         Args:
             most: largest number of cells; None comes back when there are more, or would be
@@ -215,13 +216,13 @@ class PatternSearch:
             too_many = count + len(left) > most
             if len(left) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
                 return None
-        return Cells.joined(met)
+        return Cells.joined(met).distinct()
 
     def some_cells(self, begin: Beginning, rectangles: FloatArray, most: int) -> PatternScan:
-        """Return cells that meet the rectangles, shape (R, 4), each once.
+        """Return cells that meet the rectangles, shape (R, 4), each once; all if they are few.
 
         Args:
-            most: number of cells from which on no more are looked for.
+            most: number of cells met, some of them repeatedly, from which on no more are listed.
         """
         inside = np.clip(rectangles, 0.0, 2.0 * self.limit)
         met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
@@ -276,7 +277,7 @@ class PatternMap:
     @property
     def patterns(self) -> int:
         """Number of cells."""
-        return len(self.scan.loss)
+        return len(self.cells.distinct().bounds)
 
 
 def neighbourhood(

@@ -142,6 +142,25 @@ def levels_of(
     return np.column_stack([ends[:-1], ends[1:]])[widest]
 
 
+def levels_with(
+    u: FloatArray, static: float, begin: Beginning, law: type[FrictionLaw] = HeStiction
+) -> FloatArray:
+    """Return the range of the level from which a valve with f_S first slips as in ``begin``.
+
+    Returns:
+        Shape (1, 2), or (0, 2) when there is no such level.
+    """
+    before = u[: begin.first]
+    if law in RULES:
+        before = before[RULES[law](u).resting_samples(float(u[0]))[: begin.first]]
+    if not len(before):
+        return np.empty((0, 2))
+    low, high = float(before.max()) - static, float(before.min()) + static
+    edge = float(u[begin.first]) - begin.direction * static
+    low, high = (low, min(high, edge)) if begin.direction > 0.0 else (max(low, edge), high)
+    return np.array([[low, high]]) if low < high else np.empty((0, 2))
+
+
 def cells_at(
     u: FloatArray, begin: Beginning, points: FloatArray, law: type[FrictionLaw] = HeStiction
 ) -> Cells:

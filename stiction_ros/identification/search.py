@@ -1,7 +1,8 @@
 """Search over the valves' friction: grids first, then exact switching patterns.
 
 A valve's friction is found by scanning the triangle with everything else fixed
-(:mod:`.scan`), closer and closer round the best points; candidates are judged by the exact
+(:mod:`.scan`), closer and closer round the best points, and in short records on growing windows
+(:mod:`.growing_patterns`); candidates are judged by the exact
 fit under the noise model (:mod:`.output_error`); the best ends in the best switching pattern
 of its neighbourhood (:mod:`.pattern_search`).
 """
@@ -9,18 +10,18 @@ of its neighbourhood (:mod:`.pattern_search`).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 
+from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import (
     coarse_grid,
     cross_grid,
     even_grid,
     finer_grid,
-    line_grid,
 )
 from stiction_ros.identification.growing_patterns import LONGEST, growing_patterns
 from stiction_ros.identification.growing_swarm import growing_swarm
@@ -48,9 +49,7 @@ from stiction_ros.identification.polygon_search import refine_near
 from stiction_ros.identification.side_by_side import together
 
 STEPS = 80
-LINES = 14
 WORK = 24_000_000
-MOST_POINTS = 12_000
 APART = 0.03
 FINEST = 0.004
 COMB = 0.0012
@@ -67,16 +66,6 @@ EQUAL = 10.0
 BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of the stem, shares of f_S away from OP
 AWAY_STEPS = 30  # of their grids
 FURTHER = 2  # beginnings that are searched further
-
-
-def first_grid(limit: float, samples: int) -> FloatArray:
-    """Return the grid of the first scan; short records allow more points."""
-    grids = [coarse_grid(limit), even_grid(limit, STEPS)]
-    spare = min(WORK // samples, MOST_POINTS) - len(grids[0]) - len(grids[1])
-    steps = int(spare / (1.5 * LINES))
-    if steps > STEPS:
-        grids.append(line_grid(limit, LINES, steps))
-    return np.vstack(grids)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,7 +119,7 @@ class FirstScan:
 def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstScan:
     """Scan the whole triangle of one valve, its first row without friction."""
     limit, start = float(data.limit[valve]), float(model.start[valve])
-    fine = np.vstack([np.zeros((1, 2)), first_grid(limit, data.y.shape[1])])
+    fine = np.vstack([np.zeros((1, 2)), coarse_grid(limit), even_grid(limit, STEPS)])
     points = WORK / (data.y.shape[1] * len(BEGINNINGS))
     away = even_grid(limit, min(AWAY_STEPS, int(np.sqrt(points))))
     starts = [np.full(len(fine), start), *(start + share * away[:, 0] for share in BEGINNINGS)]
@@ -155,14 +144,16 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
     """Return the best model over the whole triangle of one valve, never worse than before.
 
     Args:
-        growing: take a short record in piece by piece as well.
+        growing: take a short record in piece by piece as well, under He's law.
     """
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
     if not has_cells(data.law):
         grown = growing_swarm(data, model, orders, valve)
         if grown is not None and grown.loss < model.loss:
             return grown
-    growing = growing and has_cells(data.law) and data.y.shape[1] <= LONGEST
+    piece_by_piece: list[Callable[[], Model]] = []
+    if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
+        piece_by_piece = [partial(growing_patterns, data, model, orders, valve)]
 
     def from_scan(criterion: Criterion) -> Model:
         scan = first.scans[criterion]
@@ -181,7 +172,7 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
         return descend(data, moved, orders, valve, parents, criterion, ranges, False)
 
     rivals = together(
-        *(partial(growing_patterns, data, model, orders, valve) for _ in range(growing)),
+        *piece_by_piece,
         *(partial(from_scan, criterion) for criterion in first.scans),
         lambda: _from_fitted(data, first, orders),
         *(partial(from_elsewhere, other) for other in first.better_beginnings),
@@ -362,7 +353,8 @@ def search(data: Data, model: Model, orders: Orders, growing: bool = True) -> Se
     """Coordinate search over all valves: the most promising first, until nothing changes.
 
     Args:
-        growing: take a short record in piece by piece as well (:mod:`.growing_patterns`).
+        growing: take a short record in piece by piece as well, under He's law
+            (:mod:`.growing_patterns`).
     """
     left, rivals = list(range(len(data.u))), []
     while left:

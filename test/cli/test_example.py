@@ -85,6 +85,8 @@ def test_one_seed_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
         ["healthy", "--seeds", "1:2", "--out", "somewhere"],
         ["healthy", "--samples", "500"],
         ["1", "--samples", "40"],
+        ["1", "--samples", "0"],
+        ["2", "--samples", "-5"],
     ],
 )
 def test_what_does_not_fit_is_one_line_and_exit_2(

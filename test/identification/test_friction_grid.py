@@ -11,7 +11,6 @@ from stiction_ros.identification.friction_grid import (
     cross_grid,
     even_grid,
     finer_grid,
-    line_grid,
 )
 
 
@@ -28,7 +27,7 @@ def inside(grid: FloatArray, limit: float) -> bool:
 def test_grids_of_the_whole_triangle_stay_in_it(limit: float) -> None:
     assert coarse_grid(limit)[:, 0].min() > 0.0
     assert np.isclose(coarse_grid(limit)[:, 0].max(), limit)
-    for grid in (coarse_grid(limit), even_grid(limit, 20), line_grid(limit, 5, 40)):
+    for grid in (coarse_grid(limit), even_grid(limit, 20)):
         assert len(grid) > 100
         assert inside(grid, limit)
 

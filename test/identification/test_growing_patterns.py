@@ -33,6 +33,7 @@ from stiction_ros.identification.pattern_search import PatternSearch
 from stiction_ros.identification.patterns import Beginning, beginning_of, cells_at
 from stiction_ros.identification.preparation import prepare, window
 from stiction_ros.identification.rectangles import area
+from stiction_ros.identification.search import search
 
 
 def random_walk(seed: int, samples: int = 200) -> FloatArray:
@@ -85,7 +86,7 @@ def test_a_valve_slips_first_where_op_goes_beyond_all_it_was(
     u = random_walk(seed)
     begin = beginning_of(u, float(u[0]) + share * static, static)
     found = {slip.first: slip.direction for slip in first_slips(u)}
-    assert len(found) <= 4
+    assert len(found) <= 3
     for first, direction in found.items():
         assert direction * u[first] > (direction * u[:first]).max()
     if begin.first < len(u):
@@ -97,6 +98,14 @@ def test_a_valve_slips_first_where_op_goes_beyond_all_it_was(
 
 def test_op_that_rests_has_no_first_slip() -> None:
     assert first_slips(np.zeros(50)) == []
+
+
+def test_a_record_whose_op_rests_at_first_keeps_its_model(
+    loop: tuple[Data, Model, Orders],
+) -> None:
+    data, model, orders = loop
+    still = dataclasses.replace(data, u=np.where(np.arange(600) < 590, 0.0, data.u))
+    assert growing_patterns(still, model, orders, 0) is model
 
 
 def test_lines_cross_in_the_middle() -> None:
@@ -139,19 +148,20 @@ def test_windows_grow_up_to_the_whole_record() -> None:
     assert all(b <= int(1.2 * a) + 1 for a, b in itertools.pairwise(lengths))
 
 
-@pytest.mark.parametrize(("plant", "seed"), [("tank", 54), ("tank", 177), ("tank", 135)])
-def test_a_needle_between_the_grids_is_found(plant: str, seed: int) -> None:
-    """The right pattern is less than 0.1 % of the span wide; grids miss it on these seeds."""
-    example = example2(seed, plant)
+@pytest.mark.parametrize(("plant", "seed"), [("tank", 54), ("tank", 135), ("linear", 68)])
+def test_a_needle_that_the_grids_step_over_is_found(plant: str, seed: int) -> None:
+    example = example2(seed, plant, samples=620)
     data = prepare(example.record, example.options)
     orders = window(example.options, 2, 2)
     linear = linear_model(data, orders)
+    by_grids = search(data, linear, orders, growing=False).model
     found = growing_patterns(data, linear, orders, 0)
+    assert np.abs(by_grids.friction[0] - [8.0, 1.0]).max() > 0.15
     assert found.friction[0] == pytest.approx([8.0, 1.0], abs=0.15)
-    assert found.loss < linear.loss - 1000.0
+    assert found.loss < by_grids.loss - 100.0
 
 
-def test_the_model_is_kept_where_friction_does_not_help() -> None:
+def test_nothing_is_gained_where_there_is_no_friction() -> None:
     generator = np.random.default_rng(5)
     u = generator.standard_normal(400).cumsum()
     y = np.zeros(400)

@@ -1,5 +1,7 @@
 """Enumeration is complete, and its best cell is the best of any point nearby."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import simulated_loops as loops
@@ -13,10 +15,11 @@ from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
     PatternSearch,
     nearby_delays,
+    neighbourhood,
     points_of,
     refine,
 )
-from stiction_ros.identification.patterns import beginning_of, cells_at
+from stiction_ros.identification.patterns import beginning_of, cells_at, levels_with
 from stiction_ros.identification.preparation import prepare, window
 from stiction_ros.identification.step_signals import StepSignals
 
@@ -53,20 +56,60 @@ def test_enumerated_cells_fill_the_rectangle(near_truth: tuple[Data, Model, Orde
 
 
 @settings(max_examples=40, deadline=None)
-@given(jump=st.floats(0.5, 6.0), more=st.floats(0.2, 6.0), first=st.integers(0, 2))
+@given(jump=st.floats(0.5, 6.0), more=st.floats(0.2, 6.0), slip=st.integers(0, 2))
 def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
-    near_truth: tuple[Data, Model, Orders], jump: float, more: float, first: int
+    near_truth: tuple[Data, Model, Orders], jump: float, more: float, slip: int
 ) -> None:
     data, model, orders = near_truth
-    begin = first_slips(data.u[0])[first]
+    begin = first_slips(data.u[0, :300])[slip]
     search = PatternSearch(data, model, orders, 0, ((5, 5),), begin, Criterion.ONE_STEP)
     scan = search.evaluate(cells_at(search.u, begin, np.array([[jump, jump + more]])))
     friction, start = search.realised(scan, 0, begin)
-    level = float(search.u[0]) + start
     assume(friction[0] > 0.5 * np.ptp(search.u[: begin.first]))  # else it slipped before
-    again = beginning_of(search.u, level, float(friction[0]))
-    assert (again.first, again.direction) == (begin.first, begin.direction)
+    again = beginning_of(search.u, float(search.u[0]) + start, float(friction[0]))
+    assert again.slips_alike(begin)
     assert (cells_at(search.u, again, points_of(friction[None, :])).bounds == scan.bounds).all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 10_000), static=st.floats(0.2, 5.0), share=st.floats(-0.99, 0.99))
+def test_levels_of_a_first_slip_are_those_from_which_it_comes(
+    seed: int, static: float, share: float
+) -> None:
+    u = np.random.default_rng(seed).standard_normal(200).cumsum()
+    level = float(u[0]) + share * static
+    begin = beginning_of(u, level, static)
+    assume(0 < begin.first < len(u))
+    ((low, high),) = levels_with(u, static, begin)
+    assert low - 1e-9 <= level <= high + 1e-9
+    for inside in np.linspace(low, high, 5)[1:-1]:
+        assert beginning_of(u, float(inside), static).slips_alike(begin)
+
+
+def test_no_friction_beyond_the_limit_is_taken(near_truth: tuple[Data, Model, Orders]) -> None:
+    data, model, orders = near_truth
+    narrow = dataclasses.replace(data, limit=np.array([4.5]))
+    begin = first_slips(data.u[0, :300])[0]
+    search = PatternSearch(narrow, model, orders, 0, ((5, 5),), begin, Criterion.ONE_STEP)
+    points = np.array([[0.01, 8.9], [0.5, 8.4], [2.0, 6.9], [4.4, 4.5]])
+    scan = search.evaluate(cells_at(search.u, begin, points))
+    for index in range(len(points)):
+        assert search.realised(scan, index, begin)[0][0] <= 4.5
+
+
+def test_cells_that_are_known_are_not_listed_again(near_truth: tuple[Data, Model, Orders]) -> None:
+    search, friction = search_of(near_truth), np.array([5.0, 2.0])
+    assert search.begin is not None
+    fresh = neighbourhood(search, search.begin, friction, 1.0, 3000)
+    again = neighbourhood(search, search.begin, friction, 1.0, 3000, before=fresh)
+    assert fresh.closed
+    assert again.closed
+    assert (again.cells.bounds == fresh.cells.bounds).all()
+    assert again.scan.loss == pytest.approx(fresh.scan.loss, rel=1e-12)
+    later = dataclasses.replace(search.begin, first=search.begin.first + 1)
+    other = neighbourhood(search, later, friction, 1.0, 3000, before=fresh)
+    apart = neighbourhood(search, later, friction, 1.0, 3000)
+    assert (other.cells.bounds == apart.cells.bounds).all()
 
 
 @settings(max_examples=30, deadline=None)
