@@ -89,14 +89,14 @@ LENGTHS = (2500, 5000, 10_000, 25_000, 50_000, 100_000)
 FULL = Plan(
     duels=(
         Duel(example1, "Example 1", 7, 0.5, 0.1),
-        Duel(example2_of_one_round, "Example 2", 5, 2.0, 1.0),
+        Duel(example2_of_one_round, "Example 2, one round", 5, 2.0, 1.0),
     ),
     lengths=LENGTHS,
 )
 QUICK = Plan(
     duels=(
         Duel(example1, "Example 1", 1, 2.0, 0.1),
-        Duel(example2_of_one_round, "Example 2", 1, 5.0, 1.0),
+        Duel(example2_of_one_round, "Example 2, one round", 1, 5.0, 1.0),
     ),
     lengths=LENGTHS,
     delay=(4, 6),

@@ -103,7 +103,7 @@ def test_a_grid_is_extrapolated_by_its_points(document: dict[str, Any]) -> None:
 def test_the_full_run_covers_what_was_asked() -> None:
     assert [(duel.title, duel.starts) for duel in FULL.duels] == [
         ("Example 1", 7),
-        ("Example 2", 5),
+        ("Example 2, one round", 5),
     ]
     assert FULL.delay is None
     assert (FULL.lengths[0], FULL.lengths[-1], FULL.longest) == (2500, 100_000, 100_000)
