@@ -34,17 +34,17 @@ from stiction_ros.identification.patterns import Beginning, cells_at
 from stiction_ros.identification.step_kernels import IntArray
 
 LONGEST = 1500  # samples of a record that is searched so
-FIRST_TURNS = 3
-FIRST_SLIPS = 3
-STEPS = 60
-THIN = 1e-7  # of the limit
-PARENTS = 20
-CROSSES = 10
-CELLS_EACH = 50
-MOST_CELLS = 1000
-KEPT = 60
+FIRST_TURNS = 3  # reversals of OP in the first window
+FIRST_SLIPS = 3  # that are tried
+STEPS = 60  # of the first window's grid
+PARENTS = 20  # whose surroundings are listed
+CROSSES = 10  # points through which lines are listed
+CELLS_EACH = 50  # of one of these
+THIN = 1e-7  # of the limit; half the width of a line
+MOST_CELLS = 1000  # of a branch in a longer window
+KEPT = 60  # cells that go on to a longer window
 BIN = 0.03  # of the limit; squares of the (J, S) plane that may hold few of the cells kept
-ALIKE = 5
+ALIKE = 5  # of them in one square
 FITTED = 2
 
 
