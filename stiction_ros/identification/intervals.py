@@ -12,10 +12,10 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
 from stiction_ros.identification.growing_swarm import swarm_round
 from stiction_ros.identification.models import Data, Model, ValveScan, scan_valve, with_valve
+from stiction_ros.identification.neighbourhood import PatternMap
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_scan import PatternScan
 from stiction_ros.identification.pattern_search import (
-    PatternMap,
     PatternSearch,
     best_in_cells,
     nearby_delays,

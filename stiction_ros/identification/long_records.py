@@ -12,8 +12,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.identification.models import Data, Model, refit, stem_of
+from stiction_ros.identification.neighbourhood import REJECTED, refine
 from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.pattern_search import REJECTED, refine
 from stiction_ros.identification.search import comb
 
 PART = 6000

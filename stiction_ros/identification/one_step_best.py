@@ -27,16 +27,15 @@ from stiction_ros.identification.models import (
     Model,
     with_delays,
 )
-from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.pattern_scan import PatternScan
-from stiction_ros.identification.pattern_search import (
+from stiction_ros.identification.neighbourhood import (
     CELL_SAMPLES,
     SAMPLES,
     PatternMap,
-    PatternSearch,
     neighbourhood,
-    points_of,
 )
+from stiction_ros.identification.output_error import Orders
+from stiction_ros.identification.pattern_scan import PatternScan
+from stiction_ros.identification.pattern_search import PatternSearch, points_of
 from stiction_ros.identification.patterns import Beginning, beginning_of
 from stiction_ros.identification.search import zoom
 from stiction_ros.identification.search_log import SearchLog

@@ -16,14 +16,10 @@ import numpy as np
 from stiction_ros.effects import SemiPhysicalStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.models import Data, Model, with_valve
+from stiction_ros.identification.neighbourhood import PatternMap, refine
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_scan import PatternScan
-from stiction_ros.identification.pattern_search import (
-    PatternMap,
-    PatternSearch,
-    nearby_delays,
-    refine,
-)
+from stiction_ros.identification.pattern_search import PatternSearch, nearby_delays
 from stiction_ros.identification.patterns import has_cells
 from stiction_ros.identification.polygon_patterns import (
     PolygonCell,

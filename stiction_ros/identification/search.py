@@ -35,10 +35,9 @@ from stiction_ros.identification.models import (
     scan_valve,
     with_valve,
 )
+from stiction_ros.identification.neighbourhood import REJECTED, SAMPLES
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.pattern_search import (
-    REJECTED,
-    SAMPLES,
     PatternSearch,
     best_in_cells,
     nearby_delays,

@@ -11,14 +11,9 @@ from hypothesis import strategies as st
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.growing_patterns import first_slips
 from stiction_ros.identification.models import Criterion, Data, Model, linear_model, with_valve
+from stiction_ros.identification.neighbourhood import neighbourhood, refine
 from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.pattern_search import (
-    PatternSearch,
-    nearby_delays,
-    neighbourhood,
-    points_of,
-    refine,
-)
+from stiction_ros.identification.pattern_search import PatternSearch, nearby_delays, points_of
 from stiction_ros.identification.patterns import beginning_of, cells_at, levels_with
 from stiction_ros.identification.preparation import prepare, window
 from stiction_ros.identification.step_signals import StepSignals
