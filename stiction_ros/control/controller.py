@@ -84,7 +84,7 @@ class MpcController:
         design, mode: as given.
         observer: state and disturbance estimate.
         valves: belief in each sticky valve, None for those taken to be healthy.
-        stem: stem estimates χ̂, shape (m,), %.
+        stem: stem estimates χ̂, shape (m,), %; after a step those that its OP will bring about.
         raised: what the slip check found at the last step, empty for nothing.
     """
 
@@ -123,6 +123,7 @@ class MpcController:
         self._check = SlipCheck(m) if design.slip_check else None
         self._dv: FloatArray = np.zeros(design.model.e.shape[1])
         self._started = False
+        self._decided: tuple[FloatArray, Plan | None] | None = None  # applied in this sample
 
     def _build_formulation(
         self, unaware: UnawareMpc, known: tuple[Behaviour | None, ...]
@@ -173,7 +174,13 @@ class MpcController:
             if belief is not None:
                 belief.start(float(op[j]), *self.design.limits.stem[j].tolist())
         self.observer.rest(self.stem, pv)
-        self._started = True
+        self._started, self._decided = True, None
+
+    def forget(self) -> None:
+        """Forget the past; the next measurement starts from rest, frictions stay known."""
+        self._started, self._decided = False, None
+        if self._check is not None:
+            self._check.drop()
 
     def take_over(self, history: History) -> float:
         """Take over from another controller of the same loop without a stop.
@@ -187,24 +194,43 @@ class MpcController:
             innovations, each in standard deviations of the measurement noise.
         """
         first = max(len(history.op) - self.design.hand_over_samples, 0)
-        stems = self._replay(history.op)
-        self.observer.rest(stems[first], history.pv[first])
+        begin = history.op[0]
+        for j, belief in enumerate(self.valves):
+            if belief is not None:
+                belief.start(float(begin[j]), *self.design.limits.stem[j].tolist())
+        stem = begin
+        for row in history.op[: first + 1]:
+            stem = self._stems(row)
+        self.observer.rest(stem, history.pv[first])
+        misfit = self._follow(history, first, stem)
+        self._started, self._decided = True, None
+        return misfit
+
+    def follow(self, history: History) -> None:
+        """Go on behind :meth:`take_over` over the samples since then, all of them answered."""
+        if len(history.op):
+            self._follow(history, 0, self._stems(history.op[0]))
+
+    def _follow(self, history: History, first: int, stem: FloatArray) -> float:
+        """Take in the samples from ``first`` on, whose stems are ``stem``; as take_over."""
         total = 0.0
-        for k in range(first, len(stems)):
+        for k in range(first, len(history.op)):
+            if k > first:
+                stem = self._stems(history.op[k])
             self.observer.correct(history.pv[k])
             scaled = self.observer.innovation**2 / self.design.observer.measurement_noise
             total += float(scaled.mean())
-            self.observer.predict(stems[k], history.dv[k])
-        self.stem, self._started = stems[-1].copy(), True
-        return total / (len(stems) - first)
+            self.observer.predict(stem, history.dv[k])
+        self.stem = stem
+        return total / max(len(history.op) - first, 1)
 
-    def _replay(self, op: FloatArray) -> FloatArray:
-        stems = np.array(op, dtype=float)
+    def _stems(self, op: FloatArray) -> FloatArray:
+        """Move the valves on by one sample of ``op`` (m,) and return their stems, (m,), %."""
+        stem = np.array(op, dtype=float)
         for j, belief in enumerate(self.valves):
             if belief is not None:
-                belief.start(float(op[0, j]), *self.design.limits.stem[j].tolist())
-                stems[:, j] = [belief.step(value) for value in op[:, j].tolist()]
-        return stems
+                stem[j] = belief.step(float(op[j]))
+        return stem
 
     def step(
         self,
@@ -213,18 +239,39 @@ class MpcController:
         dv: FloatArray,
         applied: FloatArray,
         preview: FloatArray | None = None,
+        *,
+        known: bool = True,
+        keep: bool = False,
     ) -> StepResult:
         """Return what to apply now.
 
         Args:
             pv, sp: measurement and set-points, shape (p,).
             dv: measured disturbances in deviations from nominal, shape (d,); taken to stay.
-            applied: the OP applied last, shape (m,), held when nothing better is found.
+            applied: the OP that the valves were given last, shape (m,), whatever this
+                controller wanted; held when nothing better is found.
             preview: set-points of the samples 1, 2, … ahead, shape (K, p), the last of which
                 holds on; None when ``sp`` holds on.
+            known: whether ``applied`` is surely what the valves were given; where it is not, no
+                slip is judged.
+            keep: leave OP at ``applied`` whatever is planned, as at the first sample of a run.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._step(pv, sp, dv, applied, preview)
+            return self._step(pv, sp, dv, applied, preview, known, keep)
+
+    def pass_over(
+        self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
+    ) -> None:
+        """Take in a sample that is not answered: OP stays at ``applied``; as :meth:`step`.
+
+        What is not finite of ``pv`` is missing.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            applied = self._take_in(pv, dv, applied, known)
+            kept = Proposal(applied, None, StepStatus.HELD, "")
+            for strategy in self._strategies:
+                strategy.applied(kept, False)
+            self._decide(applied, None)
 
     def _step(
         self,
@@ -233,24 +280,20 @@ class MpcController:
         dv: FloatArray,
         applied: FloatArray,
         preview: FloatArray | None,
+        known: bool,
+        keep: bool,
     ) -> StepResult:
         begin = time.perf_counter()
-        self.raised = ""
-        applied = self._valid(applied, self.stem)
         trouble = _unusable(pv=pv, sp=sp, dv=dv)
-        if np.isfinite(dv).all():
-            self._dv = dv
-        if np.isfinite(pv).all():
-            self._measure(pv, applied)
+        applied = self._take_in(pv, dv, applied, known)
         target: Target | None = None
         if not trouble and self._formulation is not None:
             target = self._select(sp, preview)
             trouble = "" if target is not None else "no steady state within the limits"
         situation = Situation(self.observer.state, target, self.stem, applied, self.forms, trouble)
         proposal, strategy = self._choose(situation)
-        op = self._valid(proposal.op, applied)
-        if self._started:
-            self._move(op, proposal.plan)
+        op = applied if keep else self._valid(proposal.op, applied)
+        self._decide(op, proposal.plan)
         seconds = time.perf_counter() - begin
         miss = np.zeros(len(sp)) if target is None else target.miss
         return StepResult(
@@ -265,6 +308,19 @@ class MpcController:
             proposal.age,
             self._gap(situation, proposal),
         )
+
+    def _take_in(
+        self, pv: FloatArray, dv: FloatArray, applied: FloatArray, known: bool
+    ) -> FloatArray:
+        """Move on by what was applied, take in what is measured; return the valid ``applied``."""
+        self.raised = ""
+        applied = self._valid(applied, self.stem)
+        self._advance(applied, known)
+        if np.isfinite(dv).all():
+            self._dv = dv
+        if np.isfinite(pv).all():
+            self._measure(pv, applied)
+        return applied
 
     def _measure(self, pv: FloatArray, applied: FloatArray) -> None:
         if not self._started:
@@ -320,19 +376,37 @@ class MpcController:
         usable = np.where(np.isfinite(op), op, otherwise)
         return np.minimum(np.maximum(usable, limits[:, 0]), limits[:, 1])
 
-    def _move(self, op: FloatArray, plan: Plan | None) -> None:
+    def _decide(self, op: FloatArray, plan: Plan | None) -> None:
+        """Note what is to be applied in this sample, and where that should bring the stems."""
+        if not self._started:
+            return
+        self._decided = op, plan
         stem = op.copy()
         for j, belief in enumerate(self.valves):
             if belief is not None:
-                if self._check is not None:
-                    self._check.begin(j, self.observer, belief, float(op[j]))
-                stem[j] = belief.step(float(op[j]))
-        if isinstance(plan, InvertedPlan):
+                stem[j] = belief.expected(float(op[j]))
+        self.stem = plan.process_input if isinstance(plan, InvertedPlan) else stem
+
+    def _advance(self, applied: FloatArray, known: bool) -> None:
+        """Move valves and observer over the sample that has passed, by what was ``applied``."""
+        if self._decided is None:
+            return
+        decided, plan = self._decided
+        self._decided = None
+        check = self._check
+        if check is not None:
+            if not known:
+                check.drop()
+            for j, belief in enumerate(self.valves):
+                if belief is not None and known:
+                    check.begin(j, self.observer, belief, float(applied[j]))
+        stem = self._stems(applied)
+        if isinstance(plan, InvertedPlan) and np.array_equal(applied, decided):
             stem = plan.process_input
         self.stem = stem
         self.observer.predict(stem, self._dv)
-        if self._check is not None:
-            self._check.predict(op, stem, self._dv)
+        if check is not None:
+            check.predict(applied, stem, self._dv)
 
     def _remarks(self) -> list[str]:
         remarks = [self.raised]
