@@ -18,6 +18,7 @@ from stiction_ros.control import (
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.online.background import Background
 from stiction_ros.online.known_friction import frictions_of, spreads_of
 from stiction_ros.online.offers import OfferRule, doubt
 from stiction_ros.online.schedule import FitSchedule
@@ -70,7 +71,12 @@ class LiveController:
     one before.
     """
 
-    def __init__(self, settings: LiveControllerSettings, model: LoopModel) -> None:
+    def __init__(
+        self,
+        settings: LiveControllerSettings,
+        model: LoopModel,
+        background: Background | None = None,
+    ) -> None:
         """Build the first controller on ``model``, whose own valve effects are taken as known.
 
         Raises:
@@ -92,6 +98,7 @@ class LiveController:
         self._retuned: _Prepared | None = None
         self._offered: _Prepared | None = None
         self._doubted: _Prepared | None = None
+        self._in_force = np.array(model.stem_start)
         self._raised: tuple[Behaviour | None, ...] | None = None  # by the slip check
         self._given_up = False
         self._sample = 0
@@ -124,6 +131,24 @@ class LiveController:
         """The controller in force, for its observer and its stem estimates."""
         return self._controller
 
+    def begin(self, op: FloatArray) -> None:
+        """Stand-in: continue from ``op``."""
+        for queue in (self._op, self._pv, self._dv):
+            queue.clear()
+        self._in_force = np.array(op, dtype=float)
+
+    def applied(self, op: FloatArray, known: bool = True) -> None:
+        """Stand-in: note what the valves were given."""
+        if self._op:
+            self._op[-1] = np.array(op, dtype=float)
+
+    def pass_over(self, pv: FloatArray, dv: FloatArray | None = None) -> None:
+        """Stand-in: count the sample."""
+        self._sample += 1
+
+    def close(self) -> None:
+        """Stand-in."""
+
     def offer(self, model: LoopModel, at: int) -> str:
         """Prepare a controller that knows the valves of ``model`` from sample ``at`` on.
 
@@ -133,6 +158,7 @@ class LiveController:
         try:
             self._offered = self._prepare_offer(model, at, self.settings, self._design)
         except InputError as error:
+            self.doubts.append((self._sample, str(error)))
             return str(error)
         self._doubted = None
         return ""
@@ -186,7 +212,7 @@ class LiveController:
         """Return what to apply at the present sample; arguments as for the controller's step."""
         upset = np.zeros(self._design.model.e.shape[1]) if dv is None else dv
         self._commit_what_is_due()
-        applied = self._op[-1] if self._op else np.array(self.model.stem_start)
+        applied = self._op[-1] if self._op else self._in_force
         result = self._controller.step(pv, sp, upset, applied, preview)
         if self._unknown:
             text = "; ".join(t for t in (result.reason, self._unknown) if t)
