@@ -64,8 +64,7 @@ def test_whatever_is_put_into_a_model_it_is_read_or_refused(
 ) -> None:
     text = GOOD[:place] + junk + GOOD[place + gone :]
     try:
-        model = read_offer(text, OWN)
+        said = read_offer(text, OWN).name
     except InputError as error:
-        assert "\n" not in str(error)
-    else:
-        assert isinstance(model, LoopModel)
+        said = str(error)
+    assert "\n" not in said
