@@ -165,9 +165,14 @@ class InputPort:
         """Take samples to be ``period`` s apart by the receiver's clock."""
         self._pace.retune(period)
 
-    def number_of(self, stamp: int) -> int:
-        """Return the number of the sample that a stamp belongs to."""
-        return self._grid.number_of(stamp)
+    @property
+    def next(self) -> int:
+        """The number of the next sample."""
+        return self._grid.number + 1
+
+    def due(self, stamp: int) -> int:
+        """Return the number of the sample at a stamp, or of the next one if that is over."""
+        return self.next if self.next == 0 else max(self.next, self._grid.number_of(stamp))
 
     def stamp_of(self, number: int) -> int:
         """Return the stamp of a sample of the present run, ns."""
