@@ -393,7 +393,7 @@ def test_a_loop_model_that_is_none_does_not_end_the_controller(graph: Graph, tex
 
 
 def test_a_loop_model_swaps_at_its_valid_from(graph: Graph) -> None:
-    hand = Hand(graph)
+    hand = Hand(graph, hand_over_samples=3, offer_samples=0)
     known = (Path(__file__).parents[2] / "config" / "example1.loop.yaml").read_text()
     hand.show(1, 50.0)
     graph.spin_until(lambda: len(hand.op) == 1, "the first op")
