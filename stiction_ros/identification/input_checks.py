@@ -50,7 +50,6 @@ def require_signals(record: Record) -> None:
     Raises:
         InputError: gaps or bad samples, no valve, no output, or a constant OP or PV.
     """
-    require_whole(record)
     require_tags(record)
     require_motion(record, "op", record.op, record.valves)
     require_motion(record, "pv", record.pv, record.outputs)
@@ -65,7 +64,8 @@ def require_whole(record: Record) -> None:
 
 
 def require_tags(record: Record) -> None:
-    """Refuse a record without valves or outputs."""
+    """Refuse a record with gaps, or without valves or outputs."""
+    require_whole(record)
     if not record.valves or not record.outputs:
         raise InputError("needs at least one valve and one output", where=record.name)
 

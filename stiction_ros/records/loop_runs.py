@@ -12,6 +12,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag_runs import run_of, tell_runs
 from stiction_ros.records.loop_signals import Given, LoopSignals
+from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.records.whole import Source, Whole
 
@@ -147,6 +148,7 @@ class _Loop:
         )
         parts = whole.records(self._source, said)
         begin = first + round(parts[0].start * 1e9)
+        parts = tuple(_with_known(part, first, pv, op) for part in parts)
         moved = tuple(dataclasses.replace(p, start=first / 1e9 + p.start) for p in parts)
         return LoopRun(run.begin, run.end, begin, moved)
 
@@ -225,6 +227,27 @@ def _at(stamps: np.ndarray[Any, Any], samples: Samples, tags: tuple[str, ...]) -
     """Return the values at ``stamps``, shape (N, len(tags))."""
     rows = [[samples[stamp][tag] for tag in tags] for stamp in stamps.tolist()]
     return np.array(rows, dtype=float).reshape(len(stamps), len(tags))
+
+
+def _with_known(record: Record, first: int, pv: Samples, op: Samples) -> Record:
+    """Return the record with the one of PV and OP that is known at a sample that lacks the other.
+
+    Args:
+        record: its start counts from ``first``.
+        first: stamp of the run's first sample, ns.
+        pv, op: by stamp.
+    """
+    held = np.flatnonzero(record.quality == Quality.HELD).tolist()
+    if not held:
+        return record
+    values = {"pv": record.pv.copy(), "op": record.op.copy()}
+    tags = {"pv": record.outputs, "op": record.valves}
+    for row in held:
+        stamp = first + round((record.start + row * record.sample_time) * 1e9)
+        for signal, samples in (("pv", pv), ("op", op)):
+            if stamp in samples:
+                values[signal][row] = [samples[stamp][tag] for tag in tags[signal]]
+    return dataclasses.replace(record, pv=values["pv"], op=values["op"])
 
 
 def _latest(stamps: np.ndarray[Any, Any], known: Samples, tags: tuple[str, ...]) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,9 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.records.segment import Gap
+
+DATES = 3e8
+"""Seconds from which a time is shown as a date: 1979."""
 
 ALIKE = 0.01
 """Sample times of two parts, one over the other, that count as the same."""
@@ -40,9 +44,7 @@ def only_part(parts: Sequence[Record], where: str) -> Record:
         )
     bad = int(np.count_nonzero(parts[0].quality == Quality.BAD))
     if bad:
-        raise InputError(
-            f"has {bad} bad samples", where=where, fix="cut it there, or leave them out"
-        )
+        raise InputError(f"has {bad} bad sample{'s' * (bad > 1)}", where=where, fix="cut it there")
     return parts[0]
 
 
@@ -62,13 +64,19 @@ def longest_part(parts: Sequence[Record]) -> Record:
     total = sum(len(part) for part in parts)
     if len(found) == total:
         return found
-    begin, end = found.start, found.start + float(found.time[-1])
+    others = len(good) - 1
     note = (
-        f"only the longest good part is looked at: {begin:.9g} s to {end:.9g} s, {len(found)} of "
-        f"{total} samples; {1 - len(found) / total:.1%} of them, in {len(good) - 1} other good "
-        f"part{'s' * (len(good) != 2)} or not good, are left out"
+        f"only the longest good part is looked at: {span(found)}, {len(found)} of {total} "
+        f"samples; {1 - len(found) / total:.1%} of the samples, in {others} other good "
+        f"part{'s' * (others != 1)} or not good, are left out"
     )
     return dataclasses.replace(found, notes=(*found.notes, note))
+
+
+def span(*parts: Record) -> str:
+    """Return from when to when parts of one clock reach: ``5 s to 20 s``, or dates in UTC."""
+    first, last = parts[0], parts[-1]
+    return f"{_moment(first.start)} to {_moment(last.start + float(last.time[-1]))}"
 
 
 def joined(parts: Sequence[Record]) -> Record:
@@ -86,8 +94,9 @@ def joined(parts: Sequence[Record]) -> Record:
     kept = [part for part in parts if abs(part.sample_time / model.sample_time - 1.0) <= ALIKE]
     notes = list(dict.fromkeys(note for part in kept for note in part.notes))
     if len(kept) < len(parts):
+        other = len(parts) - len(kept)
         notes.append(
-            f"{len(parts) - len(kept)} parts with another sample time than "
+            f"{other} part{'s' * (other > 1)} with another sample time than "
             f"{model.sample_time:g} s left out"
         )
     ends = np.cumsum([len(part) for part in kept]).tolist()
@@ -109,3 +118,9 @@ def joined(parts: Sequence[Record]) -> Record:
         mask=np.concatenate([part.quality for part in kept]),
         gaps=tuple(Gap(row, part.start) for row, part in zip(ends, kept[1:], strict=False)),
     )
+
+
+def _moment(seconds: float) -> str:
+    if not DATES < seconds < 2 * 10**9:
+        return f"{seconds:.9g} s"
+    return datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC).isoformat(" ")[:23]

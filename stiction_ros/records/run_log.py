@@ -14,7 +14,7 @@ from stiction_ros.records.bag_reader import bag_source
 from stiction_ros.records.gap_log import GapLog, gap_log
 from stiction_ros.records.loop_runs import LoopRun, loop_runs
 from stiction_ros.records.loop_signals import LoopSignals, is_signal
-from stiction_ros.records.parts import joined
+from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
 from stiction_ros.records.run_events import (
     Estimate,
@@ -211,11 +211,7 @@ def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:
     notes = list(record.notes)
     for other in runs:
         if other is not run:
-            first, last = other.parts[0], other.parts[-1]
-            notes.append(
-                f"another run, {first.start:.9g} s to {last.start + float(last.time[-1]):.9g} s, "
-                f"{len(other)} samples, is left out"
-            )
+            notes.append(f"another run, {span(*other.parts)}, {len(other)} samples, is left out")
     if len(stretches) > 1:
         left_out = total - sum(map(len, kept))
         notes.append(f"{left_out} samples beyond a gap longer than the run are left out")
