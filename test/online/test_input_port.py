@@ -273,6 +273,11 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         "3-? 4-? 5-? 6-? 7-? 8-? 9+",
         {"missing": 6},
     ),
+    "a backlog that is longer than the clock says": (
+        [(2.1, "queued", k) for k in range(3, 9)] + [(2.1, "queued", 99), (2.1, "pv", 9)],
+        "3- 4- 5- 6- 7- 8- 9+",
+        {"passed over": 6, "ahead": 1},
+    ),
     "a stale one in the queue": (
         [(3, "queued", 1), (4, "queued", 3), (4, "pv", 4)],
         "3- 4+",
