@@ -274,8 +274,7 @@ class ControllerNode(ControllerInputs):
 
     def _notice(self, name: str, level: str, text: str) -> None:
         if self.noticed.notice(name, level, text):
-            log = self.get_logger()
-            (log.error if level == "error" else log.warning)(text)
+            self.get_logger().warning(text)
 
 
 def main() -> int:

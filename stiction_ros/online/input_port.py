@@ -19,6 +19,7 @@ from stiction_ros.online.signal_check import SignalCheck
 T = TypeVar("T")
 
 SECOND = 1e9
+LATEST = 2_140_000_000 * 10**9  # ns: stamps end in 2038, and those that follow must fit
 PATIENCE = 3  # samples of PV that wait for the OP in force before a run begins without
 SLACK = 3  # samples that a stamp may be further than the receiver's clock allows
 LATENESS = 0.1  # s that a PV is waited for at least
@@ -67,6 +68,9 @@ class InputPort:
         """Take in a measurement (p,), NaN for a tag that lacks; None: it has no tag of ours."""
         if pv is None:
             self.counts["wrong tags"] += 1
+            return
+        if not 0 <= stamp <= LATEST:
+            self.counts["ahead" if stamp > 0 else "stale"] += 1
             return
         self._seen["pv"] = now
         self._queue.append(_Arrived(stamp, pv))

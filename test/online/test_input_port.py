@@ -261,7 +261,12 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
     "a stale one": ([(2.5, "pv", 1), (3, "pv", 3)], "3+", {"stale": 1}),
     "stamp 0": ([(2.5, "pv", 0), (3, "pv", 3)], "3+", {"stale": 1}),
     "the same again": ([(2.5, "pv", 2), (3, "pv", 3)], "3+", {"stale": 1}),
-    "far ahead": ([(2.5, "pv", 4e9), (3, "pv", 3)], "3+", {"ahead": 1}),
+    "far ahead": ([(2.5, "pv", 2e9), (3, "pv", 3)], "3+", {"ahead": 1}),
+    "stamps that no clock shows": (
+        [(2.5, "pv", 4e9), (2.5, "pv", -1), (3, "pv", 3)],
+        "3+",
+        {"ahead": 1, "stale": 1},
+    ),
     "ahead of what the clock allows": ([(2.5, "pv", 9), (3, "pv", 3)], "3+", {"ahead": 1}),
     "a gap as long as the clock says": (
         [(9, "pv", 9)],
@@ -274,8 +279,8 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         {"stale": 1, "passed over": 1},
     ),
     "older stamps that rise": (
-        [(3 + k / 10, "pv", -90 + k) for k in TEN] + [(4, "pv", -80)],
-        "^-81+ -80+",
+        [(3 + k / 10, "pv", k / 20) for k in TEN] + [(4, "pv", 1.45)],
+        "^0.45+ 1.45+",
         {"stale": SUCCESSION, "new runs": 1},
     ),
     "older stamps with good ones between": (
