@@ -96,8 +96,9 @@ class RecorderNodeSettings(NodeSettings):
         (), "names of topics to record, beside those that regex fits", fixed=True
     )
     regex: str = setting(
-        ".*",
-        "regular expression of the full names of topics to record; empty for none",
+        "own",
+        "regular expression of the full names of topics to record; own: all in the recorder's "
+        "namespace and /clock, /diagnostics, /rosout, /parameter_events; empty for none",
         fixed=True,
     )
     exclude_regex: str = setting(
