@@ -56,6 +56,10 @@ class EstimatorNode(ManagedNode):
     def configuration(self) -> dict[str, Any]:
         return {} if self._watched is None else {"model": self._watched.to_mapping()}
 
+    def preparing(self) -> str:
+        ready = self._worker is None or self._worker.compiled
+        return "" if ready else "the fits are being compiled"
+
     def hardware(self) -> str:
         return str(self.settings.loop)
 

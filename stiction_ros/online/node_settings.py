@@ -18,7 +18,10 @@ class NodeSettings:
 
     autostart: bool = setting(True, "configure and activate without being told", fixed=True)
     wait_for: tuple[str, ...] = setting(
-        (), "nodes of this package that must be ready before this one begins", fixed=True
+        (),
+        "nodes of this package that must be ready, and topics (/pv, topic:pv) that must be "
+        "there, before this one begins",
+        fixed=True,
     )
 
 
