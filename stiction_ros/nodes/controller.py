@@ -93,6 +93,7 @@ class ControllerNode(ControllerInputs):
             result = self.live.step(sample.pv, sample.sp, sample.dv, ahead)
             self.stamp = stamp
             self._last_op = joint_state(stamp, self.model.valve_names, result.op)
+            self._last_op.header.frame_id = self.get_fully_qualified_name()
             self._op.publish(self._last_op)
             self._sample += 1
             before, self._result, self._held = self._result, result, result.reason
