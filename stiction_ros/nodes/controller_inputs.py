@@ -40,7 +40,6 @@ class ControllerInputs(ManagedNode):
         sp_qos = QoSProfile(depth=READER_QOS.depth)
         if self.settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
-        self.inlet(JointState, "op_applied", lambda _message: None, READER_QOS)
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
         self.inlet(JointState, "dv", self._on_dv, READER_QOS)
