@@ -51,7 +51,7 @@ class ControllerInputs(ManagedNode):
         if self.settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
         self._draining = False
-        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
+        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS, ("plant",))
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
         self.inlet(JointState, "dv", self._on_dv, READER_QOS)
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))

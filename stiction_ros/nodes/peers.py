@@ -153,6 +153,12 @@ class Peers:
         ]
 
 
+def publishers_of(node: Node, topic: str) -> list[str]:
+    """Return the full names of the nodes that publish a topic, as often as they do."""
+    found = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
+    return [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found]
+
+
 def _is_topic(entry: str) -> bool:
     return entry.startswith(("/", "~", TOPIC))
 
