@@ -17,6 +17,7 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.controller_inputs import ControllerInputs
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
+from stiction_ros.nodes.peers import publishers_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.background import AtOnce, Beside
 from stiction_ros.online.input_port import InputPort
@@ -251,11 +252,9 @@ class ControllerNode(ControllerInputs):
 
     def _look_at_graph(self) -> None:
         """See whether someone else commands the same valves."""
-        topic = self.resolve_topic_name("op")
-        found = self.get_publishers_info_by_topic(topic)
-        if len(found) > 1:
-            names = sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
-            self.notice("commanders", "error", f"{topic} is published by {', '.join(names)}")
+        names = publishers_of(self, "op")
+        if len(names) > 1:
+            self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")
 
 
 def main() -> int:

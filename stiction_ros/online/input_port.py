@@ -138,8 +138,11 @@ class InputPort:
         if self.rules.lockstep or not self._begun:
             return ()
         period = self._pace.period
-        due = math.floor((now - self._blind_from - max(period, LATENESS)) / period)
-        lacking = due - (self._grid.number - self._pv_number)
+        since = now - self._blind_from
+        if since < period + max(period, LATENESS):
+            return ()
+        # A PV that comes again within a period of its time is not late yet.
+        lacking = math.floor(since / period) - 1 - (self._grid.number - self._pv_number)
         if lacking <= 0:
             return ()
         skipped = max(lacking - LONGEST_GAP, 0)
