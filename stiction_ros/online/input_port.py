@@ -61,6 +61,8 @@ class InputPort:
         self._waiting = self._behind = 0
         self._pv_number, self._pv_now, self._blind_from = -1, 0.0, 0.0
         self._taken_at, self._in_time = 0.0, True
+        self._looked: float | None = None
+        self._awake = -math.inf
 
     # ---- what comes in ---------------------------------------------------------------------
 
@@ -134,12 +136,19 @@ class InputPort:
         return self._begin(now, arrived[-1])
 
     def overdue(self, now: float) -> tuple[Sample, ...]:
-        """Return samples whose PV should have come by ``now`` and has not, the last answered."""
+        """Return samples whose PV should have come by ``now`` and has not, the last answered.
+
+        To be called regularly, several times in a sample or every 20 ms.
+        """
         if self.rules.lockstep or not self._begun:
             return ()
         period = self._pace.period
+        patience = max(period, LATENESS)
+        if self._looked is not None and now - self._looked > patience:
+            self._awake = now  # the receiver itself stood still: what came may be on its way
+        self._looked = now
         since = now - self._blind_from
-        if since < period + max(period, LATENESS):
+        if since < period + patience or now - self._awake < LATENESS:
             return ()
         # A PV that comes again within a period of its time is not late yet.
         lacking = math.floor(since / period) - 1 - (self._grid.number - self._pv_number)
@@ -165,6 +174,7 @@ class InputPort:
         """
         self._queue.clear()
         self._refused.clear()
+        self._looked = None
         if not self.rules.lockstep:
             self._begun, self._waiting = False, 0
 

@@ -314,6 +314,16 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         {"blind": 2},
     ),
     "nothing comes for long": ([(6.1, "tick", 0)], "3-? 4-? 5+?", {"blind": 3}),
+    "the receiver itself stood still": (
+        [(2.1, "tick", 0), (9.1, "tick", 0), (9.15, "queued", 3), (9.15, "pv", 4)],
+        "3- 4+",
+        {"passed over": 1},
+    ),
+    "it stood still and nothing has come": (
+        [(2.1, "tick", 0), (5.1, "tick", 0), (5.15, "tick", 0), (5.25, "tick", 0)],
+        "3-? 4+?",
+        {"blind": 2},
+    ),
     "late": (
         [(4.1, "tick", 0), (4.2, "pv", 3), (4.3, "pv", 4)],
         "3+? 4+",
