@@ -29,7 +29,7 @@ _KIND_BY_PARAMETER = {"confirmations": "estimator", "horizon": "controller"}
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """One message of ``pv``, ``op``, ``sp`` or ``dv``: its stamp in ns, tags and values."""
+    """One message of a signal, such as ``pv`` or ``op_applied``: stamp in ns, tags, values."""
 
     kind: str
     stamp: int

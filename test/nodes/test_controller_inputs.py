@@ -19,6 +19,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.nodes import controller as controller_module
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.messages import joint_state, to_ns
+from stiction_ros.online.health import Noticed
 
 S = 10**9
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -59,6 +60,7 @@ class Bench:
             }
             | parameters,
         )
+        self.node.noticed = Noticed(lambda: self.clock.now)
         self.node.start()
         assert self.node.failure == ""
         self.probe = graph.plain()
@@ -86,7 +88,7 @@ class Bench:
         self.graph.spin_some(0)
         end = time.monotonic() + 10.0
         while time.monotonic() < end:
-            self.node.drain()
+            self.node.drain_signals()
             if len(self.node.port._queue) >= count:
                 return
         raise AssertionError(f"{len(self.node.port._queue)} of {count} came")
@@ -119,12 +121,14 @@ class Bench:
         """Show samples from ``first`` on, until what was noticed is over."""
         for k in range(first, first + 4):
             self.sample(k)
+            self.node.look()
 
     def status(self) -> Any:
         """Return what the node says of itself now."""
         seen = self.graph.seen["/diagnostics"]
         before = len(seen)
-        self.node._look()
+        self.node._go_on_without()
+        self.node.look()
         self.node.report()
         self.graph.spin_until(lambda: len(seen) > before, "diagnostics")
         self.graph.spin_some(5)
@@ -235,7 +239,7 @@ def test_without_pv_the_plan_goes_on_and_the_stop_is_said(bench: Bench) -> None:
     assert "no pv for" in told.message
     assert bench.stamps == [1.0, 3.0]  # of the samples that were due, the newest
     bench.clock.now += 1.0
-    bench.node._look()
+    bench.node._go_on_without()
     assert bench.stepped(4).header.frame_id == "/controller"
     bench.calm(5)
     assert bench.status().level == OK

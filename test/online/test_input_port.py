@@ -273,6 +273,11 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         "3-? 4-? 5-? 6-? 7-? 8-? 9+",
         {"missing": 6},
     ),
+    "a backlog that is longer than the clock says": (
+        [(2.1, "queued", k) for k in range(3, 9)] + [(2.1, "queued", 99), (2.1, "pv", 9)],
+        "3- 4- 5- 6- 7- 8- 9+",
+        {"passed over": 6, "ahead": 1},
+    ),
     "a stale one in the queue": (
         [(3, "queued", 1), (4, "queued", 3), (4, "pv", 4)],
         "3- 4+",
@@ -459,6 +464,18 @@ def test_a_pace_that_was_set_wrong_is_found_out() -> None:
         feed.event(k + 1, "pv", k)
     late = feed.samples[-20:]
     assert [word(sample) for sample in late] == [f"{k}+" for k in range(40, 60)]
+
+
+def test_fast_samples_are_waited_for_a_tenth_of_a_second_and_then_stepped_in_time() -> None:
+    feed = Feed(dataclasses.replace(REALTIME, step=S // 100, period=0.01))
+    for now, kind, stamp in ((0.0, "sp", 0), (0.0, "applied", 0.0), (0.01, "pv", 0.01)):
+        feed.event(now, kind, stamp)
+    feed.event(0.11, "tick", 0)
+    assert len(feed.samples) == 1
+    feed.event(0.1205, "tick", 0)
+    assert feed.words == "^0.01+ " + " ".join(f"{k / 100:g}-?" for k in range(2, 11)) + " 0.11+?"
+    feed.event(0.129, "pv", 0.12)
+    assert word(feed.samples[-1]) == "0.12+"
 
 
 def test_a_preview_is_held_against_the_range() -> None:
