@@ -27,12 +27,13 @@ class StepStatus(enum.StrEnum):
     LIMIT = "limit"  # out of iterations; a checked plan is applied
     SHIFTED = "shifted"  # the rest of an earlier plan is applied
     SUBSTITUTED = "substituted"  # the unaware controller stands in
+    FALLBACK = "fallback"  # OP goes to the safe value
     HELD = "held"  # the last applied OP is held
 
     @property
     def failed(self) -> bool:
         """Whether the formulation that is in force gave nothing usable."""
-        return self in (StepStatus.SHIFTED, StepStatus.SUBSTITUTED, StepStatus.HELD)
+        return self not in (StepStatus.SOLVED, StepStatus.UNREACHABLE, StepStatus.LIMIT)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from stiction_ros.control.controller import ControlDesign
+from stiction_ros.control.design import ControlDesign
 from stiction_ros.control.embedding import EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.observer import ObserverKind, ObserverTuning
@@ -98,8 +98,18 @@ class ControlSettings:
         0, "samples free to jump in the optimality gap of each step; 0: none", low=0, high=16
     )
     iteration_limit: int = setting(2000, "most iterations of one quadratic programme", low=1)
-    shift_limit: int = setting(5, "oldest age of a plan that is followed on, samples", low=0)
-    hold_limit: int = setting(30, "samples held before the mode becomes hold", low=0)
+    hold_after: int = setting(
+        5,
+        "samples for which the last plan is followed on when there is no other; then OP is held",
+        low=0,
+    )
+    fallback_after: int = setting(
+        0, "samples held until OP goes to fallback_op; 0 holds for ever", low=0
+    )
+    fallback_op: tuple[float, ...] = setting((0.0,), "where each OP goes then, %")
+    fallback_rate: tuple[float, ...] = setting(
+        (1.0,), "largest OP move on the way there, % per sample", low=1e-6
+    )
     hand_over_samples: int = setting(
         200, "past samples replayed into a new observer", low=1, high=100_000
     )
@@ -163,13 +173,23 @@ class ControlSettings:
             ),
             jumps=EmbeddingTuning(self.jump_price, self.jump_margin, self.least_jump_margin),
             hand_over_samples=self.hand_over_samples,
-            fallback=FallbackRule(self.shift_limit, self.hold_limit),
+            fallback=self._fallback(model),
             slip_check=self.slip_check,
             gap_samples=self.gap_samples,
             valve_names=model.valve_names,
             output_names=model.outputs,
         )
         return self._as_printed(self._with_preset(design))
+
+    def _fallback(self, model: LoopModel) -> FallbackRule:
+        m = len(model.valves)
+        if not self.fallback_after:
+            return FallbackRule(self.hold_after)
+        limits, op = self._op_limits(model), self._list("fallback_op", m)
+        if np.any(op < limits[:, 0]) or np.any(op > limits[:, 1]):
+            raise InputError("lies outside the limits of OP", where="fallback_op")
+        rate = self._list("fallback_rate", m)
+        return FallbackRule(self.hold_after, self.fallback_after, op, rate)
 
     def _with_preset(self, design: ControlDesign) -> ControlDesign:
         """Return ``design`` with the paper's Q, S, V_F and Q_ss, and its observer as printed."""

@@ -4,10 +4,12 @@ Each strategy returns a proposal or nothing; the first proposal is applied:
 
 1. ``solve``: the formulation's plan, solved to the end.
 2. ``limit``: its plan when the solver ran out of iterations, checked by the formulation.
-3. ``shift``: the next sample of an earlier plan, at most ``shift_limit`` samples old.
+3. ``shift``: the next sample of an earlier plan, at most ``hold_after`` samples old.
 4. ``unaware``: the plan of the unaware controller, where another one was in force.
-5. ``hold``: the last applied OP, at most ``hold_limit`` times in succession.
-6. ``hold_mode``: the same in mode ``hold``, until a plan is found again.
+5. ``fallback``: after ``fallback_after`` samples of holding, a ramp to a safe OP.
+6. ``hold``: the last applied OP, until a plan is found again.
+
+The mode is ``hold`` in the last two.
 """
 
 from __future__ import annotations
@@ -39,12 +41,16 @@ class FallbackRule:
     """How long a strategy may stand in.
 
     Attributes:
-        shift_limit: K, oldest age of a shifted plan, samples.
-        hold_limit: successive samples held before the mode becomes ``hold``.
+        hold_after: K, oldest age of a plan that is followed on, samples; then OP is held.
+        fallback_after: samples held until OP goes to ``fallback_op``; 0 holds for ever.
+        fallback_op: where it goes, shape (m,), %; None where it never does.
+        fallback_rate: largest move on the way there, shape (m,), % per sample.
     """
 
-    shift_limit: int = 5
-    hold_limit: int = 30
+    hold_after: int = 5
+    fallback_after: int = 0
+    fallback_op: FloatArray | None = None
+    fallback_rate: FloatArray | None = None
 
 
 class Situation:
@@ -205,37 +211,43 @@ class Unaware:
         return
 
 
-class Hold:
-    """The last applied OP, for a while."""
+class Fallback:
+    """A ramp to the safe OP, once OP was held for long enough."""
 
-    name = "hold"
+    name = "fallback"
 
-    def __init__(self, limit: int) -> None:
-        """Hold at most ``limit`` times in succession."""
-        self._limit = limit
+    def __init__(self, rule: FallbackRule) -> None:
+        """Begin to count what is held."""
+        self._rule = rule
         self._held = 0
 
     def propose(self, situation: Situation) -> Proposal | None:
-        if self._held >= self._limit:
+        rule = self._rule
+        if rule.fallback_op is None or rule.fallback_rate is None:
             return None
-        reason = f"{_trouble(situation)}; OP is held"
-        return Proposal(situation.applied, None, StepStatus.HELD, reason)
+        if not rule.fallback_after or self._held < rule.fallback_after:
+            return None
+        way = rule.fallback_op - situation.applied
+        op = situation.applied + np.clip(way, -rule.fallback_rate, rule.fallback_rate)
+        reason = f"{_trouble(situation)}; OP goes to its fallback"
+        return Proposal(op, None, StepStatus.FALLBACK, reason, mode=ControlMode.HOLD)
 
     def applied(self, proposal: Proposal, mine: bool) -> None:
-        self._held = self._held + 1 if proposal.status is StepStatus.HELD else 0
+        standing = proposal.status in (StepStatus.HELD, StepStatus.FALLBACK)
+        self._held = self._held + 1 if standing else 0
 
 
-class HoldMode:
+class Hold:
     """The last applied OP, in mode ``hold``: the end of the list."""
 
-    name = "hold_mode"
+    name = "hold"
 
     def __init__(self, asked: bool) -> None:
         """Say that this mode was ``asked`` for, or else why it came to it."""
         self._asked = asked
 
     def propose(self, situation: Situation) -> Proposal:
-        reason = "mode hold" if self._asked else f"{_trouble(situation)}; mode hold"
+        reason = "mode hold" if self._asked else f"{_trouble(situation)}; OP is held"
         return Proposal(situation.applied, None, StepStatus.HELD, reason, mode=ControlMode.HOLD)
 
     def applied(self, proposal: Proposal, mine: bool) -> None:
@@ -257,9 +269,9 @@ def strategies(
         rule: how long the strategies may stand in.
     """
     if formulation is None:
-        return (HoldMode(asked=True),)
+        return (Hold(asked=True),)
     solve = Solve(formulation)
-    found: list[Strategy] = [solve, Limit(solve), Shift(rule.shift_limit)]
+    found: list[Strategy] = [solve, Limit(solve), Shift(rule.hold_after)]
     if stand_in is not None:
         found.append(Unaware(stand_in))
-    return (*found, Hold(rule.hold_limit), HoldMode(asked=False))
+    return (*found, Fallback(rule), Hold(asked=False))

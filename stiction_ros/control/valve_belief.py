@@ -55,6 +55,10 @@ class ValveBelief:
         self._others = [] if sure else [memory for memory, _ in moved]
         return self.stem
 
+    def expected(self, op: float) -> float:
+        """Return the χ̂, %, that :meth:`step` would bring about; nothing changes."""
+        return self.form.law.step(self._memory, op, 0.0)[1]
+
     @property
     def interval(self) -> tuple[float, float]:
         """Lowest and highest stem position that OP so far allows, %."""

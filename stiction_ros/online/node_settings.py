@@ -74,9 +74,12 @@ class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
         choices=PACES,
         fixed=True,
     )
+    speed: float = setting(
+        1.0, "simulated seconds per second of realtime pace, as of the plant", low=1e-3, high=1e6
+    )
     sp_source: str = setting(
         "schedule",
-        "schedule: sp comes with every pv; external: the last sp (transient local) holds",
+        "schedule: in lockstep each pv has its own sp; external: the last (transient local) holds",
         choices=("schedule", "external"),
         fixed=True,
     )
@@ -117,8 +120,9 @@ class RecorderNodeSettings(NodeSettings):
         (), "names of topics to record, beside those that regex fits", fixed=True
     )
     regex: str = setting(
-        ".*",
-        "regular expression of the full names of topics to record; empty for none",
+        "own",
+        "regular expression of the full names of topics to record; own: all in the recorder's "
+        "namespace and /clock, /diagnostics, /rosout, /parameter_events; empty for none",
         fixed=True,
     )
     exclude_regex: str = setting(

@@ -333,6 +333,6 @@ def test_an_unknown_start_is_found_by_the_first_far_jump() -> None:
     controller = MpcController(design_for(model), ControlMode.EMBEDDING, (FRICTION,))
     loop = Loop(model, controller, FRICTION)
     loop.stem = np.array([44.0])
-    loop.run(1, np.array([25.0]))
+    loop.run(2, np.array([25.0]))
     assert np.diff(controller.stem_interval[0])[0] == pytest.approx(0.0, abs=1e-9)
     assert controller.stem == pytest.approx(loop.stem, abs=1e-9)

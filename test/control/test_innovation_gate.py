@@ -18,10 +18,23 @@ def test_one_wild_innovation_is_held_back() -> None:
     assert it.closed.tolist() == [False]
 
 
-def test_a_lasting_change_passes_after_three() -> None:
+def test_a_lasting_change_passes_after_three_in_growing_portions() -> None:
     it = gate()
     passed = [float(it.pass_on(np.array([50.0]))[0]) for _ in range(6)]
-    assert passed == [0.0, 0.0, 0.0, 50.0, 50.0, 50.0]
+    assert passed == pytest.approx([0.0, 0.0, 0.0, 2.0, 4.0, 6.0])
+
+
+def test_a_small_lasting_change_passes_whole_after_three() -> None:
+    it = gate()
+    passed = [float(it.pass_on(np.array([-2.5]))[0]) for _ in range(5)]
+    assert passed == pytest.approx([0.0, 0.0, 0.0, -2.0, -2.5])
+
+
+def test_values_just_within_the_gate_hardly_widen_it() -> None:
+    it = gate()
+    for _ in range(10):
+        it.pass_on(np.array([1.9]))
+    assert it.pass_on(np.array([3.0])).tolist() == [0.0]
 
 
 def test_wild_ones_with_a_calm_one_between_do_not_add_up() -> None:

@@ -40,7 +40,12 @@ class Trial:
             model, self.limits, weights_for(model, int(random.integers(2, 9))), observer
         )
         self.mode = MODES[seed % len(MODES)]
-        rule = FallbackRule(int(random.integers(0, 4)), int(random.integers(0, 4)))
+        rule = FallbackRule(
+            int(random.integers(0, 4)),
+            int(random.integers(0, 4)),
+            np.full(self.m, 50.0),
+            np.ones(self.m),
+        )
         design = dataclasses.replace(design, fallback=rule)
         self.controller = MpcController(design, self.mode, self.frictions(), self.spreads())
         self.applied = random.uniform(self.low, self.high, self.m)
@@ -88,13 +93,15 @@ def check(trial: Trial, result: StepResult) -> None:
     assert np.isfinite(result.op).all()
     assert np.all((result.op >= trial.low) & (result.op <= trial.high))
     held = result.status is StepStatus.HELD
-    assert held == (result.plan is None) == (result.strategy in ("hold", "hold_mode"))
+    assert held == (result.strategy == "hold")
+    assert (result.status is StepStatus.FALLBACK) == (result.strategy == "fallback")
+    assert (result.plan is None) == (result.strategy in ("hold", "fallback"))
     assert (result.status is StepStatus.SHIFTED) == (result.strategy == "shift")
     assert (result.status is StepStatus.SUBSTITUTED) == (result.strategy == "unaware")
     assert (result.status is StepStatus.LIMIT) == (result.strategy == "limit")
     assert (result.age > 0) == (result.status is StepStatus.SHIFTED)
     assert result.reason or result.status is StepStatus.SOLVED
-    assert (result.mode is ControlMode.HOLD) == (result.strategy == "hold_mode")
+    assert (result.mode is ControlMode.HOLD) == (result.strategy in ("hold", "fallback"))
     if result.strategy == "solve":
         assert (result.status is StepStatus.UNREACHABLE) == bool(result.miss.any())
         assert result.plan is not None

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,14 +35,14 @@ class Switched:
         )
 
 
-def design(**rule: int) -> ControlDesign:
+def design(**rule: Any) -> ControlDesign:
     model = first_order()
     made = design_of(model, limits_for(model, 10.0, 90.0), weights_for(model, 8), kalman(1))
     return dataclasses.replace(made, fallback=FallbackRule(**rule))
 
 
 def controller(
-    mine: Switched, standing_in: Switched | None, mode: ControlMode, **rule: int
+    mine: Switched, standing_in: Switched | None, mode: ControlMode, **rule: Any
 ) -> MpcController:
     """A controller whose formulation and stand-in are these."""
     frictions = (FRICTION,) if mode is ControlMode.EMBEDDING else (None,)
@@ -71,7 +72,7 @@ def test_an_unfinished_plan_is_said_to_be_one() -> None:
 
 def test_a_lost_solution_is_followed_by_the_rest_of_the_last_plan() -> None:
     mine = Switched([55.0, 56.0, 57.0, 58.0, 59.0, 60.0, 61.0, 62.0])
-    it = controller(mine, None, ControlMode.UNAWARE, shift_limit=3)
+    it = controller(mine, None, ControlMode.UNAWARE, hold_after=3)
     step(it, 50.0)
     mine.works = False
     results = [step(it, 70.0) for _ in range(4)]
@@ -83,7 +84,7 @@ def test_a_lost_solution_is_followed_by_the_rest_of_the_last_plan() -> None:
 
 def test_a_plan_is_not_followed_beyond_its_end() -> None:
     mine = Switched([55.0, 56.0])
-    it = controller(mine, None, ControlMode.UNAWARE, shift_limit=9)
+    it = controller(mine, None, ControlMode.UNAWARE, hold_after=9)
     step(it, 50.0)
     mine.works = False
     assert [step(it, 70.0).strategy for _ in range(3)] == ["shift", "hold", "hold"]
@@ -101,7 +102,7 @@ def test_a_shifted_jump_is_the_op_that_makes_it() -> None:
 
 def test_then_the_unaware_controller_stands_in() -> None:
     mine, other = Switched([55.0] * 8), Switched([44.0] * 8)
-    it = controller(mine, other, ControlMode.EMBEDDING, shift_limit=1)
+    it = controller(mine, other, ControlMode.EMBEDDING, hold_after=1)
     step(it, 50.0)
     mine.works = False
     assert step(it, 55.0).strategy == "shift"
@@ -110,13 +111,13 @@ def test_then_the_unaware_controller_stands_in() -> None:
     assert (result.mode, result.op.tolist()) == (ControlMode.UNAWARE, [44.0])
 
 
-def test_then_op_is_held_and_at_last_the_mode_is_hold() -> None:
+def test_then_op_is_held_in_mode_hold() -> None:
     mine, other = Switched([55.0] * 8), Switched([44.0] * 8)
     mine.works = other.works = False
-    it = controller(mine, other, ControlMode.EMBEDDING, hold_limit=2)
-    results = [step(it, 47.0) for _ in range(4)]
-    assert [r.strategy for r in results] == ["hold", "hold", "hold_mode", "hold_mode"]
-    assert [r.mode.value for r in results] == ["embedding", "embedding", "hold", "hold"]
+    it = controller(mine, other, ControlMode.EMBEDDING)
+    results = [step(it, 47.0) for _ in range(40)]
+    assert {r.strategy for r in results} == {"hold"}
+    assert {r.mode for r in results} == {ControlMode.HOLD}
     assert {r.status for r in results} == {StepStatus.HELD}
     assert all(r.op.tolist() == [47.0] and r.plan is None for r in results)
     assert "no plan found" in results[-1].reason
@@ -125,12 +126,53 @@ def test_then_op_is_held_and_at_last_the_mode_is_hold() -> None:
 def test_a_plan_that_is_found_again_ends_the_hold() -> None:
     mine = Switched([55.0] * 8)
     mine.works = False
-    it = controller(mine, None, ControlMode.UNAWARE, hold_limit=1)
-    assert [step(it, 47.0).strategy for _ in range(2)] == ["hold", "hold_mode"]
+    it = controller(mine, None, ControlMode.UNAWARE)
+    assert step(it, 47.0).strategy == "hold"
     mine.works = True
     assert step(it, 47.0).strategy == "solve"
     mine.works = False
     assert [step(it, 47.0).strategy for _ in range(6)] == ["shift"] * 5 + ["hold"]
+
+
+def fallback(after: int) -> dict[str, Any]:
+    return {
+        "hold_after": 1,
+        "fallback_after": after,
+        "fallback_op": np.array([45.0]),
+        "fallback_rate": np.array([2.0]),
+    }
+
+
+def test_what_is_held_for_long_goes_to_its_fallback_in_steps() -> None:
+    mine = Switched([50.0] * 8)
+    it = controller(mine, None, ControlMode.UNAWARE, **fallback(3))
+    op = [float(step(it, 50.0).op[0])]
+    mine.works = False
+    results = []
+    for _ in range(9):
+        results.append(step(it, op[-1]))
+        op.append(float(results[-1].op[0]))
+    assert [r.strategy for r in results] == ["shift"] + ["hold"] * 3 + ["fallback"] * 5
+    assert op == [50.0] * 5 + [48.0, 46.0, 45.0, 45.0, 45.0]
+    assert {r.status for r in results[4:]} == {StepStatus.FALLBACK}
+    assert {r.mode for r in results[1:]} == {ControlMode.HOLD}
+    assert "fallback" in results[-1].reason
+
+
+def test_a_mode_that_was_asked_for_never_falls_back() -> None:
+    made = MpcController(design(**fallback(1)), ControlMode.HOLD, (None,))
+    assert {step(made, 47.0).strategy for _ in range(9)} == {"hold"}
+
+
+def test_a_plan_that_is_found_again_ends_the_fallback() -> None:
+    mine = Switched([50.0] * 8)
+    it = controller(mine, None, ControlMode.UNAWARE, **fallback(1))
+    mine.works = False
+    assert [step(it, 50.0).strategy for _ in range(2)] == ["hold", "fallback"]
+    mine.works = True
+    assert step(it, 48.0).strategy == "solve"
+    mine.works = False
+    assert [step(it, 48.0).strategy for _ in range(2)] == ["shift", "hold"]
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -150,11 +192,11 @@ def test_a_held_op_is_cut_to_the_limits() -> None:
 def test_the_order_is_the_documented_one() -> None:
     mine = Switched([50.0])
     names = [s.name for s in strategies(mine, mine, FallbackRule())]
-    assert names == ["solve", "limit", "shift", "unaware", "hold", "hold_mode"]
+    assert names == ["solve", "limit", "shift", "unaware", "fallback", "hold"]
     assert [s.name for s in strategies(mine, None, FallbackRule())] == [
         n for n in names if n != Unaware.name
     ]
-    assert [s.name for s in strategies(None, None, FallbackRule())] == ["hold_mode"]
+    assert [s.name for s in strategies(None, None, FallbackRule())] == ["hold"]
 
 
 def test_out_of_iterations_the_unaware_plan_is_checked() -> None:
