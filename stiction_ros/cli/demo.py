@@ -73,8 +73,8 @@ def _run_scenario(
     seed = scenario.seed if options.seed is None else options.seed
     nodes["plant"]["seed"] = seed
     if options.speed is not None:
-        nodes["plant"].update(pace="realtime", speed=options.speed)
-        nodes["controller"]["pace"] = "realtime"
+        for name_of_node in ("plant", "controller", "estimator"):
+            nodes[name_of_node].update(pace="realtime", speed=options.speed)
     processes = NodeProcesses(nodes, directory)
     begin = time.monotonic()
     try:
@@ -122,6 +122,9 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
             cells = ["–" if value is None else f"{value:.4g}" for value in values]
             table.add_row(output, key, *cells)
     console.print(table)
+    if summary["pv_to_op_ms"]:
+        times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
+        console.print(f"{name}: PV to OP in ms: {times}")
     for topic, count in summary["messages"].items():
         # The recorder cannot hold its own last message.
         lost = (count["published"] or 0) - count["recorded"] - (topic == "/diagnostics")
