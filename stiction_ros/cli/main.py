@@ -18,6 +18,7 @@ from stiction_ros.cli import (
     demo,
     example,
     experiment,
+    faults,
     fit_linear,
     gap,
     identify,
@@ -46,6 +47,7 @@ COMMANDS = (
     study,
     study_control,
     study_monitor,
+    faults,
     bench,
 )
 
