@@ -9,7 +9,7 @@ from typing import Any
 
 from stiction_ros.cli.identify import add_columns, columns
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag_reader import read_bag
+from stiction_ros.records.bag_reader import read_bag_parts
 from stiction_ros.records.csv_file import CsvColumns, read_csv_parts
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.open_record import is_bag
@@ -24,7 +24,8 @@ def add(commands: Any) -> None:
         help="convert a record between CSV and bag",
         description="Write a record in another form: OUT ending in .csv becomes a CSV file, "
         "anything else a rosbag2 directory. Slightly irregular samples are brought onto a "
-        "regular grid; a file with gaps becomes OUT_1, OUT_2 and so on. What was done is told.",
+        "regular grid; a record with gaps, or of several runs, becomes OUT_1, OUT_2 and so on. "
+        "What was done is told.",
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     parser.add_argument("out", metavar="OUT", help="F.csv, or the directory of a new bag")
@@ -66,4 +67,4 @@ def _read(options: argparse.Namespace) -> tuple[Record, ...]:
             where=str(options.record),
             fix="leave --op, --pv, --sp, --stem and --time out",
         )
-    return (read_bag(options.record, namespace=options.namespace),)
+    return read_bag_parts(options.record, namespace=options.namespace)

@@ -59,7 +59,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record = opened(options)
+    record, _ = opened(options)
     settings = LinearOptions(
         kind=LinearKind(options.kind),
         order=options.order,

@@ -17,7 +17,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import METHODS, Identification, IdentificationOptions, identify
 from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.csv_file import CsvColumns
-from stiction_ros.records.open_record import open_record
+from stiction_ros.records.open_record import open_parts
+from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 
 
@@ -27,7 +28,8 @@ def add(commands: Any) -> None:
         "identify",
         help="identify friction and process from a record",
         description="Identify the friction of every valve and the process behind it from "
-        "controller output and measurement, and say which valve sticks.",
+        "controller output and measurement, and say which valve sticks. Of a record with gaps "
+        "or of several runs the longest good part is taken.",
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     add_columns(parser)
@@ -88,9 +90,10 @@ def columns(options: argparse.Namespace) -> CsvColumns:
     return CsvColumns(**chosen)
 
 
-def opened(options: argparse.Namespace) -> Record:
-    """Return the record that the command line names."""
-    return open_record(options.record, columns(options), namespace=options.namespace)
+def opened(options: argparse.Namespace) -> tuple[Record, tuple[Record, ...]]:
+    """Return the longest good part of the record that the command line names, and all parts."""
+    parts = open_parts(options.record, columns(options), namespace=options.namespace)
+    return longest_part(parts), parts
 
 
 def delay_range(text: str) -> tuple[int, int]:
@@ -104,7 +107,7 @@ def delay_range(text: str) -> tuple[int, int]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record = opened(options)
+    record, parts = opened(options)
     settings = IdentificationOptions(
         method=options.method,
         output_order=options.na,
@@ -128,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"cannot be made ({error.strerror})", where=options.out) from None
-        page = report_record(record, found, directory)
+        page = report_record(record, found, directory, parts)
         print(f"report: {page}", file=sys.stderr)
     return 0
 

@@ -47,8 +47,9 @@ def run(options: argparse.Namespace) -> int:
         if is_bag(options.record) and holds_live_run(options.record):
             print(report_run(options.record, out, namespace=options.namespace).page)
         else:
-            record = opened(options)
-            print(report_record(record, identify(record, IdentificationOptions()), out))
+            record, parts = opened(options)
+            found = identify(record, IdentificationOptions())
+            print(report_record(record, found, out, parts))
     except OSError as error:
         raise InputError(
             f"cannot be written ({error.strerror})", where=str(out), fix="choose another --out"

@@ -1,6 +1,7 @@
 """Model predictive control of loops whose valves may stick."""
 
-from stiction_ros.control.controller import ControlDesign, History, MpcController
+from stiction_ros.control.controller import MpcController
+from stiction_ros.control.design import ControlDesign, History
 from stiction_ros.control.jump_form import FrictionSpread
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
 from stiction_ros.control.settings import ControlSettings

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.control.certificate import CertificateStatus, certify
-from stiction_ros.control.embedding import EmbeddingMpc, EmbeddingTuning
-from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.design import ControlDesign, History
+from stiction_ros.control.embedding import EmbeddingMpc
 from stiction_ros.control.inversion import InversionMpc
-from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
-from stiction_ros.control.observer import Observer, ObserverTuning
-from stiction_ros.control.paper_weights import PaperTuning
+from stiction_ros.control.jump_form import FrictionSpread
+from stiction_ros.control.observer import Observer
 from stiction_ros.control.printed_embedding import PrintedEmbeddingMpc
 from stiction_ros.control.printed_inversion import InvertedPlan, PrintedInversionMpc
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
 from stiction_ros.control.slip_check import SlipCheck
 from stiction_ros.control.strategies import (
-    FallbackRule,
     Formulation,
     Proposal,
     Situation,
@@ -28,53 +25,8 @@ from stiction_ros.control.strategies import (
 )
 from stiction_ros.control.target import Target, TargetSelector
 from stiction_ros.control.unaware import UnawareMpc
-from stiction_ros.control.valve_belief import ValveBelief
+from stiction_ros.control.valve_beliefs import ValveBeliefs
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
-from stiction_ros.processes import LinearModel
-
-
-@dataclasses.dataclass(frozen=True)
-class ControlDesign:
-    """Everything a controller is built from, apart from the friction.
-
-    Attributes:
-        model: the process.
-        limits: bounds; outputs are soft.
-        unaware, embedding: weights of (19a) for either formulation.
-        target_weights: Q_ss, shape (p,).
-        observer: observer tuning.
-        jumps: how sticky valves are moved.
-        hand_over_samples: past samples replayed into the observer of a new controller.
-        fallback: how long a strategy other than the first may stand in.
-        slip_check: whether jumps are watched by a second observer.
-        gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
-        valve_names, output_names: for messages; numbers stand in where empty.
-        paper: the paper's own embedding and inversion; None for those of this package.
-    """
-
-    model: LinearModel
-    limits: HorizonLimits
-    unaware: HorizonWeights
-    embedding: HorizonWeights
-    target_weights: FloatArray
-    observer: ObserverTuning
-    jumps: EmbeddingTuning = EmbeddingTuning()
-    hand_over_samples: int = 200
-    fallback: FallbackRule = FallbackRule()
-    slip_check: bool = True
-    gap_samples: int = 0
-    valve_names: tuple[str, ...] = ()
-    output_names: tuple[str, ...] = ()
-    paper: PaperTuning | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class History:
-    """Past samples in order: OP (K, m), PV (K, p), measured disturbances (K, d)."""
-
-    op: FloatArray
-    pv: FloatArray
-    dv: FloatArray
 
 
 class MpcController:
@@ -108,10 +60,7 @@ class MpcController:
         aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION) and frictions is not None
         known = tuple(frictions or ()) if aware else (None,) * m
         widths = tuple(spreads or (None,) * m)
-        self.valves = tuple(
-            None if law is None else ValveBelief(jump_form(law), width)
-            for law, width in zip(known, widths, strict=True)
-        )
+        self.valves = ValveBeliefs(known, widths, design.limits.stem)
         self.observer = Observer(design.model, design.observer)
         self.stem: FloatArray = np.array(design.model.stem0)
         self.raised = ""
@@ -143,26 +92,17 @@ class MpcController:
     @property
     def frictions(self) -> tuple[Behaviour | None, ...]:
         """Friction believed in now, per valve; None for those taken to be healthy."""
-        return tuple(None if belief is None else belief.form.law for belief in self.valves)
+        return self.valves.frictions
 
     @property
     def spreads(self) -> tuple[FrictionSpread | None, ...]:
         """Half-widths of the intervals of the frictions, per valve, None where unknown."""
-        return tuple(None if belief is None else belief.spread for belief in self.valves)
-
-    @property
-    def forms(self) -> tuple[JumpForm | None, ...]:
-        """Jump forms of the valves, None for those taken to be healthy."""
-        return tuple(None if belief is None else belief.form for belief in self.valves)
+        return self.valves.spreads
 
     @property
     def stem_interval(self) -> FloatArray:
         """Lowest and highest stem position that the past OP allows, shape (m, 2), %."""
-        interval = np.column_stack([self.stem, self.stem])
-        for j, belief in enumerate(self.valves):
-            if belief is not None:
-                interval[j] = belief.interval
-        return interval
+        return self.valves.intervals(self.stem)
 
     def start(self, op: FloatArray, pv: FloatArray) -> None:
         """Start from rest at the applied ``op`` (m,) and the outputs ``pv`` (p,).
@@ -170,9 +110,7 @@ class MpcController:
         The stem of a sticky valve may then be anywhere within f_S of OP.
         """
         self.stem = np.array(op, dtype=float)
-        for j, belief in enumerate(self.valves):
-            if belief is not None:
-                belief.start(float(op[j]), *self.design.limits.stem[j].tolist())
+        self.valves.start(op)
         self.observer.rest(self.stem, pv)
         self._started, self._decided = True, None
 
@@ -182,55 +120,53 @@ class MpcController:
         if self._check is not None:
             self._check.drop()
 
-    def take_over(self, history: History) -> float:
+    def take_over(self, history: History, samples: int | None = None, skip: int = 0) -> float:
         """Take over from another controller of the same loop without a stop.
 
         The valve models are replayed over the whole past OP, which finds the stem exactly
         after one move that slips wherever the stem was before; the observer is restarted on
-        the last ``hand_over_samples`` with these stems as its input.
+        the last samples with these stems as its input.
+
+        Args:
+            history: what was applied and measured, one sample at least.
+            samples: how many the observer takes; None for ``hand_over_samples``.
+            skip: how many of these are left out of what is returned, while the observer settles.
 
         Returns:
             How badly valves and process explain these samples: the mean square of the
             innovations, each in standard deviations of the measurement noise.
         """
-        first = max(len(history.op) - self.design.hand_over_samples, 0)
-        begin = history.op[0]
-        for j, belief in enumerate(self.valves):
-            if belief is not None:
-                belief.start(float(begin[j]), *self.design.limits.stem[j].tolist())
-        stem = begin
+        count = self.design.hand_over_samples if samples is None else samples
+        first = max(len(history.op) - count, 0)
+        stem = history.op[0]
+        self.valves.start(stem)
         for row in history.op[: first + 1]:
-            stem = self._stems(row)
-        self.observer.rest(stem, history.pv[first])
-        misfit = self._follow(history, first, stem)
+            stem = self.valves.step(row)
+        known = history.pv[first:][np.isfinite(history.pv[first:]).all(axis=1)]
+        self.observer.rest(stem, known[0] if len(known) else self.design.model.pv0)
+        misfit = self._follow(history, first, stem, first + skip)
         self._started, self._decided = True, None
         return misfit
 
     def follow(self, history: History) -> None:
         """Go on behind :meth:`take_over` over the samples since then, all of them answered."""
         if len(history.op):
-            self._follow(history, 0, self._stems(history.op[0]))
+            self._follow(history, 0, self.valves.step(history.op[0]))
 
-    def _follow(self, history: History, first: int, stem: FloatArray) -> float:
+    def _follow(self, history: History, first: int, stem: FloatArray, count_from: int = 0) -> float:
         """Take in the samples from ``first`` on, whose stems are ``stem``; as take_over."""
-        total = 0.0
+        total, counted = 0.0, 0
         for k in range(first, len(history.op)):
             if k > first:
-                stem = self._stems(history.op[k])
-            self.observer.correct(history.pv[k])
-            scaled = self.observer.innovation**2 / self.design.observer.measurement_noise
-            total += float(scaled.mean())
+                stem = self.valves.step(history.op[k])
+            if np.isfinite(history.pv[k]).all():
+                self.observer.correct(history.pv[k])
+                if k >= count_from:
+                    scaled = self.observer.innovation**2 / self.design.observer.measurement_noise
+                    total, counted = total + float(scaled.mean()), counted + 1
             self.observer.predict(stem, history.dv[k])
         self.stem = stem
-        return total / max(len(history.op) - first, 1)
-
-    def _stems(self, op: FloatArray) -> FloatArray:
-        """Move the valves on by one sample of ``op`` (m,) and return their stems, (m,), %."""
-        stem = np.array(op, dtype=float)
-        for j, belief in enumerate(self.valves):
-            if belief is not None:
-                stem[j] = belief.step(float(op[j]))
-        return stem
+        return total / max(counted, 1)
 
     def step(
         self,
@@ -290,7 +226,9 @@ class MpcController:
         if not trouble and self._formulation is not None:
             target = self._select(sp, preview)
             trouble = "" if target is not None else "no steady state within the limits"
-        situation = Situation(self.observer.state, target, self.stem, applied, self.forms, trouble)
+        situation = Situation(
+            self.observer.state, target, self.stem, applied, self.valves.forms, trouble
+        )
         proposal, strategy = self._choose(situation)
         op = applied if keep else self._valid(proposal.op, applied)
         self._decide(op, proposal.plan)
@@ -344,9 +282,9 @@ class MpcController:
     def _select(self, sp: FloatArray, preview: FloatArray | None) -> Target | None:
         formulation = self._formulation
         if isinstance(formulation, InversionMpc):
-            formulation.forms = self.forms
+            formulation.forms = self.valves.forms
         if isinstance(formulation, EmbeddingMpc):
-            formulation.know(self.forms, self.spreads, self.stem_interval)
+            formulation.know(self.valves.forms, self.spreads, self.stem_interval)
             limits = self.design.limits.stem.copy()
             for j in formulation.immobile:
                 limits[j] = self.stem[j]
@@ -381,11 +319,10 @@ class MpcController:
         if not self._started:
             return
         self._decided = op, plan
-        stem = op.copy()
-        for j, belief in enumerate(self.valves):
-            if belief is not None:
-                stem[j] = belief.expected(float(op[j]))
-        self.stem = plan.process_input if isinstance(plan, InvertedPlan) else stem
+        if isinstance(plan, InvertedPlan):
+            self.stem = plan.process_input
+        else:
+            self.stem = self.valves.expected(op)
 
     def _advance(self, applied: FloatArray, known: bool) -> None:
         """Move valves and observer over the sample that has passed, by what was ``applied``."""
@@ -397,10 +334,9 @@ class MpcController:
         if check is not None:
             if not known:
                 check.drop()
-            for j, belief in enumerate(self.valves):
-                if belief is not None and known:
-                    check.begin(j, self.observer, belief, float(applied[j]))
-        stem = self._stems(applied)
+            for j, belief in self.valves.sticky if known else ():
+                check.begin(j, self.observer, belief, float(applied[j]))
+        stem = self.valves.step(applied)
         if isinstance(plan, InvertedPlan) and np.array_equal(applied, decided):
             stem = plan.process_input
         self.stem = stem

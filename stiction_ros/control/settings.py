@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from stiction_ros.control.controller import ControlDesign
+from stiction_ros.control.design import ControlDesign
 from stiction_ros.control.embedding import EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
 from stiction_ros.control.observer import ObserverKind, ObserverTuning

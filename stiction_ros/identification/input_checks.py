@@ -25,6 +25,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 
 TOO_SHORT = "take a longer record, lower orders or a narrower delay range"
@@ -44,18 +45,27 @@ SIDES = 100.0  # how much closer to zero the coefficients of one side must add u
 
 
 def require_signals(record: Record) -> None:
-    """Refuse a record without valves or outputs, or with a signal that never moves.
+    """Refuse a record with gaps, without valves or outputs, or with a signal that never moves.
 
     Raises:
-        InputError: no valve, no output, or a constant OP or PV.
+        InputError: gaps or bad samples, no valve, no output, or a constant OP or PV.
     """
     require_tags(record)
     require_motion(record, "op", record.op, record.valves)
     require_motion(record, "pv", record.pv, record.outputs)
 
 
+def require_whole(record: Record) -> None:
+    """Refuse a record with gaps or bad samples."""
+    if record.gaps or (record.quality == Quality.BAD).any():
+        raise InputError(
+            "has gaps or bad samples", where=record.name, fix="take one of its good parts"
+        )
+
+
 def require_tags(record: Record) -> None:
-    """Refuse a record without valves or outputs."""
+    """Refuse a record with gaps, or without valves or outputs."""
+    require_whole(record)
     if not record.valves or not record.outputs:
         raise InputError("needs at least one valve and one output", where=record.name)
 

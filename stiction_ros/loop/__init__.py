@@ -10,6 +10,7 @@ from stiction_ros.loop.excitation import prbs_experiment, random_binary, simulat
 from stiction_ros.loop.model import Disturbance, LoopModel, PiTuning, Valve
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
+from stiction_ros.loop.valve_changes import ValveChange, read_valve_changes
 
 __all__ = [
     "ClosedLoopRun",
@@ -22,8 +23,10 @@ __all__ = [
     "Plant",
     "SetPoints",
     "Valve",
+    "ValveChange",
     "prbs_experiment",
     "random_binary",
+    "read_valve_changes",
     "simulate_closed_loop",
     "simulate_open_loop",
 ]

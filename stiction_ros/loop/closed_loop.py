@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +12,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop.model import LoopModel, PiTuning
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
+from stiction_ros.loop.valve_changes import ValveChange
 from stiction_ros.records import Record
 
 
@@ -43,6 +44,7 @@ def simulate_closed_loop(
     samples: int,
     seed: int,
     progress: Callable[[int], None] | None = None,
+    valve_changes: Sequence[ValveChange] = (),
 ) -> ClosedLoopRun:
     """Run ``controller`` on the plant of ``model`` for ``samples`` samples.
 
@@ -53,8 +55,9 @@ def simulate_closed_loop(
         samples: number N of samples.
         seed: of the plant's noise.
         progress: called with the number of samples done, about a hundred times.
+        valve_changes: valves that change in mid-run, in the order of their times.
     """
-    plant = Plant(model, seed)
+    plant = Plant(model, seed, valve_changes)
     m, p = len(model.valves), len(model.outputs)
     op, stem = np.empty((samples, m)), np.empty((samples, m))
     pv, sp, clean = (np.empty((samples, p)) for _ in range(3))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.effects import Behaviour, DrivenByNoise, FloatArray, Memory
 from stiction_ros.loop.model import LoopModel
+from stiction_ros.loop.valve_changes import ValveChange
 from stiction_ros.processes import NoiseEntry
 
 
@@ -57,12 +59,18 @@ class Plant:
     noise does not depend on what is applied.
     """
 
-    def __init__(self, model: LoopModel, seed: int) -> None:
-        """Start at rest at the model's initial stem positions and outputs."""
+    def __init__(
+        self, model: LoopModel, seed: int, valve_changes: Sequence[ValveChange] = ()
+    ) -> None:
+        """Start at rest at the model's initial stem positions and outputs.
+
+        Valves change as ``valve_changes`` says, in the order of their times.
+        """
         self.model = model
         process = model.process
         self._random = np.random.default_rng(seed)
-        random_effects = np.random.default_rng([seed, 1])
+        self._random_effects = random_effects = np.random.default_rng([seed, 1])
+        self._changes = list(valve_changes)
         self._limits = model.limits.tolist()
         self._valves = [
             _Chain(valve.effects, float(start), random_effects)
@@ -78,6 +86,7 @@ class Plant:
         self._measurement_std = process.noise_std(NoiseEntry.MEASUREMENT)
         self._equation_std = process.noise_std(NoiseEntry.EQUATION)
         self._state = process.rest(model.stem_start, model.pv_start)
+        self._stem = np.array(model.stem_start, dtype=float)
         self._measured = [process.upsets.index(n) for n in process.measured_disturbances]
         self.sample = 0
         self._now = self._look()
@@ -92,15 +101,23 @@ class Plant:
         OP and stems are kept within the valves' limits.
         """
         time = self._now.time
+        self._change_valves(time)
         stem = np.empty(len(self._valves))
         for j, (chain, (low, high)) in enumerate(zip(self._valves, self._limits, strict=True)):
             asked = min(max(float(op[j]), low), high)
             stem[j] = min(max(chain.step(asked, time), low), high)
         noise = self._equation_std * self._random.standard_normal(len(self._equation_std))
         self._state = self.model.process.advance(self._state, stem, self._upset, noise)
+        self._stem = stem
         self.sample += 1
         self._now = self._look()
         return stem
+
+    def _change_valves(self, time: float) -> None:
+        while self._changes and self._changes[0].time <= time + 1e-9:
+            change = self._changes.pop(0)
+            j = self.model.valve_names.index(change.valve)
+            self._valves[j] = _Chain(change.effects, float(self._stem[j]), self._random_effects)
 
     def _look(self) -> Measurement:
         process = self.model.process

@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.loop import LoopModel, Plant, SetPoints
+from stiction_ros.loop import LoopModel, Plant, SetPoints, read_valve_changes
 from stiction_ros.nodes.managed import READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, values_of
 from stiction_ros.nodes.runner import run
@@ -36,7 +36,10 @@ class PlantNode(ManagedNode):
         if settings.set_points:
             path = find_config(settings.set_points)
             self.schedule = SetPoints.load(path, self.model.outputs)
-        self.plant = Plant(self.model, settings.seed)
+        changes = read_valve_changes(
+            settings.valve_changes, self.model.valve_names, "plant: valve_changes"
+        )
+        self.plant = Plant(self.model, settings.seed, changes)
         self._op = np.array(self.model.stem_start)
         self._step = round(self.model.sample_time * SECOND)
         self._start = round(settings.start_time * SECOND)

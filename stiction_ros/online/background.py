@@ -10,7 +10,13 @@ T = TypeVar("T")
 
 
 class Background(Protocol):
-    """Runs what would make a step long: reading a model, building and judging a controller."""
+    """Runs what would make a step long: reading a model, building and judging a controller.
+
+    Attributes:
+        ahead: whether work is begun as soon as it is known, or when its result is due.
+    """
+
+    ahead: bool
 
     def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
         """Return a future of ``work(*arguments)``; it may hold what the work raised."""
@@ -23,6 +29,8 @@ class Background(Protocol):
 
 class AtOnce:
     """Does the work within the call, so that a run in lockstep does not depend on speed."""
+
+    ahead = False
 
     def submit(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
         future: Future[T] = Future()
@@ -38,6 +46,8 @@ class AtOnce:
 
 class Beside:
     """Does the work in one thread, in order, while the loop goes on."""
+
+    ahead = True
 
     def __init__(self) -> None:
         """Start without work."""

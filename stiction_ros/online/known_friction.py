@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stiction_ros.control import FrictionSpread
 from stiction_ros.effects.behaviour import Behaviour
 from stiction_ros.loop import LoopModel
+
+ALIKE = 0.02  # share by which two estimates of one friction may differ
 
 
 def frictions_of(model: LoopModel, valves: tuple[str, ...]) -> tuple[Behaviour | None, ...]:
@@ -33,6 +36,36 @@ def spreads_of(model: LoopModel, valves: tuple[str, ...]) -> tuple[FrictionSprea
         if friction is not None and entry.get("effect") == "stiction":
             found[str(entry["valve"])] = _spread(friction, entry)
     return tuple(found.get(name) for name in valves)
+
+
+def alike(
+    one: Sequence[Behaviour | None], other: Sequence[Behaviour | None], share: float = ALIKE
+) -> bool:
+    """Whether two sets of frictions are of the same laws, and all parameters within ``share``.
+
+    The share is that of the law's largest parameter.
+    """
+    for a, b in zip(one, other, strict=True):
+        if type(a) is not type(b):
+            return False
+        if a is None or b is None:
+            continue
+        names = [entry.attribute for entry in a.parameters()]
+        x, y = ([abs(getattr(law, name)) for name in names] for law in (a, b))
+        off = max(abs(p - q) for p, q in zip(x, y, strict=True))
+        if off > share * max(*x, *y):
+            return False
+    return True
+
+
+def scaled(law: Behaviour, factor: float) -> Behaviour:
+    """Return ``law`` with all its parameters in % ``factor`` times as large."""
+    sizes = {
+        entry.attribute: factor * getattr(law, entry.attribute)
+        for entry in law.parameters()
+        if entry.unit == "%"
+    }
+    return dataclasses.replace(law, **sizes)
 
 
 def _spread(friction: Behaviour, entry: Mapping[str, Any]) -> FrictionSpread | None:

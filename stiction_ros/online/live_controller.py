@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,21 +13,24 @@ from stiction_ros.control import (
     ControlDesign,
     ControlMode,
     ControlSettings,
-    History,
     MpcController,
     StepResult,
 )
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.known_friction import frictions_of, spreads_of
-from stiction_ros.online.offers import OfferRule, doubt
+from stiction_ros.online.background import AtOnce, Background
+from stiction_ros.online.hand_over import HandOver
+from stiction_ros.online.known_friction import alike, frictions_of, spreads_of
+from stiction_ros.online.offers import Judge, OfferRule, last_samples
+from stiction_ros.online.past import Past
 from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.online.watch import Watch, WatchRule
 from stiction_ros.settings import setting
 
 AUTO = "auto"
 HISTORY_SAMPLES = 20_000
+REMEMBERED = 20  # frictions that were rolled back
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,28 +55,28 @@ class ModeChange:
     model: str
 
 
-@dataclasses.dataclass(frozen=True)
-class _Prepared:
-    """A controller that takes over before sample ``at``, and the model whose valves it knows."""
-
-    at: int
-    controller: MpcController
-    reason: str
-    model: LoopModel
-
-
 class LiveController:
     """One controller at a time, and a prepared one that takes over between two samples.
 
-    A loop model offered by the estimator is *prepared* at once (a new controller is built,
-    which may refuse), held against the past before the sample at which it takes effect
-    (:mod:`.offers`; a doubted one is looked at again every ``fit_every`` samples), *committed*
-    (it takes over the history), then *watched*, and *rolled back* when it does worse than the
-    one before.
+    A loop model offered by the estimator is *prepared* (a new controller is built, which may
+    refuse, held against the past by :class:`.offers.Judge`, and takes the past in), beside the
+    loop where there is a thread for it; a doubted one is looked at again every ``fit_every``
+    samples. It is *committed* between two samples, then *watched*, and *rolled back* to the
+    last controller that was not on trial when it does worse than the one before.
     """
 
-    def __init__(self, settings: LiveControllerSettings, model: LoopModel) -> None:
+    def __init__(
+        self,
+        settings: LiveControllerSettings,
+        model: LoopModel,
+        background: Background | None = None,
+    ) -> None:
         """Build the first controller on ``model``, whose own valve effects are taken as known.
+
+        Args:
+            settings: of controller, trust and watch.
+            model: the loop.
+            background: does what would make a step long; None does it at once.
 
         Raises:
             InputError: settings that do not fit the model.
@@ -84,21 +89,30 @@ class LiveController:
             )
         self.settings, self.model = settings, model
         self._design: ControlDesign = settings.design(model)
+        self._background: Background = background or AtOnce()
         self._known = model
         self._watch = Watch(settings)
-        self._op: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
-        self._pv: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
-        self._dv: deque[FloatArray] = deque(maxlen=HISTORY_SAMPLES)
-        self._retuned: _Prepared | None = None
-        self._offered: _Prepared | None = None
-        self._doubted: _Prepared | None = None
+        upsets = self._design.model.e.shape[1]
+        self._past = Past(HISTORY_SAMPLES, len(model.valves), len(model.outputs), upsets)
+        self._latest: tuple[FloatArray, FloatArray, FloatArray] | None = None  # OP, PV, DV
+        self._told: tuple[FloatArray, bool] | None = None  # what the valves were given
+        self._in_force, self._sure = np.array(model.stem_start), True
+        self._keep = True
+        self._retuned: HandOver | None = None
+        self._offered: HandOver | None = None
+        self._returning: HandOver | None = None
         self._raised: tuple[Behaviour | None, ...] | None = None  # by the slip check
+        self._rolled_back: deque[tuple[Behaviour | None, ...]] = deque(maxlen=REMEMBERED)
         self._given_up = False
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
-        self._fallback = self._controller, model
+        self._proven = self._in_trust()
         self.doubts: list[tuple[int, str]] = []  # samples at which an offer was not taken, and why
         self.changes: list[ModeChange] = [ModeChange(0, self._controller.mode, "start", model.name)]
+
+    def close(self) -> None:
+        """End the work in the background."""
+        self._background.close()
 
     @property
     def mode(self) -> ControlMode:
@@ -124,41 +138,74 @@ class LiveController:
         """The controller in force, for its observer and its stem estimates."""
         return self._controller
 
-    def offer(self, model: LoopModel, at: int) -> str:
+    def begin(self, op: FloatArray) -> None:
+        """Begin a run, or begin anew, with ``op`` (m,), %, in force.
+
+        The past is forgotten, what is known of the friction stays. The first OP is ``op``.
+        """
+        self._in_force, self._sure = np.array(op, dtype=float), True
+        self._latest = self._told = None
+        self._past.clear()
+        self._keep = True
+        self._controller.forget()
+        for change in (self._retuned, self._offered, self._returning):
+            if change is not None:
+                change.put_off(change.at)
+
+    def applied(self, op: FloatArray, known: bool = True) -> None:
+        """Tell what the valves were given at the last sample, (m,), %.
+
+        Without it the OP of the last step counts. ``known`` is false where nobody can tell:
+        no slip is judged on such a sample.
+        """
+        self._told = np.array(op, dtype=float), known
+
+    def offer(self, model: LoopModel, at: int) -> None:
         """Prepare a controller that knows the valves of ``model`` from sample ``at`` on.
 
-        Returns:
-            Why nothing was prepared, or an empty text.
+        What is not taken, at ``at`` or later, is told in :attr:`doubts`.
         """
-        try:
-            self._offered = self._prepare_offer(model, at, self.settings, self._design)
-        except InputError as error:
-            return str(error)
-        self._doubted = None
-        return ""
+        self._offered = self._offer_of(model, at, self.settings, self._design)
+        self._prepare_ahead()
 
-    def _doubt(self, offered: _Prepared) -> str:
-        """Return why the past speaks against what is offered, or an empty text."""
-        now, new = self._controller, offered.controller
-        if now.frictions == new.frictions and now.design.model is new.design.model:
-            return ""
-        return doubt(self.settings, (now, new), self._history())
+    def _prepare_ahead(self) -> None:
+        """Begin with what is offered before it is due, where that costs no time here."""
+        if self._offered is not None and self._background.ahead:
+            self._offered.judge = self._judge(self._offered.model)
+            self._offered.prepare(self._background, self._past)
 
-    def _prepare_offer(
+    def _offer_of(
         self, model: LoopModel, at: int, settings: LiveControllerSettings, design: ControlDesign
-    ) -> _Prepared:
+    ) -> HandOver:
+        def make() -> MpcController:
+            return self._build(self._design_for(model, settings, design), model, settings.mode)
+
+        return HandOver(at, "friction identified", model, make)
+
+    def _judge(self, model: LoopModel) -> Judge:
+        """Return what holds an offer of ``model`` against the controller in force now."""
+        now = self._controller
+        in_force = functools.partial(
+            MpcController, now.design, now.mode, now.frictions, now.spreads
+        )
+        offered = frictions_of(model, self.model.valve_names)
+        before = any(alike(offered, one) for one in self._rolled_back)
+        return Judge(self.settings, in_force, before, last_samples(model))
+
+    def _design_for(
+        self, model: LoopModel, settings: LiveControllerSettings, design: ControlDesign
+    ) -> ControlDesign:
         for name in self.model.valve_names:
             if name not in model.valve_names:
                 raise InputError(f"says nothing of valve {name}", where=model.name)
-        if settings.adopt_process:
-            if (model.valve_names, model.outputs) != (self.model.valve_names, self.model.outputs):
-                raise InputError("is the process of another loop", where=model.name)
-            adopted = settings.design(model)
-            # What is identified knows no limits: those of the valves stay.
-            limits = dataclasses.replace(adopted.limits, stem=design.limits.stem)
-            design = dataclasses.replace(adopted, limits=limits)
-        controller = self._build(design, model, settings.mode)
-        return _Prepared(at, controller, "friction identified", model)
+        if not settings.adopt_process:
+            return design
+        if (model.valve_names, model.outputs) != (self.model.valve_names, self.model.outputs):
+            raise InputError("is the process of another loop", where=model.name)
+        adopted = settings.design(model)
+        # What is identified knows no limits: those of the valves stay.
+        limits = dataclasses.replace(adopted.limits, stem=design.limits.stem)
+        return dataclasses.replace(adopted, limits=limits)
 
     def retune(self, settings: LiveControllerSettings) -> None:
         """Change settings from the next sample on.
@@ -170,11 +217,22 @@ class LiveController:
         controller = self._build(design, self._known, settings.mode, self._raised)
         waiting = self._offered
         if waiting is not None:
-            self._offered = self._prepare_offer(waiting.model, waiting.at, settings, design)
-        self._doubted = None
+            self._offered = self._offer_of(waiting.model, waiting.at, settings, design)
         self.settings, self._design = settings, design
+        self._prepare_ahead()
         self._watch.rule = settings
-        self._retuned = _Prepared(self._sample, controller, "settings changed", self._known)
+        self._retuned = HandOver(self._sample, "settings changed", self._known, lambda: controller)
+
+    def pass_over(self, pv: FloatArray, dv: FloatArray | None = None) -> None:
+        """Take in a sample that is not answered: OP stays, the observer goes on.
+
+        PV (p,) may be NaN, which is missing; DV (d,) as for :meth:`step`.
+        """
+        self._settle()
+        upset = self._upset(dv)
+        self._controller.pass_over(pv, upset, self._in_force, known=self._sure)
+        self._latest = self._in_force, np.array(pv, dtype=float), upset
+        self._sample += 1
 
     def step(
         self,
@@ -184,16 +242,17 @@ class LiveController:
         preview: FloatArray | None = None,
     ) -> StepResult:
         """Return what to apply at the present sample; arguments as for the controller's step."""
-        upset = np.zeros(self._design.model.e.shape[1]) if dv is None else dv
+        self._settle()
+        upset = self._upset(dv)
         self._commit_what_is_due()
-        applied = self._op[-1] if self._op else np.array(self.model.stem_start)
-        result = self._controller.step(pv, sp, upset, applied, preview)
+        result = self._controller.step(
+            pv, sp, upset, self._in_force, preview, known=self._sure, keep=self._keep
+        )
         if self._unknown:
             text = "; ".join(t for t in (result.reason, self._unknown) if t)
             result = dataclasses.replace(result, reason=text)
-        self._op.append(result.op)
-        self._pv.append(np.where(np.isfinite(pv), pv, self._pv[-1] if self._pv else self.model.pv0))
-        self._dv.append(np.where(np.isfinite(upset), upset, 0.0))
+        self._keep = False
+        self._latest = result.op, np.array(pv, dtype=float), upset
         self._sample += 1
         self._tell(result)
         self._watch.add(pv, sp, result.status.failed)
@@ -201,6 +260,18 @@ class LiveController:
         if reason:
             self._roll_back(reason)
         return result
+
+    def _upset(self, dv: FloatArray | None) -> FloatArray:
+        return np.zeros(self._design.model.e.shape[1]) if dv is None else dv
+
+    def _settle(self) -> None:
+        """Remember the last sample, whose OP is known now."""
+        if self._latest is None:
+            return
+        own, pv, dv = self._latest
+        self._in_force, self._sure = (own, True) if self._told is None else self._told
+        self._latest = self._told = None
+        self._past.add(self._in_force, pv, np.where(np.isfinite(dv), dv, 0.0))
 
     def _tell(self, result: StepResult) -> None:
         """Note what the step at the sample just passed changed by itself."""
@@ -217,26 +288,47 @@ class LiveController:
         self._given_up = given_up
 
     def _commit_what_is_due(self) -> None:
-        if self._doubted is not None and self._sample % self.settings.fit_every == 0:
-            self._offered, self._doubted = self._doubted, None
-        if self._retuned is not None:
-            prepared, self._retuned = self._retuned, None
-            before = self._controller.mode
-            self._commit(prepared)
-            if self._controller.mode is not before:
-                self._watch.stop()  # a mode that the user has chosen is not judged
-        if self._offered is not None and self._offered.at <= self._sample:
-            prepared, self._offered = self._offered, None
-            speaks_against = self._doubt(prepared)
-            if speaks_against:
-                self._doubted = prepared
-                self.doubts.append((self._sample, speaks_against))
-                return
-            before_offer = self._controller, self._known
-            self._raised = None
-            self._commit(prepared)
-            self._fallback = before_offer
-            self._watch.begin()
+        self._retuned = self._commit(self._retuned, self._commit_settings)
+        self._returning = self._commit(self._returning, self._take)
+        self._offered = self._commit(self._offered, self._commit_offer)
+
+    def _commit(
+        self, change: HandOver | None, take: Callable[[HandOver, MpcController], None]
+    ) -> HandOver | None:
+        """Commit ``change`` if it is due, ready and not doubted; return what is left to do."""
+        if change is None or change.at > self._sample:
+            return change
+        if not change.begun:
+            if change is self._offered:
+                change.judge = self._judge(change.model)
+            change.prepare(self._background, self._past)
+        if not change.ready:
+            return change
+        try:
+            ready = change.take(self._past)
+        except InputError as error:
+            self.doubts.append((self._sample, str(error)))
+            return None
+        if ready.controller is None:
+            self.doubts.append((self._sample, ready.doubt))
+            every = self.settings.fit_every
+            change.put_off((self._sample // every + 1) * every)
+            return change
+        take(change, ready.controller)
+        return None
+
+    def _commit_settings(self, change: HandOver, controller: MpcController) -> None:
+        before = self._controller.mode
+        self._take(change, controller)
+        if self._controller.mode is not before:
+            self._watch.stop()  # a mode that the user has chosen is not judged
+
+    def _commit_offer(self, change: HandOver, controller: MpcController) -> None:
+        if not self._watch.active:  # what is on trial itself is nothing to go back to
+            self._proven = self._in_trust()
+        self._raised = self._returning = None
+        self._take(change, controller)
+        self._watch.begin()
 
     def prediction(self, result: StepResult, points: int) -> tuple[FloatArray, FloatArray]:
         """Return the plan of the last step, thinned for a message.
@@ -255,27 +347,30 @@ class LiveController:
         rows[0, pv.shape[1] :] = stem
         return rows, picks
 
-    def _commit(self, prepared: _Prepared) -> None:
-        controller = prepared.controller
-        if self._op:
-            controller.take_over(self._history())
-        self._controller, self._known = controller, prepared.model
-        self._note(prepared.reason, self._sample)
+    def _take(self, change: HandOver, controller: MpcController) -> None:
+        """Let ``controller``, which has taken in the past, be the one in force."""
+        self._controller, self._known = controller, change.model
+        self._note(change.reason, self._sample)
 
     def _note(self, reason: str, sample: int) -> None:
         mode = self._controller.mode
         self.changes.append(ModeChange(sample, mode, reason, self._known.name))
 
-    def _roll_back(self, reason: str) -> None:
-        """Return to the mode before, on the friction known then, from the next sample on."""
-        before, known = self._fallback
-        controller = MpcController(self._design, before.mode, before.frictions, before.spreads)
-        self._raised = None
-        self._commit(_Prepared(self._sample, controller, f"rolled back: {reason}", known))
-        self._watch.stop()
+    def _in_trust(self) -> tuple[MpcController, LoopModel]:
+        return self._controller, self._known
 
-    def _history(self) -> History:
-        return History(np.array(self._op), np.array(self._pv), np.array(self._dv))
+    def _roll_back(self, reason: str) -> None:
+        """Return to the controller that was in force before the trial, on what it knew."""
+        before, known = self._proven
+        frictions, spreads = before.frictions, before.spreads
+        self._rolled_back.append(self._controller.frictions)
+        self._raised = None
+
+        def make() -> MpcController:
+            return MpcController(self._design, before.mode, frictions, spreads)
+
+        self._returning = HandOver(self._sample, f"rolled back: {reason}", known, make)
+        self._watch.stop()
 
     def _build(
         self,

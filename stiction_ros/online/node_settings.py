@@ -32,6 +32,12 @@ class PlantNodeSettings(NodeSettings):
     )
     seed: int = setting(0, "seed of the noise", low=0, fixed=True)
     samples: int = setting(0, "samples to run; 0 runs until stopped", low=0, fixed=True)
+    valve_changes: str = setting(
+        "",
+        "valves that change in mid-run: YAML text [{time: s, valve: TAG, effects: [...]}]; "
+        "empty for none",
+        fixed=True,
+    )
     pace: str = setting(
         "lockstep",
         "lockstep waits for the op of each sample; realtime does not",

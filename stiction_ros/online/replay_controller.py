@@ -112,11 +112,9 @@ def replay_controller(
 
 def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> None:
     try:
-        refused = live.offer(LoopModel.from_yaml(offer.text, "loop_model"), offer.sample - first)
+        live.offer(LoopModel.from_yaml(offer.text, "loop_model"), offer.sample - first)
     except InputError as error:
-        refused = str(error)
-    if refused:
-        notes.append(f"the model for sample {offer.sample} is refused: {refused}")
+        notes.append(f"the model for sample {offer.sample} is refused: {error}")
 
 
 def _samples(

@@ -16,8 +16,17 @@ import numpy as np
 from stiction_ros.control import ControlMode
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
+from stiction_ros.loop import (
+    ClosedLoopRun,
+    LoopModel,
+    Measurement,
+    SetPoints,
+    ValveChange,
+    read_valve_changes,
+    simulate_closed_loop,
+)
 from stiction_ros.loop.reading import Section, load_yaml
+from stiction_ros.loop.valve_changes import valve_changes_text
 from stiction_ros.online.gap_finding import GapFinding
 from stiction_ros.online.gap_monitor import GapLook, MonitorRule
 from stiction_ros.online.live_controller import LiveController, LiveControllerSettings, ModeChange
@@ -56,6 +65,7 @@ class Scenario:
         controller, estimator: settings of the two.
         monitor: rule of the estimator's monitor.
         monitor_model: what the monitor compares with; None for the loop as it is identified.
+        valve_changes: valves of the plant that change in mid-run.
     """
 
     name: str
@@ -70,12 +80,14 @@ class Scenario:
     estimator: EstimatorSettings
     monitor: MonitorRule = MonitorRule()
     monitor_model: LoopModel | None = None
+    valve_changes: tuple[ValveChange, ...] = ()
 
     @classmethod
     def load(cls, path: Path | str) -> Scenario:
         """Read a ROS parameter file (``node: {ros__parameters: {…}}``).
 
-        File names in it are relative to the file itself.
+        File names in it are relative to the file itself. ``valve_changes`` may be a list, which
+        a ROS parameter cannot hold, or the same as YAML text.
 
         Raises:
             InputError: anything missing or wrong, in one line.
@@ -85,8 +97,10 @@ class Scenario:
         nodes: dict[str, dict[str, Any]] = {}
         checked: dict[str, Any] = {}
         for name, cls_of_node in NODE_SETTINGS.items():
-            values = top.section(name).section("ros__parameters").values
-            nodes[name] = dict(values)
+            values = dict(top.section(name).section("ros__parameters").values)
+            if "valve_changes" in values:
+                values["valve_changes"] = valve_changes_text(values["valve_changes"])
+            nodes[name] = values
             checked[name] = settings_from_mapping(cls_of_node, values, f"{path}: {name}")
         top.finish()
         plant, controller = checked["plant"], checked["controller"]
@@ -131,6 +145,9 @@ class Scenario:
             checked["estimator"],
             checked["estimator"],
             watched,
+            read_valve_changes(
+                plant.valve_changes, model.valve_names, f"{path}: plant: valve_changes"
+            ),
         )
 
 
@@ -221,7 +238,7 @@ def run_live(
     Args:
         scenario: what to run.
         seed, samples: in place of the scenario's.
-        ideal_valves: run with valves that follow OP exactly.
+        ideal_valves: run with valves that follow OP exactly, to the end.
         identify: whether the estimator runs; without it the controller stays as it starts.
         progress: as in :func:`stiction_ros.loop.simulate_closed_loop`.
     """
@@ -234,6 +251,7 @@ def run_live(
         scenario.samples if samples is None else samples,
         scenario.seed if seed is None else seed,
         progress,
+        () if ideal_valves else scenario.valve_changes,
     )
     return LiveRun(
         run,

@@ -15,10 +15,16 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
+from stiction_ros.records.csv_names import (
+    DEFAULT_OUTPUT,
+    DEFAULT_VALVE,
+    QUALITY,
+    tagged_columns,
+)
+from stiction_ros.records.parts import only_part
+from stiction_ros.records.quality import QUALITY_WORDS, Quality, QualityArray
 from stiction_ros.records.record import Record
-from stiction_ros.records.regular import Part, regular_part, split_at_gaps
-from stiction_ros.records.sampling import sample_time
+from stiction_ros.records.whole import Source, Whole
 
 _TIME_NAMES = ("t", "time", "timestamp")
 _DELIMITERS = (",", ";", "\t")
@@ -58,7 +64,8 @@ def read_csv(
     """Read a CSV file with a header; comma, semicolon or tab between the cells.
 
     Time is in seconds or ISO 8601 stamps (those without a zone are taken as UTC). Other
-    columns are ignored. With semicolons or tabs the decimal sign may be a comma.
+    columns are ignored, but for the qualities that :func:`write_csv` writes. With semicolons
+    or tabs the decimal sign may be a comma.
 
     Args:
         path: the file.
@@ -73,17 +80,7 @@ def read_csv(
             finite; time that does not increase, is irregular or has gaps; fewer than two
             rows.
     """
-    parts = read_csv_parts(path, CsvColumns(op, pv, sp, stem, time))
-    if len(parts) > 1:
-        before, after = parts[0], parts[1]
-        end = before.start + float(before.time[-1])
-        raise InputError(
-            f"has {len(parts) - 1} gap{'s' * (len(parts) > 2)}, the first of "
-            f"{after.start - end:.6g} s behind {end - before.start:.6g} s",
-            where=str(path),
-            fix=f"stiction convert writes its {len(parts)} parts as records of their own",
-        )
-    return parts[0]
+    return only_part(read_csv_parts(path, CsvColumns(op, pv, sp, stem, time)), str(path))
 
 
 def read_csv_parts(
@@ -169,29 +166,34 @@ class _Table:
             )
         return index
 
-    def cells(self, index: int) -> list[str]:
-        """Return one column as text.
+    def cells(self, index: int, mask: QualityArray | None = None) -> list[str]:
+        """Return one column as text; empty cells of bad rows as ``nan``.
 
         Raises:
             InputError: a row that ends before it, or an empty cell.
         """
         values = []
-        for cells, line in zip(self.rows, self.lines, strict=True):
+        for row, (cells, line) in enumerate(zip(self.rows, self.lines, strict=True)):
             value = cells[index].strip() if index < len(cells) else ""
             if not value:
-                raise self.bad(index, line, "is empty")
+                if mask is None or mask[row] != Quality.BAD:
+                    raise self.bad(index, line, "is empty")
+                value = "nan"
             values.append(value)
         return values
 
-    def numbers(self, index: int) -> FloatArray:
-        """Return one column as numbers, shape (N,).
+    def numbers(self, index: int, mask: QualityArray | None = None) -> FloatArray:
+        """Return one column as numbers, shape (N,), those of bad rows perhaps NaN.
 
         Raises:
             InputError: a cell that is empty, not a number or not finite.
         """
         values = []
-        for cell, line in zip(self.cells(index), self.lines, strict=True):
+        for row, (cell, line) in enumerate(zip(self.cells(index, mask), self.lines, strict=True)):
             value = self._number(cell)
+            if mask is not None and mask[row] == Quality.BAD:
+                values.append(math.nan if value is None else value)
+                continue
             if value is None:
                 raise self.bad(index, line, f"is {cell[:30]!r}, not a number")
             if not math.isfinite(value):
@@ -243,60 +245,37 @@ def _records(table: _Table, columns: CsvColumns) -> tuple[Record, ...]:
             fix="a record needs two at least",
         )
     seconds, start = _time(table, time_column)
-    if not (np.diff(seconds) > 0).all():
-        sample_time(seconds, str(table.path), table.place)  # tells which line
-    whole = _Whole(
-        tuple(op),
-        tuple(pv),
-        _signals(table, op, tuple(op)),
-        _signals(table, pv, tuple(pv)),
-        None if not sp else _signals(table, sp, tuple(pv)),
-        None if not stem else _signals(table, stem, tuple(op)),
+    mask = _mask(table)
+    whole = Whole(
+        valves=tuple(op),
+        outputs=tuple(pv),
+        time=seconds,
+        start=start,
+        op=_signals(table, op, tuple(op), mask),
+        pv=_signals(table, pv, tuple(pv), mask),
+        sp=None if not sp else _signals(table, sp, tuple(pv), mask),
+        stem=None if not stem else _signals(table, stem, tuple(op), mask),
+        mask=mask,
     )
-    stretches = [edge for edge in split_at_gaps(seconds) if edge[1] - edge[0] > 1]
-    lone = len(seconds) - sum(last - first for first, last in stretches)
-    parts = [regular_part(seconds, first, last) for first, last in stretches]
-    notes = [f"{lone} rows alone between two gaps left out"] if lone else []
-    if len(parts) > 1:
-        notes.append(f"split at {len(parts) - 1} gap{'s' * (len(parts) > 2)}")
-    return tuple(whole.part(table, part, start, notes) for part in parts)
+    return whole.records(Source(table.path.name, str(table.path), table.place))
 
 
-@dataclasses.dataclass(frozen=True)
-class _Whole:
-    """Tags and signals of all rows of a file, shapes (rows, …)."""
-
-    valves: tuple[str, ...]
-    outputs: tuple[str, ...]
-    op: FloatArray
-    pv: FloatArray
-    sp: FloatArray | None
-    stem: FloatArray | None
-
-    def part(self, table: _Table, part: Part, start: float, notes: Sequence[str]) -> Record:
-        """Return the record of one stretch."""
-
-        def place(row: int) -> str:
-            return table.place(part.first + row)
-
-        step, more = sample_time(part.time, str(table.path), place)
-        return Record(
-            name=table.path.name,
-            sample_time=step,
-            valves=self.valves,
-            outputs=self.outputs,
-            op=part.held(self.op),
-            pv=part.interpolated(self.pv),
-            sp=None if self.sp is None else part.held(self.sp),
-            stem=None if self.stem is None else part.interpolated(self.stem),
-            start=start + float(part.time[0]),
-            notes=(*notes, *([part.note] if part.note else []), *more),
-        )
+def _mask(table: _Table) -> QualityArray | None:
+    """Return the qualities, shape (N,), when a column of that name holds nothing else."""
+    index = table.header.index(QUALITY) if QUALITY in table.header else None
+    if index is None:
+        return None
+    words = [cells[index].strip() if index < len(cells) else "" for cells in table.rows]
+    if not QUALITY_WORDS.keys() >= set(words):
+        return None  # a historian's own column
+    return np.array([QUALITY_WORDS[word] for word in words], dtype=np.uint8)
 
 
-def _signals(table: _Table, mapping: Mapping[str, str], tags: tuple[str, ...]) -> FloatArray:
+def _signals(
+    table: _Table, mapping: Mapping[str, str], tags: tuple[str, ...], mask: QualityArray | None
+) -> FloatArray:
     """Return the columns of ``tags`` side by side, shape (N, len(tags))."""
-    columns = [table.numbers(table.column(mapping[tag], "")) for tag in tags]
+    columns = [table.numbers(table.column(mapping[tag], ""), mask) for tag in tags]
     return np.column_stack(columns)
 
 

@@ -9,6 +9,9 @@ DEFAULT_OUTPUT = "PV1"
 SIGNALS = {"op": "OP", "pv": "PV", "sp": "SP", "stem": "STEM"}
 """Signal of a record to the last part of its columns' names, in the order of the file."""
 
+QUALITY = "QUALITY"
+"""Column with the quality of each sample, written where not all are good."""
+
 _KEYS = {name: key for key, name in SIGNALS.items()}
 
 
@@ -21,8 +24,8 @@ def tagged_columns(header: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
     """Return signal to tag to column of a header that this package wrote.
 
     It is the time, OP of every valve, PV of every output and, where they are known, SP of the
-    same outputs and the stems of the same valves, each in the same order. A header with any
-    other column or order may mean something else.
+    same outputs and the stems of the same valves, each in the same order, and perhaps the
+    quality. A header with any other column or order may mean something else.
 
     Args:
         header: names of all columns.
@@ -31,6 +34,7 @@ def tagged_columns(header: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
         Signals of :data:`SIGNALS`; empty for any other header.
     """
     found: dict[str, dict[str, str]] = {key: {} for key in SIGNALS}
+    header = header[:-1] if header and header[-1] == QUALITY else header
     for column in header[1:]:
         tag, _, name = column.rpartition(".")
         if not tag or name not in _KEYS:

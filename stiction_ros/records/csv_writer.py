@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import csv
 import datetime
+import math
 from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, SIGNALS, column_name
+from stiction_ros.records.csv_names import (
+    DEFAULT_OUTPUT,
+    DEFAULT_VALVE,
+    QUALITY,
+    SIGNALS,
+    column_name,
+)
+from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 
 
@@ -16,8 +24,9 @@ def write_csv(record: Record, path: str | Path, *, iso: bool = False) -> None:
     """Write ``record`` with a column of seconds and one column per signal.
 
     A loop of one valve V1 and one output PV1 gets the default names ``t,OP,PV[,SP][,STEM]``;
-    any other gets ``TAG.OP``, ``TAG.PV`` …. Either is read back without naming a column; runs
-    of blanks in a tag come back as one.
+    any other gets ``TAG.OP``, ``TAG.PV`` …. Where not every sample is good a column ``QUALITY``
+    says what each is, and NaN is an empty cell. Either is read back without naming a column;
+    runs of blanks in a tag come back as one.
 
     Args:
         record: to write.
@@ -37,7 +46,10 @@ def write_csv(record: Record, path: str | Path, *, iso: bool = False) -> None:
         tags = record.valves if key in ("op", "stem") else record.outputs
         for tag, column in zip(tags, values.T, strict=True):
             header.append(name if plain else column_name(key, tag))
-            columns.append([repr(value) for value in column.tolist()])
+            columns.append([_cell(value) for value in column.tolist()])
+    if record.mask is not None:
+        header.append(QUALITY)
+        columns.append([Quality(number).word for number in record.mask.tolist()])
     try:
         with Path(path).open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
@@ -47,6 +59,10 @@ def write_csv(record: Record, path: str | Path, *, iso: bool = False) -> None:
             writer.writerows(zip(*columns, strict=True))
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", where=str(path)) from None
+
+
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else repr(value)
 
 
 def _iso(record: Record) -> list[str]:

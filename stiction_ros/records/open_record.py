@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag_reader import read_bag
-from stiction_ros.records.csv_file import CsvColumns, read_csv
+from stiction_ros.records.bag_reader import read_bag_parts
+from stiction_ros.records.csv_file import CsvColumns, read_csv_parts
+from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
 
 
@@ -22,7 +23,7 @@ def open_record(
     *,
     namespace: str | None = None,
 ) -> Record:
-    """Read a record from a CSV file or a bag.
+    """Read a record without gaps from a CSV file or a bag.
 
     Args:
         path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
@@ -30,8 +31,27 @@ def open_record(
         namespace: of the loop's topics, for bags that hold several loops.
 
     Raises:
-        InputError: as :func:`read_csv` and :func:`read_bag`; columns given for a bag,
-            a namespace given for a CSV file.
+        InputError: as :func:`open_parts`; gaps, several runs, bad samples.
+    """
+    return only_part(open_parts(path, columns, namespace=namespace), str(path))
+
+
+def open_parts(
+    path: str | Path,
+    columns: CsvColumns = CsvColumns(),  # noqa: B008 (frozen)
+    *,
+    namespace: str | None = None,
+) -> tuple[Record, ...]:
+    """Read the records of a CSV file or a bag, one for each stretch without a gap.
+
+    Args:
+        path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
+        columns: which column is what, for CSV files only.
+        namespace: of the loop's topics, for bags that hold several loops.
+
+    Raises:
+        InputError: as :func:`read_csv_parts` and :func:`read_bag_parts`; columns given for a
+            bag, a namespace given for a CSV file.
     """
     if is_bag(path):
         if columns != CsvColumns():
@@ -40,18 +60,11 @@ def open_record(
                 where=str(path),
                 fix="leave --op, --pv, --sp, --stem and --time out",
             )
-        return read_bag(path, namespace=namespace)
+        return read_bag_parts(path, namespace=namespace)
     if namespace is not None:
         raise InputError(
             "is a CSV file, which has no namespaces",
             where=str(path),
             fix="leave --namespace out",
         )
-    return read_csv(
-        path,
-        op=columns.op,
-        pv=columns.pv,
-        sp=columns.sp,
-        stem=columns.stem,
-        time=columns.time,
-    )
+    return read_csv_parts(path, columns)

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.records.quality import USABLE, Quality, QualityArray
+from stiction_ros.records.segment import Gap, Segment
+
+IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 
 @dataclasses.dataclass(frozen=True)
 class Record:
     """Regularly sampled signals of one loop, arrays read-only.
+
+    Inside a segment samples are ``sample_time`` apart; a plain record is one segment of good
+    samples. Where time falls back from one segment to the next, another run begins.
 
     Attributes:
         name: where it came from, for messages and reports.
@@ -25,9 +35,12 @@ class Record:
         stem: true stem positions, shape (N, m), %, or None when not known.
         start: seconds of the first sample on the record's own clock.
         notes: what was repaired or ignored while reading, one sentence each.
+        mask: :class:`Quality` of each sample, shape (N,); None when all are good.
+        gaps: where it goes on after a gap, in the order of the samples.
 
     Raises:
-        InputError: shapes that do not fit together, or a value that is not finite.
+        InputError: shapes that do not fit together, a value that is not finite at a sample
+            that is not bad, an unknown quality, gaps out of order.
     """
 
     name: str
@@ -40,11 +53,18 @@ class Record:
     stem: FloatArray | None = None
     start: float = 0.0
     notes: tuple[str, ...] = ()
+    mask: QualityArray | None = None
+    gaps: tuple[Gap, ...] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.sample_time) and self.sample_time > 0):
             raise InputError(f"sample time {self.sample_time} is not positive", where=self.name)
         count = len(self.op)
+        self._check_mask(count)
+        rows = [0, *(gap.row for gap in self.gaps), count]
+        if self.gaps and not all(before < after for before, after in itertools.pairwise(rows)):
+            raise InputError(f"gaps at samples {rows[1:-1]} of {count}", where=self.name)
+        bad = None if self.mask is None else self.mask == Quality.BAD
         widths = {"op": self.valves, "pv": self.outputs, "sp": self.outputs, "stem": self.valves}
         for key, tags in widths.items():
             values = getattr(self, key)
@@ -56,27 +76,121 @@ class Record:
                     f"{key} has shape {values.shape}, not {(count, len(tags))}", where=self.name
                 )
             if not np.isfinite(values).all():
-                row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
-                raise InputError(f"{key} is not finite at sample {row}", where=self.name)
+                wrong = ~np.isfinite(values).all(axis=1)
+                wrong &= True if bad is None else ~bad
+                if wrong.any():
+                    row = int(np.flatnonzero(wrong)[0])
+                    raise InputError(f"{key} is not finite at sample {row}", where=self.name)
             values.flags.writeable = False
             object.__setattr__(self, key, values)
+
+    def _check_mask(self, count: int) -> None:
+        if self.mask is None:
+            return
+        given = np.asarray(self.mask)
+        if given.shape != (count,) or not np.isin(given, list(Quality)).all():
+            raise InputError(
+                f"mask of shape {given.shape} is no quality for each of {count} samples",
+                where=self.name,
+            )
+        mask = given.astype(np.uint8)
+        mask.flags.writeable = False
+        object.__setattr__(self, "mask", mask if mask.any() else None)
 
     def __len__(self) -> int:
         return len(self.op)
 
     @property
     def time(self) -> FloatArray:
-        """Seconds since the first sample, shape (N,)."""
-        return np.arange(len(self), dtype=np.float64) * self.sample_time
+        """Seconds since the first sample on the record's own clock, shape (N,)."""
+        time = np.arange(len(self), dtype=np.float64) * self.sample_time
+        for first, last, start in self.segments[1:]:
+            time[first:last] += (start - self.start) - time[first]
+        return time
+
+    @property
+    def quality(self) -> QualityArray:
+        """:class:`Quality` of each sample, shape (N,), read-only."""
+        if self.mask is not None:
+            return self.mask
+        return np.broadcast_to(np.uint8(Quality.GOOD), (len(self),))
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Stretches without a gap in time, in the order of the samples."""
+        begins = (Gap(0, self.start), *self.gaps, Gap(len(self), 0.0))
+        return tuple(Segment(a.row, b.row, a.start) for a, b in itertools.pairwise(begins))
 
     def part(self, first: int, last: int) -> Record:
         """Return samples ``first`` up to, not including, ``last``."""
         rows = slice(first, last)
+        start, gaps = self.start + first * self.sample_time, self.gaps
+        if gaps:
+            last = min(last, len(self))
+            inside = next((s for s in self.segments if s.first <= first < s.last), self.segments[0])
+            start = inside.start + (first - inside.first) * self.sample_time
+            gaps = tuple(Gap(g.row - first, g.start) for g in gaps if first < g.row < last)
         return dataclasses.replace(
             self,
             op=self.op[rows],
             pv=self.pv[rows],
             sp=None if self.sp is None else self.sp[rows],
             stem=None if self.stem is None else self.stem[rows],
-            start=self.start + first * self.sample_time,
+            start=start,
+            mask=None if self.mask is None else self.mask[rows],
+            gaps=gaps,
         )
+
+    def usable_rows(self, wanted: Iterable[Quality] = USABLE) -> list[tuple[int, int]]:
+        """Return the longest stretches of samples of ``wanted`` qualities without a gap.
+
+        Each is its first sample and the one behind its last.
+        """
+        if self.mask is None:
+            return [(s.first, s.last) for s in self.segments if s.last > s.first]
+        there = np.isin(self.mask, list(wanted))
+        cut = np.zeros(len(self) + 1, dtype=bool)
+        cut[[gap.row for gap in self.gaps]] = True
+        before = np.concatenate([[False], there])
+        after = np.concatenate([there, [False]])
+        begins = np.flatnonzero(after & (~before | cut))
+        ends = np.flatnonzero(before & (~after | cut))
+        return list(zip(begins.tolist(), ends.tolist(), strict=True))
+
+    def good_parts(self) -> tuple[Record, ...]:
+        """Return the stretches without a gap and without bad or manual samples."""
+        stretches = self.usable_rows()
+        if stretches == [(0, len(self))]:
+            return (self,)
+        return tuple(self.part(first, last) for first, last in stretches)
+
+    def filled(self) -> Record:
+        """Return the record as one segment; in its gaps stand bad samples of NaN.
+
+        A gap longer than the record itself is made as long as the record, and another run is
+        put behind the one before, one bad sample away.
+        """
+        if not self.gaps:
+            return self
+        rows = self.filled_rows()
+        mask = np.full(int(rows[-1]) + 1, Quality.BAD, dtype=np.uint8)
+        mask[rows] = self.quality
+        spread: dict[str, Any] = {}
+        for key in ("op", "pv", "sp", "stem"):
+            values: FloatArray | None = getattr(self, key)
+            if values is not None:
+                spread[key] = np.full((len(mask), values.shape[1]), np.nan)
+                spread[key][rows] = values
+        return dataclasses.replace(self, mask=mask, gaps=(), **spread)
+
+    def filled_rows(self) -> IndexArray:
+        """Return for each sample its row in :meth:`filled`, shape (N,)."""
+        rows = np.arange(len(self))
+        for before, after in itertools.pairwise(self.segments):
+            rows[after.first :] += min(max(self._missing(before, after), 1), len(self))
+        return rows
+
+    def _missing(self, before: Segment, after: Segment) -> int:
+        """Return how many samples are missing between two segments; below 0 when time falls."""
+        end = before.start + (before.last - before.first) * self.sample_time
+        return round((after.start - end) / self.sample_time)

@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.sampling import TOLERATED
 
 GAP = 5.5
@@ -18,6 +19,12 @@ SLIGHT = 0.1
 
 WIDEST = 200
 """Frequencies looked at on either side of the usual one."""
+
+HOLE = 1.5
+"""A step of more usual steps than this is a hole in which samples are missing."""
+
+EXACT = 1e-6
+"""Share of a step by which a row may be off a regular time and is taken as it is."""
 
 SHORTEST = 3
 """Samples that a repair needs at least."""
@@ -32,6 +39,7 @@ class Part:
         time: regular times, shape (N,), s; the given ones where nothing was repaired.
         left: for each time the row, counted from ``first``, given at or before it, shape (N,).
         weight: share of the next row in a linear interpolation, in [0, 1), shape (N,).
+        missing: whether no row is within half a step of a time, shape (N,).
         note: what was done; empty for nothing.
     """
 
@@ -40,28 +48,45 @@ class Part:
     time: FloatArray
     left: np.ndarray[tuple[int], np.dtype[np.intp]]
     weight: FloatArray
+    missing: np.ndarray[tuple[int], np.dtype[np.bool_]]
     note: str = ""
 
     def interpolated(self, values: FloatArray) -> FloatArray:
         """Return measured values, shape (rows, …), at the regular times, shape (N, …)."""
         rows = values[self.first : self.last]
-        after = rows[np.minimum(self.left + 1, len(rows) - 1)]
+        before, after = rows[self.left], rows[np.minimum(self.left + 1, len(rows) - 1)]
         weight = self.weight.reshape(-1, *[1] * (values.ndim - 1))
-        return np.asarray(rows[self.left] + weight * (after - rows[self.left]))
+        return np.where(weight > 0, before + weight * (after - before), before)
 
     def held(self, values: FloatArray) -> FloatArray:
         """Return values that are held between two rows, such as OP and SP, shape (N, …)."""
         return np.asarray(values[self.first : self.last][self.left])
 
+    def quality(self, mask: QualityArray | None) -> QualityArray | None:
+        """Return the mask at the regular times, of all rows' ``mask``, None when all are good."""
+        if mask is None and not self.missing.any():
+            return None
+        count = len(self.time)
+        if mask is None:
+            found = np.zeros(count, dtype=np.uint8)
+        else:
+            rows = mask[self.first : self.last]
+            after = rows[np.minimum(self.left + 1, len(rows) - 1)]
+            found = rows[self.left].copy()
+            found[(self.weight > 0) & (after == Quality.BAD)] = Quality.BAD
+        found[self.missing & (found == Quality.GOOD)] = Quality.HELD
+        return found
 
-def split_at_gaps(time: FloatArray) -> list[tuple[int, int]]:
+
+def split_at_gaps(time: FloatArray, longest: float = GAP) -> list[tuple[int, int]]:
     """Return first and last (not included) row of each stretch without a gap.
 
     Args:
         time: increasing times, shape (N,), s.
+        longest: step, in usual ones, above which there is a gap.
     """
     steps = np.diff(time)
-    cuts = np.flatnonzero(steps > GAP * float(np.median(steps))) + 1
+    cuts = np.flatnonzero(steps > longest * float(np.median(steps))) + 1
     edges = [0, *cuts.tolist(), len(time)]
     return list(itertools.pairwise(edges))
 
@@ -78,7 +103,10 @@ def regular_part(time: FloatArray, first: int, last: int) -> Part:
         first, last: the stretch, without a gap inside.
     """
     given = time[first:last]
-    plain = Part(first, last, given, np.arange(len(given)), np.zeros(len(given)))
+    count = len(given)
+    plain = Part(
+        first, last, given, np.arange(count), np.zeros(count), np.zeros(count, dtype=np.bool_)
+    )
     if len(given) < SHORTEST:
         return plain
     steps = np.diff(given)
@@ -89,20 +117,21 @@ def regular_part(time: FloatArray, first: int, last: int) -> Part:
     number, step = len(grid), float(grid[1] - grid[0])
     nearest = np.abs(grid[:, None] - given[_neighbours(given, grid)]).min(axis=1)
     moved = int(np.count_nonzero(nearest > TOLERATED * step))
-    far = int(np.count_nonzero(nearest > 0.5 * step))
+    missing = nearest > 0.5 * step
+    far = int(np.count_nonzero(missing))
     spare = max(len(given) - number, 0)
     if far + spare > SLIGHT * number:
         return plain
     left = np.clip(np.searchsorted(given, grid + 1e-9 * step, side="right") - 1, 0, len(given) - 1)
     span = np.diff(given, append=given[-1] + step)[left]
     weight = np.clip((grid - given[left]) / span, 0.0, 1.0)
-    weight[left == len(given) - 1] = 0.0
+    weight[(left == len(given) - 1) | (weight < EXACT)] = 0.0
     note = (
         f"resampled to one sample each {step:.6g} s: {moved} of {number} were off by more than "
         f"{TOLERATED:.0%} of a step, {far} of them missing; pv and stem are interpolated, op and "
         "sp held"
     )
-    return Part(first, last, grid, left, weight, note)
+    return Part(first, last, grid, left, weight, missing, note)
 
 
 def _grid(given: FloatArray, usual: float) -> FloatArray:

@@ -3,94 +3,46 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import types
+import itertools
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.records.bag_messages import (
-    BagMessage,
-    MessageDecoder,
-    last_part,
-    read_raw,
-    stamp_ns,
-)
-from stiction_ros.records.bag_metadata import BagTopic
-from stiction_ros.records.bag_reader import JOINT_STATE, LoopSignals, is_signal
+from stiction_ros.records.bag_messages import BagMessage, MessageDecoder, read_raw
+from stiction_ros.records.bag_reader import bag_source
 from stiction_ros.records.gap_log import GapLog, gap_log
+from stiction_ros.records.loop_runs import LoopRun, loop_runs
+from stiction_ros.records.loop_signals import LoopSignals, is_signal
+from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
+from stiction_ros.records.run_events import (
+    Estimate,
+    Fit,
+    ModeChange,
+    Text,
+    clock,
+    estimates,
+    fits,
+    mode_changes,
+    mode_texts,
+    of_loop,
+    published_counts,
+    stem_estimate,
+    tells_of_run,
+    texts,
+)
 
-_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-_STRING = "std_msgs/msg/String"
-_CLOCK = "rosgraph_msgs/msg/Clock"
-_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-
-
-@dataclasses.dataclass(frozen=True)
-class Estimate:
-    """One parameter of one fit.
-
-    Attributes:
-        stamp: end of the window, ns.
-        name: ``V1.f_s``.
-        value: estimate, % of travel for friction.
-        low: lower end of its interval, NaN when not given.
-        high: upper end of its interval, NaN when not given.
-    """
-
-    stamp: int
-    name: str
-    value: float
-    low: float
-    high: float
-
-
-@dataclasses.dataclass(frozen=True)
-class ModeChange:
-    """The controller's mode from a moment on.
-
-    Attributes:
-        stamp: of the first ``op`` of the new mode, ns.
-        mode: ``unaware``, ``embedding``, ``inversion`` or ``hold``.
-        model: of the valves that it works with, as the controller names it.
-        reason: why it changed.
-        frictions: what it takes for the friction of its valves, by ``V1.f_s``, %.
-    """
-
-    stamp: int
-    mode: str
-    model: str = ""
-    reason: str = ""
-    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)
-
-
-@dataclasses.dataclass(frozen=True)
-class Fit:
-    """One fit of the estimator.
-
-    Attributes:
-        stamp: end of the window, ns.
-        identification: the mapping of ``identify --json`` without ``record``.
-        trusted: friction trusted after this fit, by ``V1.f_s``, %.
-    """
-
-    stamp: int
-    identification: Mapping[str, Any]
-    trusted: Mapping[str, float]
-
-
-@dataclasses.dataclass(frozen=True)
-class Text:
-    """A string that a node published: its topic, log time in ns and content."""
-
-    topic: str
-    log_time: int
-    text: str
+__all__ = [
+    "Estimate",
+    "Fit",
+    "ModeChange",
+    "RunLog",
+    "Text",
+    "fits",
+    "mode_changes",
+    "read_run",
+]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,7 +50,7 @@ class RunLog:
     """A run of the live loop as its bag tells it.
 
     Attributes:
-        record: the loop's signals.
+        record: the loop's signals, one segment; where some are missing stand bad samples.
         start: stamp of the record's first sample, ns.
         estimates: in the order they came.
         modes: every change of mode, model or friction, the mode at the start first.
@@ -172,231 +124,99 @@ class RunLog:
 def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
     """Read everything that a report needs from a bag, in one pass.
 
+    Of several runs the longest is told, with a note on the others.
+
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
         namespace: of the loop's topics; needed when the bag holds several loops.
 
     Raises:
-        InputError: as :func:`stiction_ros.records.bag_reader.read_bag`.
+        InputError: as :func:`stiction_ros.records.bag_reader.read_bag_parts`.
     """
     notes: list[str] = []
     recorded: Counter[str] = Counter()
-    messages: list[BagMessage] = []
+    messages: list[tuple[int, BagMessage]] = []
     signals = LoopSignals(str(path))
     decoder = MessageDecoder()
     sent: list[int] = []
-    for raw in read_raw(path, notes):
+    for number, raw in enumerate(read_raw(path, notes)):
         recorded[raw.topic.name] += 1
         sent.append(raw.publish_time)
         signal = is_signal(raw.topic)
-        if not signal and not _wanted(raw.topic):
+        if not signal and not tells_of_run(raw.topic):
             continue
         message = decoder.decode(raw, str(path))
         if message is None:
             continue
         if signal:
-            signals.add(message)
+            signals.add(message, number)
         else:
-            messages.append(message)
+            messages.append((number, message))
     notes.extend(decoder.notes)
-    published = published_counts(messages)
-    record = signals.record(Path(path).name, namespace, notes)
-    start = signals.first_stamp(namespace)
+    published = published_counts([message for _, message in messages])
+    runs = loop_runs(signals, bag_source(path), namespace, notes)
+    run = max(runs, key=len)
+    said = _said(messages, runs, run)
+    configured = [message for number, message in messages if number <= run.end or run is runs[-1]]
     if len(signals.loops) > 1:
-        messages = of_loop(messages, signals.loop(namespace))
-    stamps = start + np.rint(record.time * 1e9).astype(np.int64)
+        space = signals.loop(namespace)
+        said, configured = of_loop(said, space), of_loop(configured, space)
+    record = _record(run, runs)
+    start = run.start + round((record.start - run.parts[0].start) * 1e9)
+    configs = texts(configured, "config")
+    if run is not runs[0]:  # what a node said when it was started again holds
+        configs = tuple({text.topic: text for text in configs}.values())
     return RunLog(
         record=record,
         start=start,
-        estimates=estimates(messages),
-        modes=mode_changes(messages) or mode_texts(messages),
-        loop_models=texts(messages, "loop_model"),
-        configs=texts(messages, "config"),
-        clock=clock(messages),
+        estimates=estimates(said),
+        modes=mode_changes(said) or mode_texts(said),
+        loop_models=texts(configured, "loop_model"),
+        configs=configs,
+        clock=clock(said),
         recorded=dict(recorded),
         published=published,
         notes=record.notes,
-        fits=fits(messages),
-        stem_estimate=stem_estimate(messages, stamps.tolist(), record.valves),
+        fits=fits(said),
+        stem_estimate=stem_estimate(said, record, start),
         wall_seconds=(max(sent) - min(sent)) / 1e9,
-        gaps=gap_log(messages),
+        gaps=gap_log(said),
     )
 
 
-def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
-    """Return the messages of the loop in the namespace ``space``, and what is global.
+def _said(
+    messages: Sequence[tuple[int, BagMessage]], runs: Sequence[LoopRun], run: LoopRun
+) -> list[BagMessage]:
+    """Return what was said between the beginning of a run and that of the next one."""
+    place = runs.index(run)
+    begin = run.begin if place else 0
+    end = runs[place + 1].begin if place + 1 < len(runs) else None
+    return [m for number, m in messages if begin <= number and (end is None or number < end)]
 
-    The diagnostics of all loops share a topic; of these the statuses of the loop's nodes
-    are kept, which begin with its namespace.
+
+def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:
+    """Return the record of a run on one regular grid, its notes telling of gaps and other runs.
+
+    Only the longest stretch is taken of a run with a gap that is longer than all its samples.
     """
-    kept = []
-    for message in messages:
-        namespace, name = last_part(message.topic)
-        if name == "diagnostics":
-            header, every = message.message.header, message.message.status
-            own = [s for s in every if last_part("/" + node_of(s))[0] == space]
-            only = types.SimpleNamespace(header=header, status=own)
-            kept.append(dataclasses.replace(message, message=only))
-        elif (
-            name == "clock" or (last_part(namespace)[0] if name == "config" else namespace) == space
-        ):
-            kept.append(message)
-    return kept
-
-
-def node_of(status: Any) -> str:
-    """Return the node that gave a diagnostic status: what stands before the colon."""
-    return str(status.name).partition(":")[0].strip()
-
-
-def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
-    """Return the estimates on ``stiction`` in their order."""
-    found = []
-    for message in _of(messages, JOINT_STATE, "stiction"):
-        state = message.message
-        stamp = stamp_ns(state)
-        for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
-            low = _item(state.velocity, index)
-            high = _item(state.effort, index)
-            found.append(Estimate(stamp, str(name), float(value), low, high))
-    return tuple(found)
-
-
-def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
-    """Return the changes of mode, model or friction in ``/diagnostics``, with swap times."""
-    changes: list[ModeChange] = []
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
-        for status in message.message.status:
-            values = {item.key: item.value for item in status.values}
-            if "mode" not in values:
-                continue
-            change = ModeChange(
-                stamp_ns(message.message),
-                values["mode"],
-                values.get("model", ""),
-                values.get("reason", ""),
-                _frictions(values, "."),
-            )
-            if not changes or _force(changes[-1]) != _force(change):
-                changes.append(change)
-    return tuple(changes)
-
-
-def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
-    """Return the fits that ``/diagnostics`` tells, by the end of their window."""
-    found: dict[int, Fit] = {}
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
-        for status in message.message.status:
-            values = {item.key: item.value for item in status.values}
-            if "identification" not in values or not values.get("window_end", "").isdecimal():
-                continue
-            try:
-                identification = json.loads(values["identification"])
-            except json.JSONDecodeError:
-                continue
-            if isinstance(identification, dict):
-                stamp = int(values["window_end"])
-                found[stamp] = Fit(stamp, identification, _frictions(values, ".trusted_"))
-    return tuple(found[stamp] for stamp in sorted(found))
-
-
-def stem_estimate(
-    messages: Iterable[BagMessage], stamps: Sequence[int], valves: Sequence[str]
-) -> FloatArray | None:
-    """Return the stem positions, shape (N, m), in the first points on ``prediction``."""
-    rows: dict[int, list[float]] = {}
-    for message in _of(messages, _TRAJECTORY, "prediction"):
-        plan = message.message
-        if not plan.points:
-            continue
-        found = dict(zip(plan.joint_names, plan.points[0].positions, strict=False))
-        rows[stamp_ns(plan)] = [float(found.get(name, np.nan)) for name in valves]
-    if not rows:
-        return None
-    unknown = [float("nan")] * len(valves)
-    return np.array([rows.get(stamp, unknown) for stamp in stamps]).reshape(-1, len(valves))
-
-
-def _force(change: ModeChange) -> tuple[object, ...]:
-    return change.mode, change.model, change.frictions
-
-
-def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
-    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
-    found = {}
-    for key, value in values.items():
-        valve, dot, name = key.rpartition(mark)
-        if not (valve and dot and name in ("f_s", "f_d")):
-            continue
-        try:
-            found[f"{valve}.{name}"] = float(value)
-        except ValueError:
-            continue
-    return found
-
-
-def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
-    """Return the changes on ``mode``, whose messages bear no stamp: log times stand in."""
-    changes: list[ModeChange] = []
-    for text in texts(messages, "mode"):
-        if not changes or changes[-1].mode != text.text:
-            changes.append(ModeChange(text.log_time, text.text, reason="time of reception"))
-    return tuple(changes)
-
-
-def texts(messages: Iterable[BagMessage], name: str) -> tuple[Text, ...]:
-    """Return the strings on topics whose last part is ``name``."""
-    return tuple(
-        Text(message.topic, message.log_time, str(message.message.data))
-        for message in _of(messages, _STRING, name)
-    )
-
-
-def clock(messages: Iterable[BagMessage]) -> tuple[int, ...]:
-    """Return the times on ``/clock``, ns."""
-    return tuple(
-        int(message.message.clock.sec) * 10**9 + int(message.message.clock.nanosec)
-        for message in _of(messages, _CLOCK, "clock")
-    )
-
-
-def published_counts(messages: Iterable[BagMessage]) -> dict[str, int]:
-    """Return how many messages of each topic the nodes say they published.
-
-    The keys are ``published:<topic>`` (or with a space); of one node, named before the
-    colon in the status name, the last count holds; several nodes on a topic add up.
-    """
-    last: dict[tuple[str, str], int] = {}
-    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
-        for status in message.message.status:
-            node = node_of(status)
-            for item in status.values:
-                key = str(item.key)
-                if key.startswith(("published:", "published ")) and item.value.isdecimal():
-                    last[node, key[len("published:") :].strip()] = int(item.value)
-    totals: Counter[str] = Counter()
-    for (_, topic), count in last.items():
-        totals[topic] += count
-    return dict(totals)
-
-
-def _wanted(topic: BagTopic) -> bool:
-    name = last_part(topic.name)[1]
-    return (topic.type, name) in {
-        (JOINT_STATE, "stiction"),
-        (_DIAGNOSTICS, "diagnostics"),
-        (_CLOCK, "clock"),
-        (_TRAJECTORY, "prediction"),
-        (_STRING, "mode"),
-        (_STRING, "loop_model"),
-        (_STRING, "config"),
-    }
-
-
-def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
-    return (m for m in messages if m.type == type_name and last_part(m.topic)[1] == name)
-
-
-def _item(values: Iterable[float], index: int) -> float:
-    items = list(values)
-    return float(items[index]) if index < len(items) else float("nan")
+    total = sum(len(part) for part in run.parts)
+    stretches: list[list[Record]] = [[run.parts[0]]]
+    for before, after in itertools.pairwise(run.parts):
+        end = before.start + float(before.time[-1])
+        if after.start - end > total * after.sample_time:
+            stretches.append([])
+        stretches[-1].append(after)
+    kept = max(stretches, key=lambda parts: sum(map(len, parts)))
+    record = joined(kept)
+    notes = list(record.notes)
+    for other in runs:
+        if other is not run:
+            notes.append(f"another run, {span(*other.parts)}, {len(other)} samples, is left out")
+    if len(stretches) > 1:
+        left_out = total - sum(map(len, kept))
+        notes.append(f"{left_out} samples beyond a gap longer than the run are left out")
+    filled = record.filled()
+    missing = len(filled) - len(record)
+    if missing:
+        notes.append(f"{missing} of {len(filled)} samples are missing")
+    return dataclasses.replace(filled, notes=tuple(notes))

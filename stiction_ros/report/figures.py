@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records.quality import Quality
 from stiction_ros.report.drawing import (
     BLUE,
     GREEN,
@@ -173,6 +174,7 @@ def rounds(story: Story) -> Drawing | None:
     time = TimeAxis.spanning(length * record.sample_time)
     at = time(record.time[:length])
     error, _ = errors(record)
+    error[record.quality == Quality.BAD] = np.nan  # a gap stays empty
     parts = [
         ("before the swap", VERMILION, error[before.first : before.last]),
         ("after the swap", BLUE, error[after.first : after.last]),
@@ -187,7 +189,7 @@ def rounds(story: Story) -> Drawing | None:
         for label, colour, values in parts:
             axis.plot(at, values[:, j], color=colour, linewidth=1.0, label=label)
         # Set-point moves make errors far larger than the cycle: they may leave the panel.
-        reach = 1.3 * float(np.quantile(np.abs(parts[0][2][:, j]), 0.96)) or 1.0
+        reach = 1.3 * float(np.nanquantile(np.abs(parts[0][2][:, j]), 0.96)) or 1.0
         axis.set_ylim(-reach, reach)
         axis.set_title(name)
         axis.set_ylabel(f"PV − SP{_unit(story, name)}")

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from stiction_ros import __version__
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
 from stiction_ros.json_values import finite
+from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
 from stiction_ros.report.drawing import (
     BLUE,
@@ -45,19 +47,25 @@ _MEANING = {
 }
 
 
-def report_record(record: Record, identification: Identification, out: str | Path) -> Path:
+def report_record(
+    record: Record,
+    identification: Identification,
+    out: str | Path,
+    parts: Sequence[Record] = (),
+) -> Path:
     """Write ``report.html`` and its figures and return the page.
 
     Args:
         record: that was looked at.
         identification: of this record.
         out: folder, made when missing; or the ``.html`` file alone.
+        parts: all parts of the source that it is from, when there are several.
     """
     out = Path(out)
     alone = out.suffix.lower() == ".html"
     folder = out.parent if alone else out
     folder.mkdir(parents=True, exist_ok=True)
-    drawings = [(drawing, drawing.png()) for drawing in draw_record(record, identification)]
+    drawings = [(drawing, drawing.png()) for drawing in draw_record(record, identification, parts)]
     target = out if alone else folder / "report.html"
     target.write_text(record_page(record, identification, drawings), encoding="utf-8")
     if not alone:
@@ -79,7 +87,7 @@ def record_page(
     trouble = ""
     if identification.reason:
         trouble = f'<p class="warn">The fit is not to be trusted: {text(identification.reason)}</p>'
-    notes = [*record.notes, *identification.notes]
+    notes = dict.fromkeys([*record.notes, *identification.notes])
     listed = "".join(f"<li>{text(note)}</li>" for note in notes)
     parts = [
         f"<h1>{text(headline)}</h1>",
@@ -106,10 +114,12 @@ def evidence_table(valves: Sequence[ValveEstimate]) -> str:
     return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in valves]], rows)
 
 
-def draw_record(record: Record, identification: Identification) -> tuple[Drawing, ...]:
+def draw_record(
+    record: Record, identification: Identification, parts: Sequence[Record] = ()
+) -> tuple[Drawing, ...]:
     """Draw the signals with the estimated stems, valve curves, free run and step responses."""
     with style():
-        drawn = [_signals(record, identification)]
+        drawn = [_signals(record, identification, joined(parts) if parts else record)]
         if identification.stem.shape == record.op.shape:
             drawn += [_curves(record, identification)]
             if identification.outputs:
@@ -127,26 +137,46 @@ def draw_record(record: Record, identification: Identification) -> tuple[Drawing
     return tuple(drawn)
 
 
-def _signals(record: Record, identification: Identification) -> Drawing:
+def _signals(record: Record, identification: Identification, whole: Record) -> Drawing:
+    """Draw the signals of ``whole``, of which ``record`` is a part; its gaps stay empty."""
     rows = len(record.outputs) + len(record.valves)
     figure, axes = panels(rows, 0.6 + 2.0 * rows, sharex=True)
-    time = TimeAxis.spanning(record.time[-1])
-    at = time(record.time)
+    shown = whole.filled()
+    time = TimeAxis.spanning(shown.time[-1])
+    at = time(shown.time)
     for j, name in enumerate(record.outputs):
-        draw_output(axes[j, 0], at, record, j, slice(None))
+        draw_output(axes[j, 0], at, shown, j, slice(None))
         axes[j, 0].set_ylabel(f"{name} (PV units)")
-    known = identification.stem.shape == record.op.shape
+    stem = _stem_within(record, identification, whole)
     for j, name in enumerate(record.valves):
         axis = axes[len(record.outputs) + j, 0]
-        true = None if record.stem is None else record.stem[:, j]
-        draw_valve(axis, at, record.op[:, j], true, identification.stem[:, j] if known else None)
+        true = None if shown.stem is None else shown.stem[:, j]
+        draw_valve(axis, at, shown.op[:, j], true, None if stem is None else stem[:, j])
         axis.set_title(name)
         legend(axis)
     axes[-1, 0].set_xlabel(time.label)
     axes[-1, 0].set_xlim(at[0], at[-1])
     legend(axes[0, 0])
-    caption = "The record, and the stem positions that the identified valves give for its OP."
+    caption = "The record, and the stem positions that the identified valves give for its OP"
+    caption += "." if len(whole) == len(record) else " in the part that was looked at."
     return Drawing("signals", "Signals and stems", caption, figure)
+
+
+def _stem_within(
+    record: Record, identification: Identification, whole: Record
+) -> FloatArray | None:
+    """Return the estimated stems at the samples of ``whole.filled()``, NaN elsewhere."""
+    if identification.stem.shape != record.op.shape:
+        return None
+    rows = whole.filled_rows()
+    stem = np.full((int(rows[-1]) + 1, len(record.valves)), np.nan)
+    for first, _, start in whole.segments:
+        begin = first + round((record.start - start) / record.sample_time)
+        end = begin + len(record)
+        if begin >= first and np.array_equal(whole.op[begin:end], record.op):
+            stem[rows[begin:end]] = identification.stem
+            return stem
+    return None
 
 
 def _curves(record: Record, identification: Identification) -> Drawing:

@@ -28,11 +28,13 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records import Record
+from stiction_ros.records.quality import Quality
 
 OFFSET_SAMPLES = 50
 NEEDED_CYCLES = 4
 NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1
 LEAST_LINE = 0.25  # share of the variance inside the holds that a cycle explains at least
+MOST_MISSING = 0.5  # share of the samples of a phase that may be missing in the record
 _SHORTEST = 6.0  # samples; below that a cycle cannot be told from noise
 
 
@@ -189,7 +191,9 @@ def score(
         period: dominant period, samples; None leaves amplitudes out.
         noise_std: σ of the measurement noise of each output where known, else 0.
     """
-    error, stretches = errors(record.part(first, last))
+    part = record.part(first, last)
+    there = part.quality != Quality.BAD
+    error, stretches = errors(part)
     return Phase(
         first,
         last,
@@ -197,7 +201,7 @@ def score(
             name: Score(
                 None if period is None else amplitude(error[:, j], stretches, period),
                 offset(error[:, j], stretches),
-                iae_per_hour(error[:, j], noise_std[j]),
+                iae_per_hour(error[there, j], noise_std[j]),
             )
             for j, name in enumerate(record.outputs)
         },
@@ -205,10 +209,17 @@ def score(
 
 
 def errors(record: Record) -> tuple[FloatArray, list[tuple[int, int]]]:
-    """Return PV − SP, shape (N, p), and the holds; without SP deviations from the mean."""
+    """Return PV − SP, shape (N, p), and the holds; without SP deviations from the mean.
+
+    A sample that is missing in the record has the error 0 and is in no hold.
+    """
+    there = record.quality != Quality.BAD
+    error = record.pv - (record.pv[there].mean(axis=0) if record.sp is None else record.sp)
+    error[~there] = 0.0
+    stretches = record.usable_rows(set(Quality) - {Quality.BAD})
     if record.sp is None:
-        return record.pv - record.pv.mean(axis=0), [(0, len(record))]
-    return record.pv - record.sp, holds(record.sp)
+        return error, stretches
+    return error, [(a + f, a + b) for a, z in stretches for f, b in holds(record.sp[a:z])]
 
 
 def phases(
@@ -245,11 +256,17 @@ def phases(
         if ended < 1:
             reason = f"the swap at sample {swap} came before the first round of set-points ended"
             return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
+    if _gap(record, *spans[:2]):
+        reason = "the record has a gap in the last round of set-points before the swap"
+        return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
     cycle = dominant_cycle(*errors(record.part(spans[0], spans[1])))
     period = None if cycle is None else cycle.period
     before = score(record, spans[0], spans[1], period, sigma)
     if spans[3] > len(record):
         reason = "the record ends before one whole round of set-points after the swap"
+        return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
+    if _gap(record, *spans[2:]):
+        reason = "the record has a gap in the first round of set-points after the swap"
         return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
     after = score(record, spans[2], spans[3], period, sigma)
     reason = _no_cycle(cycle)
@@ -263,10 +280,19 @@ def _unswapped(record: Record, round_samples: int | None, sigma: Sequence[float]
     if round_samples is not None and last >= round_samples:
         last -= last % round_samples
         first = last - round_samples
+    reason = "the controller was never swapped"
+    if _gap(record, first, last):
+        reason += ", and most of its last round of set-points is missing in the record"
+        return Phases(PhaseStatus.NO_SWAP, reason, None, None, None)
     cycle = dominant_cycle(*errors(record.part(first, last)))
     before = score(record, first, last, None if cycle is None else cycle.period, sigma)
-    reason = "the controller was never swapped"
     return Phases(PhaseStatus.NO_SWAP, reason, cycle, before, None)
+
+
+def _gap(record: Record, first: int, last: int) -> bool:
+    """Tell whether too much is missing in a phase to score it."""
+    missing = record.quality[first:last] == Quality.BAD
+    return bool(missing.mean() > MOST_MISSING)
 
 
 def _no_cycle(cycle: Cycle | None) -> str:

@@ -12,12 +12,14 @@ import yaml
 from graph import Graph
 
 from stiction_ros.config_files import find_config
+from stiction_ros.loop import read_valve_changes
 from stiction_ros.nodes.messages import SECOND, to_ns
 from stiction_ros.online.session import LiveRun, Scenario, run_live
 
 SAMPLES = 150
 SCHEDULE = {"fit_first": 120, "fit_every": 1000, "fit_latency": 5}
 OTHERS = ["controller", "estimator", "recorder"]
+CHANGES = "[{time: 60.0, valve: V1, effects: [{effect: stiction, law: he, f_s: 2.0, f_d: 1.0}]}]"
 
 
 def parameters(node: str) -> dict[str, Any]:
@@ -31,7 +33,7 @@ def run() -> Iterator[Graph]:
     graph = Graph()
     graph.listen("recorder")
     nodes = {
-        "plant": parameters("plant") | {"samples": SAMPLES, "seed": 4},
+        "plant": parameters("plant") | {"samples": SAMPLES, "seed": 4, "valve_changes": CHANGES},
         "controller": parameters("controller") | SCHEDULE,
         "estimator": parameters("estimator")
         | SCHEDULE
@@ -57,7 +59,10 @@ def twin() -> LiveRun:
         scenario.estimator, window=120, delay_low=5, delay_high=5, **SCHEDULE
     )
     controller = dataclasses.replace(scenario.controller, **SCHEDULE)
-    scenario = dataclasses.replace(scenario, estimator=estimator, controller=controller)
+    changes = read_valve_changes(CHANGES, scenario.plant.valve_names)
+    scenario = dataclasses.replace(
+        scenario, estimator=estimator, controller=controller, valve_changes=changes
+    )
     return run_live(scenario, samples=SAMPLES, seed=4)
 
 
@@ -82,6 +87,13 @@ def test_the_numbers_are_those_without_ros_bit_for_bit(
     expected = getattr(twin.run.record, topic)
     found = np.array([list(m.position) for m in run.seen[topic]])
     assert np.array_equal(found, expected)
+
+
+def test_the_valve_changes_at_its_time(run: Graph) -> None:
+    """The stem, after a change of friction, stays within the new f_S of OP."""
+    op, stem = (np.array([m.position[0] for m in run.seen[t]]) for t in ("op", "stem"))
+    assert np.abs(op - stem)[:60].max() > 2.0
+    assert np.abs(op - stem)[60:].max() <= 2.0
 
 
 @pytest.mark.parametrize(

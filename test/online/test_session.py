@@ -76,6 +76,31 @@ def test_ideal_valves_follow_op(siso: Scenario) -> None:
     assert np.array_equal(run.stem_estimate, run.run.record.op)
 
 
+CHANGES = [{"time": 30.0, "valve": "V1", "effects": [{"effect": "backlash", "band": 2.0}]}]
+
+
+@pytest.mark.parametrize("value", [CHANGES, str(CHANGES)], ids=["list", "text"])
+def test_a_valve_changes_in_mid_run(value: Any, tmp_path: Path) -> None:
+    path = written(tmp_path, "plant", "valve_changes", value)
+    scenario = Scenario.load(path)
+    assert isinstance(scenario.nodes["plant"]["valve_changes"], str)  # as a ROS parameter is
+    changed = run_live(scenario, samples=90, identify=False).run.record
+    as_before = dataclasses.replace(scenario, valve_changes=())
+    plain = run_live(as_before, samples=90, identify=False).run.record
+    assert changed.stem is not None
+    assert plain.stem is not None
+    assert np.array_equal(changed.stem[:30], plain.stem[:30])
+    assert not np.array_equal(changed.stem[30:], plain.stem[30:])
+    assert np.all(np.abs(changed.stem - changed.op)[30:] <= 6.0)
+
+
+def test_ideal_valves_stay_ideal_whatever_changes(tmp_path: Path) -> None:
+    scenario = Scenario.load(written(tmp_path, "plant", "valve_changes", CHANGES))
+    record = run_live(scenario, samples=60, ideal_valves=True, identify=False).run.record
+    assert record.stem is not None
+    assert np.array_equal(record.stem, record.op)
+
+
 def test_a_window_that_cannot_be_used_does_not_end_the_run(siso: Scenario) -> None:
     """A window of ten samples is too short for a fit; the loop must go on."""
     changes: dict[str, Any] = {"fit_first": 10, "fit_every": 40}
@@ -107,6 +132,8 @@ WRONG = [
     ("plant", "seed", -1),
     ("plant", "model", "none.loop.yaml"),
     ("plant", "set_points", "none.yaml"),
+    ("plant", "valve_changes", [{"time": 1.0, "valve": "V9", "effects": []}]),
+    ("plant", "valve_changes", "[{time: soon"),
     ("controller", "horizn", 5),
     ("controller", "horizon", 0),
     ("controller", "horizon", 5.5),

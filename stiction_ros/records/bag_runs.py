@@ -1,0 +1,152 @@
+"""Tells the runs in a bag apart: a plant that was restarted begins its stamps anew.
+
+Around a restart messages of both runs may stand in the bag in any order, so the stamps are
+followed as *chains*: each message continues the chain whose next stamp it bears. A chain that
+begins, in stamps and in the log, behind the end of another goes on with it after a gap; one
+whose stamps fall back is another run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.records.regular import GAP
+
+NEW_RUN = 10
+"""Messages that make a run beside another; fewer are out of order."""
+
+AGAIN = 0.75
+"""How far off, in usual steps, a message counts that shows the present sample again."""
+
+FORGOTTEN = 50
+"""Messages after which a chain that none of them continued is over."""
+
+
+@dataclasses.dataclass
+class Run:
+    """Messages of one run.
+
+    Attributes:
+        place: stamp in ns to the message's number in the log; the last one of each stamp.
+        begin, end: numbers of its first and last message in the log.
+        first, last: smallest and largest stamp, ns.
+    """
+
+    place: dict[int, int]
+    begin: int
+    end: int
+    first: int
+    last: int
+
+    @classmethod
+    def of(cls, stamp: int, number: int) -> Run:
+        """Begin with one message."""
+        return cls({stamp: number}, number, number, stamp, stamp)
+
+    def take(self, stamp: int, number: int) -> None:
+        """Add a message whose stamp is not older than the last."""
+        self.place[stamp] = number
+        self.end, self.last = number, stamp
+
+    def append(self, other: Run) -> None:
+        """Go on with another run behind the end of this one."""
+        self.place.update(other.place)
+        self.end, self.last = other.end, other.last
+
+
+def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> tuple[list[Run], int]:
+    """Return the runs in the order in which they begin, and how many messages are in none.
+
+    Args:
+        stamps: of one signal in the order of the log, ns.
+        numbers: of these messages in the log, increasing.
+    """
+    pieces = _connected(_chains(stamps, numbers))
+    if not pieces:
+        return [], 0
+    longest = max(pieces, key=lambda run: len(run.place))
+    runs = [run for run in pieces if run is longest or len(run.place) >= NEW_RUN]
+    lost = 0
+    for stray in (run for run in pieces if not any(run is kept for kept in runs)):
+        for stamp, number in stray.place.items():
+            lost += not _inserted(runs, stamp, number)
+    return runs, lost
+
+
+def run_of(runs: Sequence[Run], stamp: int, number: int) -> Run | None:
+    """Return the run in which a message of another signal belongs; None when there is none.
+
+    Of the runs that have its stamp it is the one that has it nearest in the log.
+    """
+    known = [run for run in runs if stamp in run.place]
+    if len(known) < 2:
+        return known[0] if known else None
+    return min(known, key=lambda run: abs(run.place[stamp] - number))
+
+
+def _chains(stamps: Sequence[int], numbers: Sequence[int]) -> list[Run]:
+    """Follow the stamps; return the chains in the order in which they begin."""
+    step = _usual_step(stamps)
+    chains: list[Run] = []
+    alive: list[tuple[int, Run]] = []  # when it was continued last, newest at the end
+    for k, (stamp, number) in enumerate(zip(stamps, numbers, strict=True)):
+        alive = [entry for entry in alive if k - entry[0] <= FORGOTTEN]
+        best, best_off = -1, float("inf")
+        for place in range(len(alive) - 1, -1, -1):
+            ahead = stamp - alive[place][1].last
+            off = abs(ahead - step) if ahead else AGAIN * step
+            if 0 <= ahead <= GAP * step and off < best_off:
+                best, best_off = place, off
+        if best < 0:
+            chain = Run.of(stamp, number)
+            chains.append(chain)
+        else:
+            _, chain = alive.pop(best)
+            chain.take(stamp, number)
+        alive.append((k, chain))
+    return chains
+
+
+def _usual_step(stamps: Sequence[int]) -> float:
+    """Return the usual step from one message of a run to the next, ns.
+
+    Where two runs alternate the next message is the next but one.
+    """
+    found = []
+    for lag in (1, 2):
+        given = np.asarray(stamps, dtype=np.int64)
+        steps = given[lag:] - given[:-lag]
+        steps = steps[steps > 0]
+        if len(steps):
+            found.append(float(np.median(steps)))
+    return min(found, default=1.0)
+
+
+def _connected(chains: Sequence[Run]) -> list[Run]:
+    """Join chains of which one begins where another has ended, in stamps and in the log."""
+    runs: list[Run] = []
+    for chain in chains:
+        before = [run for run in runs if run.last < chain.first and run.end < chain.begin]
+        if before:
+            max(before, key=lambda run: run.end).append(chain)
+        else:
+            runs.append(chain)
+    return runs
+
+
+def _inserted(runs: Sequence[Run], stamp: int, number: int) -> bool:
+    """Put a message that came out of order where it is missing; tell whether it was."""
+    near = [
+        run
+        for run in runs
+        if stamp not in run.place
+        and run.first < stamp < run.last
+        and run.begin <= number <= run.end + FORGOTTEN
+    ]
+    if len(near) != 1:
+        return False
+    near[0].place[stamp] = number
+    return True

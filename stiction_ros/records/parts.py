@@ -1,0 +1,126 @@
+"""The parts of a record that has gaps: the only one, the longest good one, all in one."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.errors import InputError
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Record
+from stiction_ros.records.segment import Gap
+
+DATES = 3e8
+"""Seconds from which a time is shown as a date: 1979."""
+
+ALIKE = 0.01
+"""Sample times of two parts, one over the other, that count as the same."""
+
+
+def only_part(parts: Sequence[Record], where: str) -> Record:
+    """Return the one part that there is, with every sample usable.
+
+    Raises:
+        InputError: there are several, or samples that are bad.
+    """
+    convert = f"stiction convert writes its {len(parts)} parts as records of their own"
+    if len(parts) > 1:
+        before, after = parts[0], parts[1]
+        end = before.start + float(before.time[-1])
+        if after.start <= end:
+            raise InputError(
+                f"holds more than one run: time falls back from {end:.9g} s to {after.start:.9g} s",
+                where=where,
+                fix=convert,
+            )
+        raise InputError(
+            f"has {len(parts) - 1} gap{'s' * (len(parts) > 2)}, the first of "
+            f"{after.start - end:.6g} s behind {end - before.start:.6g} s",
+            where=where,
+            fix=convert,
+        )
+    bad = int(np.count_nonzero(parts[0].quality == Quality.BAD))
+    if bad:
+        raise InputError(f"has {bad} bad sample{'s' * (bad > 1)}", where=where, fix="cut it there")
+    return parts[0]
+
+
+def longest_part(parts: Sequence[Record]) -> Record:
+    """Return the longest stretch of good samples, its notes saying which it is.
+
+    Args:
+        parts: of one source, in their order, one at least.
+
+    Raises:
+        InputError: no good samples.
+    """
+    good = [part for each in parts for part in each.good_parts()]
+    if not good:
+        raise InputError("has no good samples", where=parts[0].name)
+    found = max(good, key=len)
+    total = sum(len(part) for part in parts)
+    if len(found) == total:
+        return found
+    others = len(good) - 1
+    note = (
+        f"only the longest good part is looked at: {span(found)}, {len(found)} of {total} "
+        f"samples; {1 - len(found) / total:.1%} of the samples, in {others} other good "
+        f"part{'s' * (others != 1)} or not good, are left out"
+    )
+    return dataclasses.replace(found, notes=(*found.notes, note))
+
+
+def span(*parts: Record) -> str:
+    """Return from when to when parts of one clock reach: ``5 s to 20 s``, or dates in UTC."""
+    first, last = parts[0], parts[-1]
+    return f"{_moment(first.start)} to {_moment(last.start + float(last.time[-1]))}"
+
+
+def joined(parts: Sequence[Record]) -> Record:
+    """Return the parts as one record with gaps between them.
+
+    It has the sample time of the longest part; parts with another one, and signals that are
+    not in every part, are left out with a note.
+
+    Args:
+        parts: of one source, in their order, one at least.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    model = max(parts, key=len)
+    kept = [part for part in parts if abs(part.sample_time / model.sample_time - 1.0) <= ALIKE]
+    notes = list(dict.fromkeys(note for part in kept for note in part.notes))
+    if len(kept) < len(parts):
+        other = len(parts) - len(kept)
+        notes.append(
+            f"{other} part{'s' * (other > 1)} with another sample time than "
+            f"{model.sample_time:g} s left out"
+        )
+    ends = np.cumsum([len(part) for part in kept]).tolist()
+    optional = {}
+    for key in ("sp", "stem"):
+        values = [getattr(part, key) for part in kept]
+        known = [value for value in values if value is not None]
+        optional[key] = np.concatenate(known) if len(known) == len(kept) else None
+        if known and len(known) < len(kept):
+            notes.append(f"{key} is not known in every part, left out")
+    return dataclasses.replace(
+        model,
+        op=np.concatenate([part.op for part in kept]),
+        pv=np.concatenate([part.pv for part in kept]),
+        sp=optional["sp"],
+        stem=optional["stem"],
+        start=kept[0].start,
+        notes=tuple(notes),
+        mask=np.concatenate([part.quality for part in kept]),
+        gaps=tuple(Gap(row, part.start) for row, part in zip(ends, kept[1:], strict=False)),
+    )
+
+
+def _moment(seconds: float) -> str:
+    if not DATES < seconds < 2 * 10**9:
+        return f"{seconds:.9g} s"
+    return datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC).isoformat(" ")[:23]

@@ -1,0 +1,34 @@
+"""How good a sample of a record is."""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+
+QualityArray = np.ndarray[tuple[int], np.dtype[np.uint8]]
+
+
+class Quality(enum.IntEnum):
+    """What is known of one sample, as one byte of a record's mask."""
+
+    GOOD = 0
+    """Measured."""
+    HELD = 1
+    """Missing in the source; carried over from its neighbours, or interpolated between them."""
+    BAD = 2
+    """Not to be used; its values may be NaN."""
+    MANUAL = 3
+    """Measured, but the loop was not in automatic."""
+
+    @property
+    def word(self) -> str:
+        """The name in files: ``good``, ``held``, ``bad`` or ``manual``."""
+        return self.name.lower()
+
+
+QUALITY_WORDS = {quality.word: quality for quality in Quality}
+"""Word in files to quality."""
+
+USABLE = (Quality.GOOD, Quality.HELD)
+"""What identification works on."""

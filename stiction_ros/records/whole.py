@@ -1,0 +1,133 @@
+"""All samples that a source holds of a loop, and the records that they make."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.records.quality import QualityArray
+from stiction_ros.records.record import Record
+from stiction_ros.records.regular import HOLE, Part, regular_part, split_at_gaps
+from stiction_ros.records.sampling import sample_time
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """How errors and records name a source.
+
+    Attributes:
+        name: of its records.
+        where: file or bag, for errors.
+        place: names a row for errors, ``place(3)`` → ``line 5``.
+        cut_holes: whether a stretch with too many holes is cut at them, not refused.
+    """
+
+    name: str
+    where: str
+    place: Callable[[int], str]
+    cut_holes: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Whole:
+    """Samples of a loop on one clock, as they were given.
+
+    Attributes:
+        valves, outputs: tags.
+        time: increasing, shape (rows,), s since the first.
+        start: time of the first on the source's own clock, s.
+        op, stem: shape (rows, m); stem None when not known.
+        pv, sp: shape (rows, p); sp None when not known.
+        mask: quality of each row, shape (rows,); None when all are good.
+    """
+
+    valves: tuple[str, ...]
+    outputs: tuple[str, ...]
+    time: FloatArray
+    start: float
+    op: FloatArray
+    pv: FloatArray
+    sp: FloatArray | None
+    stem: FloatArray | None
+    mask: QualityArray | None = None
+
+    def records(self, source: Source, notes: Sequence[str] = ()) -> tuple[Record, ...]:
+        """Return one record for each stretch without a gap.
+
+        A step of more than 5.5 usual ones is a gap. Slightly irregular samples are brought
+        onto a regular grid, short holes are held, and the mask says where.
+
+        Args:
+            source: of the samples.
+            notes: to put before those of every record.
+
+        Raises:
+            InputError: fewer than two rows, or samples that are irregular.
+        """
+        if len(self.time) < 2 or (self.time[1:] <= self.time[:-1]).any():
+            sample_time(self.time, source.where, source.place)  # tells which row
+        stretches = [edge for edge in split_at_gaps(self.time) if edge[1] - edge[0] > 1]
+        lone = len(self.time) - sum(last - first for first, last in stretches)
+        found, left_out = [], 0
+        for first, last in stretches:
+            parts, alone = self._parts(first, last, source.cut_holes)
+            found += parts
+            left_out += alone
+        said = list(notes)
+        if lone:
+            said.append(f"{lone} rows alone between two gaps left out")
+        if left_out:
+            said.append(f"{left_out} rows alone between two holes left out")
+        if len(found) > 1:
+            said.append(f"split at {len(found) - 1} gap{'s' * (len(found) > 2)}")
+        return self._regular(found, source, said)
+
+    def _parts(self, first: int, last: int, cut_holes: bool) -> tuple[list[Part], int]:
+        """Return the stretch as it is, or its pieces between holes, and how many rows are lost."""
+        part = regular_part(self.time, first, last)
+        if part.note or not cut_holes or last - first < 3:
+            return [part], 0
+        edges = split_at_gaps(self.time[first:last], HOLE)
+        pieces = [(first + a, first + b) for a, b in edges if b - a > 1]
+        if len(edges) == 1 or not pieces:
+            return [part], 0
+        lost = last - first - sum(b - a for a, b in pieces)
+        return [regular_part(self.time, a, b) for a, b in pieces], lost
+
+    def _regular(
+        self, parts: Sequence[Part], source: Source, notes: list[str]
+    ) -> tuple[Record, ...]:
+        """Return the parts as records; those that are irregular are left out if others are not."""
+        found: list[Record] = []
+        refused: list[InputError] = []
+        for part in parts:
+            try:
+                found.append(self._record(part, source, notes))
+            except InputError as error:
+                refused.append(error)
+        if refused and (not found or not source.cut_holes):
+            raise refused[0]
+        if refused:
+            notes.append(f"{len(refused)} irregular parts left out: {refused[0].what}")
+            found = [dataclasses.replace(r, notes=(*r.notes, notes[-1])) for r in found]
+        return tuple(found)
+
+    def _record(self, part: Part, source: Source, notes: Sequence[str]) -> Record:
+        step, more = sample_time(
+            part.time, source.where, lambda row: source.place(part.first + row)
+        )
+        return Record(
+            name=source.name,
+            sample_time=step,
+            valves=self.valves,
+            outputs=self.outputs,
+            op=part.held(self.op),
+            pv=part.interpolated(self.pv),
+            sp=None if self.sp is None else part.held(self.sp),
+            stem=None if self.stem is None else part.interpolated(self.stem),
+            start=self.start + float(part.time[0]),
+            notes=(*notes, *([part.note] if part.note else []), *more),
+            mask=part.quality(self.mask),
+        )

@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiction_ros.records.bag_runs import run_of, tell_runs
+
+STEP = 10**9
+
+
+def told(stamps: list[int]) -> list[list[int]]:
+    """Return the stamps of each run, in steps."""
+    runs, _ = tell_runs([stamp * STEP for stamp in stamps], list(range(len(stamps))))
+    return [sorted(stamp // STEP for stamp in run.place) for run in runs]
+
+
+def test_nothing_is_no_run() -> None:
+    assert tell_runs([], []) == ([], 0)
+
+
+def test_a_gap_is_no_new_run() -> None:
+    stamps = [*range(20), *range(500, 520), *range(9000, 9003)]
+    assert told(stamps) == [stamps]
+
+
+def test_a_restart_is_a_new_run_and_goes_on_beyond_the_end_of_the_old_one() -> None:
+    first, second = list(range(100)), list(range(250))
+    assert told(first + second) == [first, second]
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(12, 60),
+    st.integers(12, 60),
+    st.integers(300, 10**6),
+    st.integers(0, 10),
+    st.integers(0, 2**31),
+)
+def test_runs_that_overlap_in_the_log_are_told_apart(
+    old: int, new: int, begin: int, mixed: int, seed: int
+) -> None:
+    """Messages of the old run come up to ten messages late, among those of the new one."""
+    random = np.random.default_rng(seed)
+    first, second = [begin + k for k in range(old)], list(range(new))
+    late = first[old - mixed :]
+    places = sorted(random.integers(0, min(new, 20), mixed).tolist())
+    log = first[: old - mixed]
+    for k, stamp in enumerate(second):
+        log.append(stamp)
+        log += [late[i] for i in range(mixed) if places[i] == k]
+    assert told(log) == [first, second]
+
+
+def test_two_plants_that_alternate_all_the_time_are_told_apart() -> None:
+    log = [stamp for k in range(50) for stamp in (500 + k, k)]
+    assert told(log) == [[500 + k for k in range(50)], list(range(50))]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.sets(st.integers(1, 98), max_size=15))
+def test_lost_messages_break_no_run(lost: set[int]) -> None:
+    kept = [k for k in range(100) if k not in lost]
+    assert told(kept) == [kept]
+    assert told(kept + kept) == [kept, kept]
+
+
+@pytest.mark.parametrize("stray", [[-5], [10**9], [3, 2], [40, 10**6, 7]])
+def test_a_few_stamps_out_of_order_are_no_run(stray: list[int]) -> None:
+    log = [*range(50), *stray, *range(50, 90)]
+    runs, lost = tell_runs([s * STEP for s in log], list(range(len(log))))
+    assert [len(run.place) for run in runs] == [90]
+    assert lost == len(stray)
+
+
+def test_swapped_messages_are_put_in_order() -> None:
+    log = [*range(30), 31, 30, *range(32, 60)]
+    assert told(log) == [list(range(60))]
+    assert tell_runs([s * STEP for s in log], list(range(60)))[1] == 0
+
+
+def test_a_sample_that_is_shown_again_is_one_sample() -> None:
+    log = [*range(30), 29, 29, 29, *range(30, 50)]
+    runs, lost = tell_runs([s * STEP for s in log], list(range(len(log))))
+    assert (len(runs), len(runs[0].place), lost) == (1, 50, 0)
+    assert runs[0].place[29 * STEP] == 32  # what was said last
+
+
+def test_the_jitter_of_a_clock_is_no_run() -> None:
+    random = np.random.default_rng(2)
+    stamps = (np.arange(300) * STEP + random.uniform(-0.4, 0.4, 300) * STEP).astype(int).tolist()
+    runs, lost = tell_runs(stamps, list(range(300)))
+    assert ([len(run.place) for run in runs], lost) == ([300], 0)
+
+
+def test_another_signal_goes_to_the_run_that_is_nearest_in_the_log() -> None:
+    log = [*range(100), *range(100)]
+    runs, _ = tell_runs([s * STEP for s in log], list(range(200)))
+    assert run_of(runs, 50 * STEP, 51) is runs[0]
+    assert run_of(runs, 50 * STEP, 152) is runs[1]
+    assert run_of(runs, 500 * STEP, 152) is None
