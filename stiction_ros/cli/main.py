@@ -25,6 +25,7 @@ from stiction_ros.cli import (
     repair,
     replay,
     report,
+    soak,
     study,
     study_control,
     study_monitor,
@@ -48,6 +49,7 @@ COMMANDS = (
     study_control,
     study_monitor,
     faults,
+    soak,
     bench,
 )
 

@@ -40,12 +40,18 @@ ANSWER = 10.0  # s for a service to answer
 class Probe:
     """One node in this process, spun by a thread; what it heard lies in its lists."""
 
-    def __init__(self, environment: Mapping[str, str], commander: str = "/controller") -> None:
+    def __init__(
+        self,
+        environment: Mapping[str, str],
+        commander: str = "/controller",
+        topics: Sequence[str] = HEARD,
+    ) -> None:
         """Join the domain that ``environment`` names.
 
         Args:
             environment: as the nodes get it.
             commander: full name of the node whose ``op`` counts.
+            topics: signals that are heard, besides the diagnostics.
         """
         for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"):
             if name in environment:
@@ -54,7 +60,7 @@ class Probe:
         self.context.init(domain_id=int(environment["ROS_DOMAIN_ID"]))
         self.node = Node("faults", context=self.context)
         self.commander = commander
-        self.heard: dict[str, list[Sampled]] = {topic: [] for topic in HEARD}
+        self.heard: dict[str, list[Sampled]] = {topic: [] for topic in topics}
         self.statuses: list[Shown] = []
         self.values: dict[str, dict[str, str]] = {}  # by name of the status
         self.known = Known()
@@ -62,7 +68,7 @@ class Probe:
         self._rules: dict[str, Rule] = {}
         self._publishers: dict[str, Any] = {}
         self._nodes: list[Node] = [self.node]
-        for topic in HEARD:
+        for topic in topics:
             self.node.create_subscription(JointState, topic, self._hearing(topic), DEEP_QOS)
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_status, DEEP_QOS)
         self._executor = SingleThreadedExecutor(context=self.context)
