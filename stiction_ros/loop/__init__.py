@@ -7,6 +7,7 @@ from stiction_ros.loop.closed_loop import (
     simulate_closed_loop,
 )
 from stiction_ros.loop.excitation import prbs_experiment, random_binary, simulate_open_loop
+from stiction_ros.loop.instrument import Instrument
 from stiction_ros.loop.model import Disturbance, LoopModel, PiTuning, Valve
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
@@ -16,6 +17,7 @@ __all__ = [
     "ClosedLoopRun",
     "Controller",
     "Disturbance",
+    "Instrument",
     "LoopModel",
     "Measurement",
     "PiController",

@@ -15,8 +15,9 @@ from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop.effect_reading import read_effects
+from stiction_ros.loop.instrument import Instrument
 from stiction_ros.loop.places import append_effect
-from stiction_ros.loop.process_reading import read_process
+from stiction_ros.loop.process_reading import read_instruments, read_process
 from stiction_ros.loop.reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process
 
@@ -63,6 +64,7 @@ class LoopModel:
         stem_start, pv_start: where a simulation starts, same shapes.
         controller: the recorded PI tuning, or None.
         provenance: who added which effect, when, with what evidence.
+        instruments: what the instrument of each output can show, in the order of the outputs.
         document: the validated YAML mapping, which :meth:`to_yaml` writes.
     """
 
@@ -78,6 +80,7 @@ class LoopModel:
     pv_start: FloatArray
     controller: PiTuning | None
     provenance: tuple[Mapping[str, Any], ...]
+    instruments: tuple[Instrument, ...]
     document: Mapping[str, Any] = dataclasses.field(repr=False)
 
     @classmethod
@@ -141,6 +144,7 @@ class LoopModel:
             pv_start,
             controller,
             provenance,
+            read_instruments(section, process.outputs),
             copy.deepcopy(dict(document)),
         )
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
 from stiction_ros.effects import Behaviour, FloatArray, LinearFilter
 from stiction_ros.errors import InputError
 from stiction_ros.loop.effect_reading import read_effects
+from stiction_ros.loop.instrument import Instrument
 from stiction_ros.loop.reading import Section
 from stiction_ros.processes import (
     AlteredProcess,
@@ -59,7 +61,7 @@ def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Proc
             raise InputError("names no valve", where=b_section.where)
         delay = {v: delays.integer(v, 0) for v in b}
         delays.finish()
-        entry.raw("effects", [])  # see read_process
+        _read_elsewhere(entry)
         try:
             equation = ArxOutput(
                 name,
@@ -123,9 +125,38 @@ def _read_outputs(
     for entry in section.sections("outputs"):
         names.append(entry.text("name"))
         noise.append(_read_noise(entry))
-        entry.raw("effects", [])  # see read_process
+        _read_elsewhere(entry)
         entry.finish()
     return tuple(names), tuple(noise)
+
+
+def _read_elsewhere(entry: Section) -> None:
+    """Pass over what :func:`read_process` and :func:`read_instruments` read of an output."""
+    for key in ("effects", "range", "rate_limit"):
+        entry.raw(key, None)
+
+
+def read_instruments(section: Section, outputs: tuple[str, ...]) -> tuple[Instrument, ...]:
+    """Return the limits of the instrument of each output; ``section`` is the process."""
+    found = {
+        entry.text("name"): _read_instrument(entry) for entry in section.sections("outputs", [])
+    }
+    return tuple(found.get(name, Instrument()) for name in outputs)
+
+
+def _read_instrument(entry: Section) -> Instrument:
+    low, high, rate = -math.inf, math.inf, math.inf
+    if "range" in entry:
+        low, high = entry.numbers("range", count=2).tolist()
+        if low >= high:
+            raise InputError(
+                f"lower end {low:g} is not below {high:g}",
+                where=entry.at("range"),
+                fix="write [low, high]",
+            )
+    if "rate_limit" in entry:
+        rate = entry.number("rate_limit", above=0.0)
+    return Instrument(low, high, rate)
 
 
 def _read_filters(entry: Section) -> tuple[Behaviour, ...]:

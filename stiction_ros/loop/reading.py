@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -39,6 +40,49 @@ def parse_yaml(text: str, where: str) -> Any:
         raise InputError(f"no valid YAML{line} ({problem})", where=where) from None
     except (ValueError, RecursionError) as error:  # a date that does not exist, 1000 brackets
         raise InputError(f"no valid YAML ({error})", where=where) from None
+
+
+@dataclasses.dataclass(frozen=True)
+class TextLimits:
+    """What a YAML text from outside may need to be read: time and memory are bounded by these.
+
+    Attributes:
+        characters: of the text.
+        depth: lists and mappings within one another.
+        nodes: values, keys, lists and mappings altogether.
+    """
+
+    characters: int = 65_536
+    depth: int = 20
+    nodes: int = 2000
+
+
+def parse_limited(text: str, where: str, limits: TextLimits = TextLimits()) -> Any:
+    """Return what a YAML text from outside holds; nothing in the error repeats the text.
+
+    Raises:
+        InputError: the text is longer, deeper or fuller than the limits, has aliases, or is no
+            YAML.
+    """
+    if len(text) > limits.characters:
+        raise InputError(f"more than {limits.characters} characters", where=where)
+    depth = nodes = 0
+    try:
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            nodes += isinstance(event, yaml.NodeEvent)
+            if isinstance(event, yaml.AliasEvent):
+                raise InputError("aliases are not read", where=where, fix="write values in full")
+            if depth > limits.depth:
+                raise InputError(f"nested deeper than {limits.depth} levels", where=where)
+            if nodes > limits.nodes:
+                raise InputError(f"more than {limits.nodes} keys and values", where=where)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f" in line {mark.line + 1}" if mark is not None else ""
+        raise InputError(f"no valid YAML{line}", where=where) from None
+    return parse_yaml(text, where)
 
 
 class Section:

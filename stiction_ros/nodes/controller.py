@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from typing import Any
 
 from rclpy.clock import Clock as RosClock
@@ -16,11 +18,19 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.controller_inputs import ControllerInputs
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, diagnosis, joint_state, trajectory
+from stiction_ros.nodes.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
 from stiction_ros.nodes.runner import run
-from stiction_ros.online.inbox import Inbox
+from stiction_ros.online.background import AtOnce, Beside
+from stiction_ros.online.health import Noticed
+from stiction_ros.online.input_port import InputPort
 from stiction_ros.online.live_controller import LiveController
 from stiction_ros.online.node_settings import ControllerNodeSettings
+from stiction_ros.online.port_health import PortHealth, keys
+from stiction_ros.online.rehearsal import rehearse
+from stiction_ros.online.samples import PortRules, Sample
+
+QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks at what has not come
+GRAPH_PERIOD = 1.0  # s between two looks at who commands
 
 
 class ControllerNode(ControllerInputs):
@@ -29,7 +39,9 @@ class ControllerNode(ControllerInputs):
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``controller``; ``kwargs`` go to the ROS node."""
         super().__init__("controller", ControllerNodeSettings, **kwargs)
-        self._wall = RosClock(clock_type=ClockType.STEADY_TIME)
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        self._timers_of_run: list[Any] = []
+        self.listening = False
 
     def configure(self) -> None:
         settings = self.settings
@@ -38,20 +50,34 @@ class ControllerNode(ControllerInputs):
                 "no loop model", where="controller: model", fix="set it to a *.loop.yaml"
             )
         self.model = LoopModel.load(find_config(settings.model))
-        self.live = LiveController(settings, self.model)
+        lockstep = settings.pace == "lockstep"
+        self.background = AtOnce() if lockstep else Beside()
+        self.live = LiveController(settings, self.model, self.background)
+        if not lockstep:
+            rehearse(settings, self.model)
         self._plan_names = (*self.model.outputs, *self.model.valve_names)
         self._step = round(self.model.sample_time * SECOND)
-        self._origin = None
-        self._sample = 0
-        self._last_op = None
         measured = self.model.process.measured_disturbances
-        needs_dv = bool(measured) and settings.pace == "lockstep"
-        self._inbox = Inbox(settings.sp_source == "schedule", needs_dv)
-        self._fits, self._models = {}, {""}
+        self.port = InputPort(
+            PortRules(
+                step=self._step,
+                instruments=self.model.instruments,
+                lockstep=lockstep,
+                period=self.model.sample_time / settings.speed,
+                scheduled=settings.sp_source == "schedule",
+                needs_dv=bool(measured),
+            )
+        )
+        self.noticed = Noticed(time.monotonic)
+        self._port_health = PortHealth(lockstep)
+        self.fits, self.models, self.reading = {}, {""}, deque()
+        self._last_op: JointState | None = None
         self._waiting_since: int | None = None
         self._told = self._doubts = 0
-        self._held = ""
         self._result: StepResult | None = None
+        self._sent_at: float | None = None
+        self._running_since = time.monotonic()
+        self._level = "ok"
         others = ("plant", "estimator")
         self._op = self.outlet(JointState, "op", SIGNAL_QOS, others)
         self._prediction = self.outlet(JointTrajectory, "prediction", SIGNAL_QOS)
@@ -64,79 +90,192 @@ class ControllerNode(ControllerInputs):
     def hardware(self) -> str:
         return self.model.name
 
+    def activate(self) -> None:
+        self.listening = False
+        self.drain()  # what queued up before is not answered
+        self.port.rest()
+        self.listening = True
+        self._running_since = time.monotonic()
+        period = self.model.sample_time / self.settings.speed
+        looks = min(max(period / 2, QUICKEST), SLOWEST)
+        for seconds, look in ((looks, self._look), (GRAPH_PERIOD, self._look_at_graph)):
+            self._timers_of_run.append(self.create_timer(seconds, look, clock=self._steady))
+
+    def deactivate(self) -> None:
+        self.listening = False
+        while self._timers_of_run:
+            self.destroy_timer(self._timers_of_run.pop())
+
+    def finish(self) -> None:
+        super().finish()
+        self._close()
+
+    def _tear_down(self) -> None:
+        self.deactivate()
+        super()._tear_down()
+        self._close()
+
+    def _close(self) -> None:
+        """End what is done beside the loop; a node that was never configured has nothing."""
+        if hasattr(self, "live"):
+            self.live.close()
+            self.background.close()
+
     def linked(self) -> None:
-        self._try_step()
+        self._running_since = time.monotonic()
+        self.go()
 
     def retune(self, settings: Any) -> None:
         self.live.retune(settings)
+        if settings.speed != self.settings.speed:
+            self.port.retune(self.model.sample_time / settings.speed)
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
-        if self._waiting_since is not None and not self.failure:
-            waited = (self._wall.now().nanoseconds - self._waiting_since) / SECOND
-            if waited > self.settings.fit_timeout:
-                self._fail(f"no fit came within {self.settings.fit_timeout:g} s")
-        level = "warn" if self._held else "ok"
+        now = time.monotonic()
+        level, text = self.noticed.level, self.noticed.text
+        age = "" if self._sent_at is None else f"{now - self._sent_at:.3f}"
         last = [] if self._result is None else diagnosis(self._result)
-        return level, self._held or "running", [("sample", self._sample), *last]
+        values = [("sample", self.port.next), ("op_age", age), *keys(self.port.state(now)), *last]
+        return level, self.failure or text or "running", values
 
     # ---- the step --------------------------------------------------------------------------
 
-    def _try_step(self) -> None:
+    def go(self) -> None:
         """Step every sample that has all it needs, oldest first."""
-        while self.running:
-            sample = self._inbox.first()
-            if sample is None or not self._fit_is_there():
+        if not self.running:
+            return
+        if self.settings.pace == "realtime":
+            self.drain()
+        self.collect_offers()
+        while self.running and self.port.ready() and self._fit_is_there():
+            samples = self.port.take(time.monotonic())
+            if not samples:
                 return
-            self._inbox.used(sample)
-            stamp, coming = sample.stamp, self._inbox.preview
-            ahead = coming and coming.ahead(sample.sp, stamp, self._step, self.settings.horizon)
-            result = self.live.step(sample.pv, sample.sp, sample.dv, ahead)
-            self.stamp = stamp
-            self._last_op = joint_state(stamp, self.model.valve_names, result.op)
-            self._op.publish(self._last_op)
-            self._sample += 1
-            before, self._result, self._held = self._result, result, result.reason
-            rows, picks = self.live.prediction(result, self.settings.prediction_points)
-            times = (picks * self.model.sample_time).tolist()
-            self._prediction.publish(trajectory(stamp, self._plan_names, rows, times))
-            self._tell_changes()
-            if before is not None and before.strategy != result.strategy:
-                self.report()
+            self._work(samples)
 
-    def _fit_is_there(self) -> bool:
-        """Return whether the fit that takes effect at the present sample has come."""
-        if self.settings.pace != "lockstep" or self.settings.mode != "auto":
-            return True
-        end = self.settings.awaited(self._sample)
-        if end is None or self._origin is None:
-            return True
-        stamp = self._origin + end * self._step
-        if self._fits.get(stamp, "?") in self._models:
-            self._waiting_since = None
-            self._fits = {s: f for s, f in self._fits.items() if s > stamp}
-            return True
-        if self._waiting_since is None:
-            self._waiting_since = self._wall.now().nanoseconds
-        return False
+    def is_answered(self, stamp: int) -> bool:
+        last = self._last_op
+        if self.settings.pace != "lockstep" or last is None or stamp != to_ns(last.header.stamp):
+            return False
+        if self.running:
+            self._op.publish(last)
+        return True
+
+    def _look(self) -> None:
+        """See what has not come, and go on without it."""
+        if not self.running:
+            return
+        self.go()
+        self._work(self.port.overdue(time.monotonic()))
+        now = time.monotonic()
+        for name, level, text in self._port_health.look(
+            self.port.state(now), now - self._running_since
+        ):
+            self._notice(name, level, text)
+        self._await_fit(now)
+        if self.noticed.level != self._level:
+            self._level = self.noticed.level
+            self.report()
+
+    def _work(self, samples: tuple[Sample, ...]) -> None:
+        for sample in samples:
+            self._tell_what_was_given(sample)
+            if sample.answered:
+                self._answer(sample)
+            else:
+                self.live.pass_over(sample.pv, sample.dv)
+
+    def _tell_what_was_given(self, sample: Sample) -> None:
+        given, own = sample.given, None if self._result is None else self._result.op
+        if sample.begins:
+            in_force = given.op
+            if in_force is None:
+                in_force = self.model.stem_start if own is None else own
+                shown = ", ".join(f"{value:g}" for value in in_force)
+                self.get_logger().warning(f"nobody tells the op in force, taken to be {shown}")
+            self.live.begin(in_force)
+            self.get_logger().info(f"sample {sample.number}: a run begins")
+        elif given.op is not None:
+            self.live.applied(given.op)
+        elif not given.known and own is not None:
+            self.live.applied(own, known=False)
+
+    def _answer(self, sample: Sample) -> None:
+        stamp, coming = sample.stamp, self.port.preview
+        ahead = coming and coming.ahead(sample.sp, stamp, self._step, self.settings.horizon)
+        result = self.live.step(sample.pv, sample.sp, sample.dv, ahead)
+        self.stamp = stamp
+        self._last_op = joint_state(stamp, self.model.valve_names, result.op)
+        self._last_op.header.frame_id = self.get_fully_qualified_name()
+        self._op.publish(self._last_op)
+        self._sent_at = time.monotonic()
+        self.port.sent(self._sent_at)
+        before, self._result = self._result, result
+        if result.reason:
+            self.noticed.notice("step", "warn", result.reason)
+        rows, picks = self.live.prediction(result, self.settings.prediction_points)
+        times = (picks * self.model.sample_time).tolist()
+        self._prediction.publish(trajectory(stamp, self._plan_names, rows, times))
+        self._tell_changes()
+        if before is not None and before.strategy != result.strategy:
+            self.report()
 
     def _tell_changes(self) -> None:
         """Publish every change of mode since the last call."""
         for change in self.live.changes[self._told :]:
-            if self._origin is not None:
-                self.stamp = self._origin + change.sample * self._step
+            self.stamp = self.port.stamp_of(change.sample)
             self._mode.publish(String(data=change.mode.value))
             self.get_logger().info(f"sample {change.sample}: {change.mode}, {change.reason}")
-            keys = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
-            self.report([("mode", change.mode.value, [*keys, *self.live.known_friction()])])
+            told = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
+            self.report([("mode", change.mode.value, [*told, *self.live.known_friction()])])
         self._told = len(self.live.changes)
         for sample, reason in self.live.doubts[self._doubts :]:
             self.get_logger().warning(f"sample {sample}: offered model not taken, {reason}")
         self._doubts = len(self.live.doubts)
 
-    def _fail(self, reason: str) -> None:
-        self.failure, self._held = reason, reason
-        self.get_logger().error(f"{reason}; raise fit_timeout or check the estimator")
+    # ---- lockstep --------------------------------------------------------------------------
+
+    def _fit_is_there(self) -> bool:
+        """Return whether the fit that takes effect at the present sample has come."""
+        if self.settings.pace != "lockstep" or self.settings.mode != "auto":
+            return True
+        end = self.settings.awaited(self.port.next)
+        if end is None:
+            return True
+        stamp = self.port.stamp_of(end)
+        if self.fits.get(stamp, "?") in self.models:
+            self._waiting_since = None
+            self.fits = {s: f for s, f in self.fits.items() if s > stamp}
+            return True
+        if self._waiting_since is None:
+            self._waiting_since = time.monotonic()
+        return False
+
+    def _await_fit(self, now: float) -> None:
+        """End the run when an awaited fit does not come."""
+        patience = self.settings.fit_timeout
+        if self._waiting_since is None or self.failure or now - self._waiting_since <= patience:
+            return
+        self.failure = f"no fit came within {patience:g} s"
+        self.noticed.notice("fit", "error", self.failure)
+        self.get_logger().error(f"{self.failure}; raise fit_timeout or check the estimator")
+        self.report()
         self.running, self.finished = False, True
+
+    # ---- health ----------------------------------------------------------------------------
+
+    def _look_at_graph(self) -> None:
+        """See whether someone else commands the same valves."""
+        topic = self.resolve_topic_name("op")
+        found = self.get_publishers_info_by_topic(topic)
+        if len(found) > 1:
+            names = sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
+            self._notice("commanders", "error", f"{topic} is published by {', '.join(names)}")
+
+    def _notice(self, name: str, level: str, text: str) -> None:
+        if self.noticed.notice(name, level, text):
+            log = self.get_logger()
+            (log.error if level == "error" else log.warning)(text)
 
 
 def main() -> int:

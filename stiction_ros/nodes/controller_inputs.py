@@ -1,20 +1,33 @@
-"""The messages that a controller takes, sorted into what its steps use."""
+"""The topics that a controller reads, handed to its input port."""
 
 from __future__ import annotations
 
+import time
 from abc import abstractmethod
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import Future
 
+import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.managed import LATCHED_READER_QOS, READER_QOS, ManagedNode, Outlet
+from stiction_ros.nodes.managed import LATCHED_READER_QOS, READER_QOS, ManagedNode
 from stiction_ros.nodes.messages import rows_of, to_ns, values_of
-from stiction_ros.online.inbox import Inbox, SetPointPreview
+from stiction_ros.online.background import Background
+from stiction_ros.online.input_port import InputPort
 from stiction_ros.online.live_controller import LiveController
+from stiction_ros.online.offered_model import read_offer
+from stiction_ros.online.set_point_preview import SetPointPreview
+
+# What is read to the end before a step, in this order.
+DRAINED = ("op_applied", "sp", "dv", "pv")
+MOST = READER_QOS.depth  # messages of one topic at one go
 
 
 class ControllerInputs(ManagedNode):
@@ -22,82 +35,116 @@ class ControllerInputs(ManagedNode):
 
     model: LoopModel
     live: LiveController
-    _inbox: Inbox
-    _op: Outlet
-    _last_op: JointState | None
-    _origin: int | None
-    _sample: int
-    _step: int
-    _fits: dict[int, str]  # end of window -> valid_from of the model in force
-    _models: set[str]
+    port: InputPort
+    background: Background
+    listening: bool  # whether a PV is for this node: it is active
+    fits: dict[int, str]  # end of window -> valid_from of the model in force
+    models: set[str]  # valid_from of the models that have come
+    reading: deque[Future[LoopModel]]
 
     @abstractmethod
-    def _try_step(self) -> None:
+    def go(self) -> None:
         """Step every sample that has all it needs."""
 
     def listen(self) -> None:
-        """Subscribe."""
+        """Subscribe; rclpy serves what is ready in this order."""
         sp_qos = QoSProfile(depth=READER_QOS.depth)
         if self.settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
-        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
+        self._draining = False
+        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
         self.inlet(JointState, "dv", self._on_dv, READER_QOS)
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
         self.inlet(JointTrajectory, "sp_preview", self._on_preview, READER_QOS)
         self.inlet(JointState, "stiction", self._on_stiction, READER_QOS, ("estimator",))
         self.inlet(String, "loop_model", self._on_model, LATCHED_READER_QOS, ("estimator",))
 
+    def drain(self) -> None:
+        """Take in what is queued of all signals, so that the newest is known."""
+        self._draining = True
+        try:
+            for topic, subscription, _ in self._inlets:
+                if topic in DRAINED:
+                    for _count in range(MOST):
+                        with subscription.handle:
+                            found = subscription.handle.take_message(
+                                subscription.msg_type, subscription.raw
+                            )
+                        if found is None:
+                            break
+                        subscription.callback(found[0])
+        finally:
+            self._draining = False
+
+    def collect_offers(self) -> None:
+        """Offer the loop models that have been read to the controller, in their order."""
+        while self.reading and self.reading[0].done():
+            try:
+                model = self.reading.popleft().result()
+            except InputError as error:
+                self.get_logger().error(f"a loop model is refused: {error}")
+                continue
+            valid_from = int(model.document.get("valid_from", 0))
+            self.live.offer(model, self.port.due(valid_from))
+            self.models.add(str(valid_from))
+
+    def _on_applied(self, message: JointState) -> None:
+        op = values_of(message, self.model.valve_names)
+        self.port.add_applied(time.monotonic(), to_ns(message.header.stamp), op)
+
     def _on_pv(self, message: JointState) -> None:
+        if not self.listening:
+            return
         stamp = to_ns(message.header.stamp)
-        pv = values_of(message, self.model.outputs)
-        if pv is None:
-            self.get_logger().warning("pv without a value for every output is ignored")
-            return
-        if self._origin is None:
-            self._origin = stamp
-        if self._last_op is not None and stamp == to_ns(self._last_op.header.stamp):
-            self._op.publish(self._last_op)  # a plant that was paused shows its sample again
-            return
-        self._inbox.add_pv(stamp, pv)
-        self._try_step()
+        if not self.is_answered(stamp):
+            self.port.add_pv(time.monotonic(), stamp, measured_of(message, self.model.outputs))
+        self._go()
 
     def _on_sp(self, message: JointState) -> None:
         sp = values_of(message, self.model.outputs)
-        if sp is None:
-            self.get_logger().warning("sp without a value for every output is ignored")
-            return
-        self._inbox.add_sp(to_ns(message.header.stamp), sp)
-        self._try_step()
+        self.port.add_sp(time.monotonic(), to_ns(message.header.stamp), sp)
+        self._go_in_lockstep()
 
     def _on_dv(self, message: JointState) -> None:
         dv = values_of(message, self.model.process.measured_disturbances)
-        if dv is not None:
-            self._inbox.add_dv(to_ns(message.header.stamp), dv)
-            self._try_step()
+        self.port.add_dv(time.monotonic(), to_ns(message.header.stamp), dv)
+        self._go_in_lockstep()
 
     def _on_preview(self, message: JointTrajectory) -> None:
         found = rows_of(message, self.model.outputs)
-        if found is None:
-            self.get_logger().warning("sp_preview without rising times and all outputs is ignored")
-            return
-        self._inbox.preview = SetPointPreview(tuple(found[0]), found[1])
+        preview = None if found is None else SetPointPreview(tuple(found[0]), found[1])
+        self.port.add_preview(preview)
 
     def _on_stiction(self, message: JointState) -> None:
-        self._fits[to_ns(message.header.stamp)] = message.header.frame_id
-        self._try_step()
+        self.fits[to_ns(message.header.stamp)] = message.header.frame_id
+        self._go_in_lockstep()
 
     def _on_model(self, message: String) -> None:
-        try:
-            model = LoopModel.from_yaml(message.data, "loop_model")
-        except InputError as error:
-            self.get_logger().error(str(error))
-            return
-        valid_from = int(model.document.get("valid_from", 0))
-        at = self._sample
-        if self._origin is not None:
-            at = max(at, (valid_from - self._origin) // self._step)
-        refused = self.live.offer(model, at)
-        if refused:
-            self.get_logger().error(f"model refused: {refused}")
-        self._models.add(str(valid_from))
-        self._try_step()
+        self.reading.append(self.background.submit(read_offer, message.data, self.model))
+        self.collect_offers()
+        self._go_in_lockstep()
+
+    @abstractmethod
+    def is_answered(self, stamp: int) -> bool:
+        """Answer a sample in lockstep that is shown again; tell whether it was one."""
+
+    def _go_in_lockstep(self) -> None:
+        """Step: what came may be what a sample of an earlier PV has lacked."""
+        if self.settings.pace == "lockstep":
+            self._go()
+
+    def _go(self) -> None:
+        if not self._draining:
+            self.go()
+
+
+def measured_of(message: JointState, names: Sequence[str]) -> FloatArray | None:
+    """Return the values of ``names``, NaN for those without one; None when no name is there."""
+    values = values_of(message, names)
+    if values is not None:
+        return values
+    if not set(names).intersection(message.name):
+        return None
+    found = dict(zip(message.name, message.position, strict=False))
+    return np.array([found.get(name, np.nan) for name in names], dtype=float)

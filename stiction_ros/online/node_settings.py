@@ -61,9 +61,12 @@ class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
         choices=PACES,
         fixed=True,
     )
+    speed: float = setting(
+        1.0, "simulated seconds per second of realtime pace, as of the plant", low=1e-3, high=1e6
+    )
     sp_source: str = setting(
         "schedule",
-        "schedule: sp comes with every pv; external: the last sp (transient local) holds",
+        "schedule: in lockstep each pv has its own sp; external: the last (transient local) holds",
         choices=("schedule", "external"),
         fixed=True,
     )

@@ -14,6 +14,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.records.bag_messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag_metadata import BagTopic
 from stiction_ros.records.bag_reader import JOINT_STATE
+from stiction_ros.records.bag_runs import tell_runs
 from stiction_ros.records.gap_log import GapLog, gap_log
 from stiction_ros.records.run_log import Fit, ModeChange, fits, mode_changes
 from stiction_ros.records.run_metadata import mapping_of
@@ -136,10 +137,15 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
         if m.type == DIAGNOSTICS and (not loops or any(_is_of(s, loops) for s in m.message.status))
     ]
     notes += _changed_parameters(inside, configs.values())
+    signals = tuple(_signals(inside))
+    stamps = [signal.stamp for signal in signals if signal.kind == "pv"]
+    runs, _ = tell_runs(stamps, range(len(stamps)))
+    if len(runs) > 1:
+        notes.append(f"holds {len(runs)} runs, a replay needs one run from its first sample")
     return ReplayBag(
         name=Path(path).name,
         namespace=space,
-        signals=tuple(_signals(inside)),
+        signals=signals,
         estimator=configs.get("estimator"),
         controller=configs.get("controller"),
         published_fits=dict(_published_fits(inside)),

@@ -12,7 +12,7 @@ import yaml
 from stiction_ros.config_files import config_directories
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
-from stiction_ros.loop import LoopModel
+from stiction_ros.loop import Instrument, LoopModel
 
 LOOPS = sorted(config_directories()[0].glob("*.loop.yaml"))
 every_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda path: path.name)
@@ -37,6 +37,8 @@ FULL: dict[str, Any] = {
                 "delay": {"V2": 3},
                 "bias": 0.5,
                 "noise": {"std": 0.01, "enters": "equation"},
+                "range": [0.0, 20.0],
+                "rate_limit": 0.25,
             }
         ],
     },
@@ -134,7 +136,19 @@ def test_every_key_reaches_the_model() -> None:
     assert model.controller is not None
     assert (model.controller.gain, model.controller.integral_time) == (-0.5, 20.0)
     assert model.provenance == ({"valve": "V2", "effect": "stiction", "from": "somewhere"},)
+    assert model.instruments == (Instrument(0.0, 20.0, 0.25),)
     assert LoopModel.from_yaml(model.to_yaml()).to_mapping() == FULL
+
+
+def test_an_instrument_that_is_not_described_has_no_limits() -> None:
+    assert LoopModel.from_mapping(STATE_SPACE).instruments == (Instrument(),)
+    assert LoopModel.from_mapping(TANK).instruments == (Instrument(), Instrument())
+
+
+def test_instruments_are_in_the_order_of_the_outputs() -> None:
+    outputs = [{"name": "C"}, {"name": "T", "rate_limit": 2.0}]
+    model = LoopModel.from_mapping(changed(TANK, "process.outputs", outputs))
+    assert model.instruments == (Instrument(), Instrument(rate_limit=2.0))
 
 
 def test_the_tank_starts_at_its_nominal_point() -> None:
@@ -223,6 +237,8 @@ NUMBERS = [
     (FULL, "process.outputs.0.b.V2.1"),
     (FULL, "process.outputs.0.bias"),
     (FULL, "process.outputs.0.noise.std"),
+    (FULL, "process.outputs.0.range.0"),
+    (FULL, "process.outputs.0.rate_limit"),
     (FULL, "sensors.0.effects.0.rate"),
     (FULL, "disturbances.0.size"),
     (FULL, "operating_point.op.V1"),
@@ -246,7 +262,7 @@ NUMBERS = [
 def test_what_is_no_finite_number_is_refused_with_its_key(
     document: dict[str, Any], place: str, bad: object
 ) -> None:
-    if bad is None and place == "process.volume":
+    if bad is None and place in ("process.volume", "process.outputs.0.rate_limit"):
         pytest.skip("an absent parameter takes its default")
     line = refused(changed(document, place, bad))
     key = [part for part in place.split(".") if not part.isdecimal()][-1]
@@ -281,6 +297,9 @@ WRONG = {
     "delay broken": (changed(FULL, "process.outputs.0.delay.V2", 1.5), "whole number"),
     "noise negative": (changed(FULL, "process.outputs.0.noise.std", -0.1), "out of range"),
     "noise elsewhere": (changed(FULL, "process.outputs.0.noise.enters", "valve"), "unknown value"),
+    "range crossed": (changed(FULL, "process.outputs.0.range", [5.0, 5.0]), "not below"),
+    "range short": (changed(FULL, "process.outputs.0.range", [5.0]), "has 1 values"),
+    "rate zero": (changed(FULL, "process.outputs.0.rate_limit", 0.0), "out of range"),
     "limits crossed": (changed(FULL, "valves.0.limits", [100.0, 0.0]), "not below"),
     "limits short": (changed(FULL, "valves.0.limits", [100.0]), "has 1 values"),
     "sensor of nobody": (changed(FULL, "sensors.0.name", "PV9"), "unknown value 'PV9'"),

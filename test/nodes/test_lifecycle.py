@@ -293,7 +293,7 @@ def test_a_sample_shown_again_gets_the_same_op_and_counts_once(graph: Graph) -> 
         hand.show(1, 49.0)
     graph.spin_until(lambda: len(hand.op) == 2, "op twice")
     assert hand.op[0] == hand.op[1]
-    assert hand.node._sample == 1
+    assert hand.node.port.next == 1
     assert len(hand.node.live.changes) == 1
 
 
@@ -373,7 +373,7 @@ def test_a_preview_moves_op_before_the_set_point_moves(graph: Graph) -> None:
     publisher = graph.plain().create_publisher(JointTrajectory, "sp_preview", SIGNAL_QOS)
     graph.spin_until(lambda: publisher.get_subscription_count() > 0, "the link")
     publisher.publish(trajectory(10**9, ["PV1"], np.array([[50.0], [54.0]]), [0.0, 8.0]))
-    graph.spin_until(lambda: hand.node._inbox.preview is not None, "the preview")
+    graph.spin_until(lambda: hand.node.port.preview is not None, "the preview")
     hand.show(2, 50.0)
     graph.spin_until(lambda: len(hand.op) == 2, "op")
     assert hand.op[0].position[0] == pytest.approx(50.0)
@@ -393,7 +393,7 @@ def test_a_loop_model_that_is_none_does_not_end_the_controller(graph: Graph, tex
 
 
 def test_a_loop_model_swaps_at_its_valid_from(graph: Graph) -> None:
-    hand = Hand(graph)
+    hand = Hand(graph, hand_over_samples=3, offer_samples=0)
     known = (Path(__file__).parents[2] / "config" / "example1.loop.yaml").read_text()
     hand.show(1, 50.0)
     graph.spin_until(lambda: len(hand.op) == 1, "the first op")

@@ -233,6 +233,7 @@ def test_what_was_applied_is_taken_for_what_was_commanded(bag: Bag) -> None:
             bag.joint("/op", k * SECOND, {"V1": 60.0 + k})
         if k < 44:
             bag.joint("/op_applied", k * SECOND, {"V1": 0.0 if k == 30 else 60.0 + k})
+    bag.writer.close()
     record = read_bag(bag.writer.directory)
     expected = 60.0 + np.arange(5.0, 45.0)
     expected[25] = 0.0

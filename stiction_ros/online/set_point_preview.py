@@ -1,0 +1,34 @@
+"""Set-points to come."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class SetPointPreview:
+    """Set-points to come: ``stamps`` in ns, rising, each with a row of ``values`` (K, p)."""
+
+    stamps: tuple[int, ...]
+    values: FloatArray
+
+    def ahead(self, sp: FloatArray, stamp: int, step: int, samples: int) -> FloatArray:
+        """Return the set-points of the next samples, shape (samples, p).
+
+        Each holds until the stamp of the next.
+
+        Args:
+            sp: set-points of now, shape (p,), which hold until the first stamp.
+            stamp, step: of the present sample, and from one to the next, ns.
+            samples: how many.
+        """
+        times = stamp + step * np.arange(1, samples + 1)
+        # What a preview says of the past is over: sp of now is newer.
+        coming = [i for i, at in enumerate(self.stamps) if at > stamp]
+        rows = np.vstack([sp, self.values[coming]])
+        picks = np.searchsorted([self.stamps[i] for i in coming], times, side="right")
+        return np.asarray(rows[picks])

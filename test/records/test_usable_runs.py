@@ -1,0 +1,131 @@
+"""The bag of a live run with a pause, a bad message or a restart: its report, and its replay."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bag_cutting import SECOND, copy_bag
+from bag_making import joint_state
+
+from stiction_ros.cli.main import main
+from stiction_ros.records.bag_messages import read_raw
+from stiction_ros.records.bag_writer import BagWriter
+from stiction_ros.records.mcap_scan import RawMessage
+from stiction_ros.records.playback import offered_qos
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.run_log import RunLog, read_run
+
+LIVE = Path(__file__).parents[2] / "bags" / "sticky_siso"
+
+
+@pytest.fixture(scope="module")
+def whole() -> RunLog:
+    return read_run(LIVE)
+
+
+def paused(target: Path, first: float, last: float) -> Path:
+    """The live bag without what came from ``first`` to ``last`` s."""
+
+    def outside(raw: RawMessage) -> RawMessage | None:
+        return None if first * SECOND <= raw.log_time < last * SECOND else raw
+
+    return copy_bag(LIVE, target, outside)
+
+
+def restarted(target: Path) -> Path:
+    """The beginning of the live bag, and then all of it, as when a plant is started again."""
+    messages = list(read_raw(LIVE))
+    with BagWriter(target) as writer:
+        for raw in [*(m for m in messages if m.log_time < 150 * SECOND), *messages]:
+            topic = raw.topic
+            if topic.name not in writer.counts:
+                kind = (topic.name, topic.type, topic.definition, topic.type_hash)
+                writer.add_topic(*kind, offered_qos(topic))
+            writer.write(topic.name, raw.data, raw.log_time, raw.publish_time)
+    return target
+
+
+def test_a_pause_leaves_every_sample_at_its_place(tmp_path: Path, whole: RunLog) -> None:
+    run = read_run(paused(tmp_path / "bag", 400.0, 460.0))
+    assert (run.swap_sample, len(run.record)) == (whole.swap_sample, len(whole.record))
+    missing = run.record.quality == Quality.BAD
+    assert np.flatnonzero(missing).tolist() == list(range(399, 459))  # the first is at 1 s
+    np.testing.assert_array_equal(run.record.pv[~missing], whole.record.pv[~missing])
+    assert run.stem_estimate is not None
+    assert whole.stem_estimate is not None
+    known = ~np.isnan(run.stem_estimate[:, 0])
+    assert np.count_nonzero(~known) == 60
+    np.testing.assert_array_equal(run.stem_estimate[known], whole.stem_estimate[known])
+    assert run.notes == ("split at 1 gap", "60 of 2100 samples are missing")
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "status", "told"),
+    [
+        (400.0, 460.0, "ok", " of 2100 samples are missing"),
+        (700.0, 760.0, "ok", " of 2100 samples are missing"),
+        (150.0, 550.0, "no_round", "gap in the last round of set-points before the swap"),
+        (1450.0, 2050.0, "no_round", "gap in the first round of set-points after the swap"),
+        (1080.0, 1110.0, "no_swap", " of 2100 samples are missing"),
+    ],
+)
+def test_the_report_of_a_run_with_a_pause(
+    tmp_path: Path, first: float, last: float, status: str, told: str
+) -> None:
+    bag = paused(tmp_path / "bag", first, last)
+    assert main(["report", str(bag), "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert told in page
+    if status != "no_swap":  # what the controller said of its swap may be in the pause
+        assert summary["status"] == status
+    if status == "ok":
+        scores = summary["phases"]
+        ratio = scores["after"]["PV1"]["amplitude"] / scores["before"]["PV1"]["amplitude"]
+        assert ratio < 0.1
+
+
+def test_the_report_of_a_restarted_plant_is_that_of_the_longest_run(
+    tmp_path: Path, whole: RunLog
+) -> None:
+    bag = restarted(tmp_path / "bag")
+    run = read_run(bag)
+    np.testing.assert_array_equal(run.record.pv, whole.record.pv)
+    assert (run.swap, run.modes, run.fits) == (whole.swap, whole.modes, whole.fits)
+    assert [config.topic for config in run.configs] == [c.topic for c in whole.configs]
+    assert run.notes == (
+        "2 runs are told apart: stamps fall back",
+        "another run, 1 s to 149 s, 149 samples, is left out",
+    )
+    assert main(["report", str(bag), "--out", str(tmp_path / "r.html")]) == 0
+    assert "another run, 1 s to 149 s" in (tmp_path / "r.html").read_text()
+
+
+def test_a_bad_message_of_a_live_run(tmp_path: Path, whole: RunLog) -> None:
+    def spoil(raw: RawMessage) -> RawMessage:
+        if raw.topic.name != "/pv" or raw.log_time != 300 * SECOND:
+            return raw
+        return raw._replace(data=joint_state(300 * SECOND, ["PV1"], []))
+
+    run = read_run(copy_bag(LIVE, tmp_path / "bag", spoil))
+    assert run.swap_sample == whole.swap_sample
+    assert np.flatnonzero(run.record.quality).tolist() == [299]
+    np.testing.assert_array_equal(run.record.op, whole.record.op)
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (restarted, "holds 2 runs, a replay needs one run from its first sample"),
+        (lambda target: paused(target, 400.0, 460.0), "60 samples are missing within the bag"),
+    ],
+)
+def test_a_replay_says_what_stands_in_its_way(
+    fault: Callable[[Path], Path], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(fault(tmp_path / "bag"))]) == 1
+    assert words in " ".join(capsys.readouterr().out.split())
