@@ -8,7 +8,7 @@ from pathlib import Path
 from stiction_ros.errors import InputError
 from stiction_ros.faults.observation import BagFound, Sampled
 from stiction_ros.records.bag_messages import read_messages, stamp_ns
-from stiction_ros.records.open_record import open_record
+from stiction_ros.records.open_record import open_parts
 
 COMPARED = ("pv", "op_applied")
 
@@ -27,7 +27,7 @@ def check_bag(path: Path, heard: Mapping[str, Sequence[Sampled]]) -> BagFound:
         for one in read_messages(path, wanted=lambda topic: topic.name in topics):
             wanted[topics[one.topic]].discard(stamp_ns(one.message))
         missing = sum(len(stamps) for stamps in wanted.values())
-        open_record(path)
+        open_parts(path)
     except InputError as error:
         return BagFound(expected, expected, str(error))
     return BagFound(expected, missing)

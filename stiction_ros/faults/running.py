@@ -13,7 +13,6 @@ from stiction_ros.faults.node_process import NodeProcess
 from stiction_ros.faults.observation import Known, Sampled
 from stiction_ros.faults.setting_up import NAMES, case_parameters, plant_model
 from stiction_ros.loop import LoopModel
-from stiction_ros.loop.instrument import Instrument
 
 if TYPE_CHECKING:
     from stiction_ros.nodes.fault_probe import Probe
@@ -138,12 +137,6 @@ class RunningLoop:
     def known(self) -> Known:
         """Mode and frictions that the controller has told last."""
         return self.probe.known
-
-    @property
-    def instrument(self) -> Instrument:
-        """Range of the first output."""
-        found = getattr(self.model, "instruments", ())
-        return found[0] if found else Instrument()
 
     # ---- what is said ----------------------------------------------------------------------
 
