@@ -23,6 +23,7 @@ from stiction_ros.orphans import DIE_WITH_PARENT
 STARTED = ("recorder", "estimator", "controller", "plant")
 ENDED = ("plant", "controller", "estimator", "recorder")  # who still has readers goes first
 PATIENCE = 60.0  # s for a node to end before it is killed
+GOODBYE = 5.0  # s from the end of a node that follows the plant to that of the plant
 SILENCE = 180.0  # s without progress before the run is given up
 _PROGRESS = re.compile(r"sample (\d+) of (\d+)")
 
@@ -79,7 +80,7 @@ class NodeProcesses:
         while plant.poll() is None:
             for name, process in self._processes.items():
                 if name != "plant" and process.poll() is not None:
-                    raise NodeError(self._describe(name, process.returncode))
+                    self._forgive(name, process.returncode)
             if time.monotonic() - self._moved > SILENCE:
                 raise NodeError(f"no sample for {SILENCE:.0f} s at sample {self.sample}")
             progress(self.sample / max(self.samples, 1))
@@ -89,6 +90,15 @@ class NodeProcesses:
                 continue
         if plant.returncode != 0:
             raise NodeError(self._describe("plant", plant.returncode))
+
+    def _forgive(self, name: str, code: int) -> None:
+        """Let a node end cleanly a moment before the plant, which says goodbye first."""
+        try:
+            if code != 0:
+                raise NodeError(self._describe(name, code))
+            self._processes["plant"].wait(GOODBYE)
+        except subprocess.TimeoutExpired:
+            raise NodeError(self._describe(name, code)) from None
 
     def stop(self) -> None:
         """End every node, in an order in which nobody's last message is lost."""

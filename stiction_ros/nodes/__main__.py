@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 
 # As in the command: with another number of threads sums come in another order, and a run
@@ -20,6 +21,8 @@ def main() -> int:
         given = f"unknown node {sys.argv[1]!r}" if len(sys.argv) > 1 else "no node named"
         print(f"{given}; known nodes: {', '.join(NODES)}", file=sys.stderr)
         return 2
+    for number in (signal.SIGINT, signal.SIGTERM):  # nothing is open yet while modules load
+        signal.signal(number, lambda _number, _frame: os._exit(0))
     name = sys.argv[1]
     sys.argv[:2] = [name]
     return importlib.import_module(f"stiction_ros.nodes.{name}").main() or 0

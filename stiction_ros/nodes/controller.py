@@ -6,8 +6,6 @@ import time
 from collections import deque
 from typing import Any
 
-from rclpy.clock import Clock as RosClock
-from rclpy.clock import ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -19,9 +17,9 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.controller_inputs import ControllerInputs
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
+from stiction_ros.nodes.peers import publishers_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.background import AtOnce, Beside
-from stiction_ros.online.health import Noticed
 from stiction_ros.online.input_port import InputPort
 from stiction_ros.online.live_controller import LiveController
 from stiction_ros.online.node_settings import ControllerNodeSettings
@@ -29,7 +27,7 @@ from stiction_ros.online.port_health import PortHealth, keys
 from stiction_ros.online.rehearsal import rehearse
 from stiction_ros.online.samples import PortRules, Sample
 
-QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks at what has not come
+QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
 GRAPH_PERIOD = 1.0  # s between two looks at who commands
 
 
@@ -39,8 +37,7 @@ class ControllerNode(ControllerInputs):
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``controller``; ``kwargs`` go to the ROS node."""
         super().__init__("controller", ControllerNodeSettings, **kwargs)
-        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
-        self._timers_of_run: list[Any] = []
+        self._late_timer: Any = None
         self.listening = False
 
     def configure(self) -> None:
@@ -68,7 +65,6 @@ class ControllerNode(ControllerInputs):
                 needs_dv=bool(measured),
             )
         )
-        self.noticed = Noticed(time.monotonic)
         self._port_health = PortHealth(lockstep)
         self.fits, self.models, self.reading = {}, {""}, deque()
         self._last_op: JointState | None = None
@@ -77,7 +73,7 @@ class ControllerNode(ControllerInputs):
         self._result: StepResult | None = None
         self._sent_at: float | None = None
         self._running_since = time.monotonic()
-        self._level = "ok"
+        self._graph_at = 0.0
         others = ("plant", "estimator")
         self._op = self.outlet(JointState, "op", SIGNAL_QOS, others)
         self._prediction = self.outlet(JointTrajectory, "prediction", SIGNAL_QOS)
@@ -92,19 +88,19 @@ class ControllerNode(ControllerInputs):
 
     def activate(self) -> None:
         self.listening = False
-        self.drain()  # what queued up before is not answered
+        self.drain_signals()  # what queued up before is not answered
         self.port.rest()
         self.listening = True
         self._running_since = time.monotonic()
         period = self.model.sample_time / self.settings.speed
-        looks = min(max(period / 2, QUICKEST), SLOWEST)
-        for seconds, look in ((looks, self._look), (GRAPH_PERIOD, self._look_at_graph)):
-            self._timers_of_run.append(self.create_timer(seconds, look, clock=self._steady))
+        every = min(max(period / 2, QUICKEST), SLOWEST)
+        self._late_timer = self.create_timer(every, self._go_on_without)
 
     def deactivate(self) -> None:
         self.listening = False
-        while self._timers_of_run:
-            self.destroy_timer(self._timers_of_run.pop())
+        if self._late_timer is not None:
+            self.destroy_timer(self._late_timer)
+            self._late_timer = None
 
     def finish(self) -> None:
         super().finish()
@@ -132,11 +128,10 @@ class ControllerNode(ControllerInputs):
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         now = time.monotonic()
-        level, text = self.noticed.level, self.noticed.text
         age = "" if self._sent_at is None else f"{now - self._sent_at:.3f}"
         last = [] if self._result is None else diagnosis(self._result)
         values = [("sample", self.port.next), ("op_age", age), *keys(self.port.state(now)), *last]
-        return level, self.failure or text or "running", values
+        return "ok", "running", values
 
     # ---- the step --------------------------------------------------------------------------
 
@@ -145,7 +140,7 @@ class ControllerNode(ControllerInputs):
         if not self.running:
             return
         if self.settings.pace == "realtime":
-            self.drain()
+            self.drain_signals()
         self.collect_offers()
         while self.running and self.port.ready() and self._fit_is_there():
             samples = self.port.take(time.monotonic())
@@ -161,21 +156,23 @@ class ControllerNode(ControllerInputs):
             self._op.publish(last)
         return True
 
-    def _look(self) -> None:
-        """See what has not come, and go on without it."""
-        if not self.running:
-            return
+    def _go_on_without(self) -> None:
+        """Step the samples that are due and whose PV has not come."""
         self.go()
-        self._work(self.port.overdue(time.monotonic()))
+        if self.running:
+            self._work(self.port.overdue(time.monotonic()))
+
+    def look(self) -> None:
         now = time.monotonic()
-        for name, level, text in self._port_health.look(
-            self.port.state(now), now - self._running_since
-        ):
-            self._notice(name, level, text)
-        self._await_fit(now)
-        if self.noticed.level != self._level:
-            self._level = self.noticed.level
-            self.report()
+        state = self.port.state(now)
+        for notice in self._port_health.look(state, now - self._running_since):
+            self.notice(*notice)
+        if now - self._graph_at >= GRAPH_PERIOD:
+            self._graph_at = now
+            self._look_at_graph()
+        patience = self.settings.fit_timeout
+        if self._waiting_since is not None and now - self._waiting_since > patience:
+            self.end(f"no fit came within {patience:g} s; raise fit_timeout or check the estimator")
 
     def _work(self, samples: tuple[Sample, ...]) -> None:
         for sample in samples:
@@ -251,31 +248,13 @@ class ControllerNode(ControllerInputs):
             self._waiting_since = time.monotonic()
         return False
 
-    def _await_fit(self, now: float) -> None:
-        """End the run when an awaited fit does not come."""
-        patience = self.settings.fit_timeout
-        if self._waiting_since is None or self.failure or now - self._waiting_since <= patience:
-            return
-        self.failure = f"no fit came within {patience:g} s"
-        self.noticed.notice("fit", "error", self.failure)
-        self.get_logger().error(f"{self.failure}; raise fit_timeout or check the estimator")
-        self.report()
-        self.running, self.finished = False, True
-
     # ---- health ----------------------------------------------------------------------------
 
     def _look_at_graph(self) -> None:
         """See whether someone else commands the same valves."""
-        topic = self.resolve_topic_name("op")
-        found = self.get_publishers_info_by_topic(topic)
-        if len(found) > 1:
-            names = sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
-            self._notice("commanders", "error", f"{topic} is published by {', '.join(names)}")
-
-    def _notice(self, name: str, level: str, text: str) -> None:
-        if self.noticed.notice(name, level, text):
-            log = self.get_logger()
-            (log.error if level == "error" else log.warning)(text)
+        names = publishers_of(self, "op")
+        if len(names) > 1:
+            self.notice("commanders", "error", f"op is published by {', '.join(sorted(names))}")
 
 
 def main() -> int:

@@ -27,7 +27,6 @@ from stiction_ros.online.set_point_preview import SetPointPreview
 
 # What is read to the end before a step, in this order.
 DRAINED = ("op_applied", "sp", "dv", "pv")
-MOST = READER_QOS.depth  # messages of one topic at one go
 
 
 class ControllerInputs(ManagedNode):
@@ -52,7 +51,7 @@ class ControllerInputs(ManagedNode):
         if self.settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
         self._draining = False
-        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
+        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS, ("plant",))
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
         self.inlet(JointState, "dv", self._on_dv, READER_QOS)
         self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
@@ -60,20 +59,12 @@ class ControllerInputs(ManagedNode):
         self.inlet(JointState, "stiction", self._on_stiction, READER_QOS, ("estimator",))
         self.inlet(String, "loop_model", self._on_model, LATCHED_READER_QOS, ("estimator",))
 
-    def drain(self) -> None:
+    def drain_signals(self) -> None:
         """Take in what is queued of all signals, so that the newest is known."""
         self._draining = True
         try:
-            for topic, subscription, _ in self._inlets:
-                if topic in DRAINED:
-                    for _count in range(MOST):
-                        with subscription.handle:
-                            found = subscription.handle.take_message(
-                                subscription.msg_type, subscription.raw
-                            )
-                        if found is None:
-                            break
-                        subscription.callback(found[0])
+            for topic in DRAINED:
+                self.drain(topic)
         finally:
             self._draining = False
 

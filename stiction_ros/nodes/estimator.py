@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
+import time
+from collections import Counter, deque
 from concurrent.futures import Future
 from typing import Any
 
+import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -18,11 +20,15 @@ from stiction_ros.nodes.gap_status import finding_status, look_status, monitor_s
 from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, to_ns, values_of
 from stiction_ros.nodes.runner import run
+from stiction_ros.online.health import stopped_after
 from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
-from stiction_ros.online.pairing import PairedSample, Pairing
+from stiction_ros.online.pairing import NEW_RUN, PairedSample
 from stiction_ros.online.worker import FitWorker
+
+COUNTED = ("bridged", "repeated", "stale", "future")
+SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
 
 
 class EstimatorNode(ManagedNode):
@@ -37,24 +43,38 @@ class EstimatorNode(ManagedNode):
         self.settings.options()  # refuses what no fit can use
         name = self.settings.monitor_model
         self._watched = LoopModel.load(find_config(name)) if name else None
-        self.live: LiveEstimator | None = None
-        self._valves: tuple[str, ...] = ()
-        self._outputs: tuple[str, ...] = ()
-        self._pairs = Pairing(self.settings.sample_time)
+        self._forget_loop()
+        self._refused: Counter[str] = Counter()
+        self._heard = dict.fromkeys(("pv", "op"), time.monotonic())
         self._sample = 0
         self._pending: deque[tuple[int, Future[Identification]]] = deque()
         self._token = ""
-        self._fits = self._failed = self._missed = 0
+        self._fits = self._failed = 0
         self._said = "no fit yet"
         self._worker = FitWorker()
         self._done = self.create_guard_condition(self._collect)
         self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS, ("controller",))
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
-        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
+        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
         self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
+
+    def _forget_loop(self) -> None:
+        self.live: LiveEstimator | None = None
+        self._valves: tuple[str, ...] = ()
+        self._outputs: tuple[str, ...] = ()
+        self._pairs = self.settings.pairing()
+        self._strange: Counter[tuple[str, ...]] = Counter()
+
+    def linked(self) -> None:
+        self._heard = dict.fromkeys(self._heard, time.monotonic())
 
     def configuration(self) -> dict[str, Any]:
         return {} if self._watched is None else {"model": self._watched.to_mapping()}
+
+    def preparing(self) -> str:
+        ready = self._worker is None or self._worker.compiled
+        return "" if ready else "the fits are being compiled"
 
     def hardware(self) -> str:
         return str(self.settings.loop)
@@ -71,10 +91,26 @@ class EstimatorNode(ManagedNode):
         return [monitor_status(self.monitoring, self._pairs.stamp_of)]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        counts, now = self._pairs.counts, time.monotonic()
         keys: list[tuple[str, object]] = [("sample", self._sample), ("fits", self._fits)]
-        keys += [("failed_fits", self._failed), ("missed_samples", self._missed)]
-        keys.append(("running_fits", len(self._pending)))
-        return "warn" if self._missed else "ok", self._said, keys
+        keys += [("failed_fits", self._failed), ("running_fits", len(self._pending))]
+        keys += [(f"age_{name}", f"{now - heard:.3f}") for name, heard in self._heard.items()]
+        keys += [("behind", self._pairs.behind)]
+        keys += [("missed_samples", counts["missed"] + counts["bad"])]
+        keys += [(f"{name}_samples", counts[name]) for name in COUNTED]
+        keys += [("new_runs", counts["runs"])]
+        keys += [(f"refused_{name}", count) for name, count in self._refused.items()]
+        return "ok", self._said, keys
+
+    def look(self) -> None:
+        settings, now = self.settings, time.monotonic()
+        limit = SHOWN_AGAIN
+        if settings.pace == "realtime":
+            limit = stopped_after(settings.sample_time / settings.speed)
+        if now - self._heard["pv"] > limit:
+            self.notice("pv", "error", "no pv")
+        elif now - self._heard["op"] > limit:
+            self.notice("op", "error", "no op")
 
     def finish(self) -> None:
         self._end_worker()
@@ -94,16 +130,42 @@ class EstimatorNode(ManagedNode):
     # ---- samples in ------------------------------------------------------------------------
 
     def _on_pv(self, message: JointState) -> None:
-        self._outputs = self._outputs or tuple(message.name)
-        pv = values_of(message, self._outputs)
-        if pv is not None:
+        if self._agree("pv", message, self._outputs):
+            self._outputs = self._outputs or tuple(message.name)
+            pv = values_of(message, self._outputs)
             self._take(self._pairs.add_pv(to_ns(message.header.stamp), pv))
 
     def _on_op(self, message: JointState) -> None:
-        self._valves = self._valves or tuple(message.name)
-        op = values_of(message, self._valves)
-        if op is not None:
+        if self._agree("op", message, self._valves):
+            self._valves = self._valves or tuple(message.name)
+            op = values_of(message, self._valves)
             self._take(self._pairs.add_op(to_ns(message.header.stamp), op))
+
+    def _on_applied(self, message: JointState) -> None:
+        if self._agree("op", message, self._valves):
+            self._valves = self._valves or tuple(message.name)
+            op = values_of(message, self._valves)
+            self._take(self._pairs.add_applied(to_ns(message.header.stamp), op))
+
+    def _agree(self, topic: str, message: JointState, names: tuple[str, ...]) -> bool:
+        """Return whether a message has a value for each of ``names``; when not, count it.
+
+        The first message tells the tags. When many in succession have others, the first was
+        a stray, or the loop is another one: all begins anew.
+        """
+        self._heard[topic] = time.monotonic()
+        given = tuple(message.name)
+        if given and values_of(message, names) is not None:
+            self._strange.clear()
+            return True
+        self._refused[topic] += 1
+        self.notice(f"tags of {topic}", "warn", f"{topic} without a value for each tag is left out")
+        if given and len(given) == len(message.position):
+            self._strange[topic, *given] += 1
+        if self._strange[topic, *given] >= NEW_RUN:
+            self.get_logger().warning(f"{topic} has other tags now: all begins anew")
+            self._forget_loop()
+        return False
 
     def _take(self, samples: list[PairedSample]) -> None:
         for found in samples:
@@ -112,8 +174,12 @@ class EstimatorNode(ManagedNode):
                 names = (settings.loop, self._valves, self._outputs)
                 self.live = LiveEstimator(settings, *names, settings.sample_time)
                 self.monitoring = Monitoring(settings, self.live, self._watched, self._queue)
-            if found.missed:
+            if found.begins:
+                self.get_logger().info(f"a new run begins at stamp {found.stamp} ns")
+            if found.missed or found.begins:
                 self._skip(found)
+            elif not np.isfinite(found.pv).all():
+                self.notice("missed", "warn", f"bad samples from {found.sample} on, window anew")
             self.stamp, self._sample = found.stamp, found.sample + 1
             record = self.live.add(found.sample, found.op, found.pv)
             if record is not None:
@@ -138,8 +204,9 @@ class EstimatorNode(ManagedNode):
         assert self.live is not None
         self.live.restart()
         self.monitoring.restart()
-        self._missed += found.missed
-        self.get_logger().warning(f"{found.missed} samples missed before sample {found.sample}")
+        if found.missed:
+            text = f"{found.missed} samples missed before sample {found.sample}, window anew"
+            self.notice("missed", "warn", text)
         for sample in range(found.sample - found.missed, found.sample):
             if self.settings.due(sample):
                 self._publish(self._pairs.stamp_of(sample), None)

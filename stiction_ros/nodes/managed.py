@@ -9,18 +9,20 @@ from typing import Any
 
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 from std_msgs.msg import String
 
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.nodes import parameters
 from stiction_ros.nodes.messages import status, to_stamp
+from stiction_ros.nodes.peers import Inlet, Outlet, Peers
+from stiction_ros.online.health import LEVELS, Noticed
 
 SIGNAL_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # What waits for a process that is busy for a moment; writers keep SIGNAL_QOS.
@@ -36,22 +38,12 @@ LATCHED_READER_QOS = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
-LINK_PATIENCE = 5.0  # s until a node says whom it waits for
+LINK_PATIENCE = 5.0  # s until a node says what it waits for
+LINK_REMINDER = 30.0  # s until it says so again
 LINK_PERIOD = 0.02  # s between two looks at the graph until all peers are there
-
-
-class Outlet:
-    """A publisher that counts, and knows which nodes must hear its first message."""
-
-    def __init__(self, publisher: Publisher, readers: tuple[str, ...]) -> None:
-        self.publisher = publisher
-        self.readers = readers
-        self.count = 0
-
-    def publish(self, message: Any) -> None:
-        """Publish and count."""
-        self.count += 1
-        self.publisher.publish(message)
+LOOK_PERIOD = 0.1  # s between two looks at what has become of the loop
+LOOKS = 10  # of them until the next status
+PEER_LOOKS = 5  # of them until the next look at the partners
 
 
 class ManagedNode(LifecycleNode):
@@ -71,11 +63,20 @@ class ManagedNode(LifecycleNode):
         self.running = False
         self.stamp = 0
         self.outlets: dict[str, Outlet] = {}
-        self._inlets: list[tuple[str, Subscription, tuple[str, ...]]] = []
+        self.inlets: dict[str, Inlet] = {}
+        self.noticed = Noticed(time.monotonic)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._ready = self._linked = self._tunable = False
         self._link_timer: Any = None
         parameters.declare(self, settings)
         self.settings = settings()
+
+    def create_timer(
+        self, timer_period_sec: float, callback: Any, *args: Any, clock: Any = None, **kwargs: Any
+    ) -> Timer:
+        """Create a timer on a steady clock: simulated time that stands still stops no node."""
+        clock = clock or self._steady
+        return super().create_timer(timer_period_sec, callback, *args, clock=clock, **kwargs)
 
     # ---- lifecycle -------------------------------------------------------------------------
 
@@ -133,15 +134,16 @@ class ManagedNode(LifecycleNode):
         parameters.refuse_unknown(self)
         self.settings = parameters.read(self, self.settings_class)
         self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", QoSProfile(depth=100))
-        self._beat = self.create_timer(1.0, self._each_second)
+        self._looks, self._told_level = 0, "ok"
+        self._beat = self.create_timer(LOOK_PERIOD, self._look_around)
         self.configure()
         self.add_on_set_parameters_callback(self._on_set)
         self._tunable = True
 
     def _activate(self) -> None:
         self._ready = self._linked = False
-        self._told_waiting = False
-        self._link_begun = time.monotonic()
+        self._peers, self._busy = Peers(self, self.settings.wait_for), ""
+        self._remind_at = time.monotonic() + LINK_PATIENCE
         self.activate()
         self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
 
@@ -159,10 +161,11 @@ class ManagedNode(LifecycleNode):
             self._tunable = False
         self.destroy_timer(self._beat)
         for subscription in list(self.subscriptions):
-            self.destroy_subscription(subscription)
+            if subscription is not self._time_source._clock_sub:  # that of use_sim_time
+                self.destroy_subscription(subscription)
         for outlet in self.outlets.values():
             self.destroy_publisher(outlet.publisher)
-        self.outlets, self._inlets = {}, []
+        self.outlets, self.inlets = {}, {}
 
     def _guarded(self, action: Any) -> TransitionCallbackReturn:
         self.failure = ""
@@ -189,7 +192,7 @@ class ManagedNode(LifecycleNode):
         # Readers warn of incompatible QoS; what a publisher hears of it costs time at every spin.
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self.create_publisher(kind, topic, qos, event_callbacks=quiet)
-        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"))
+        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos)
         return self.outlets[topic]
 
     def inlet(
@@ -197,10 +200,18 @@ class ManagedNode(LifecycleNode):
     ) -> None:
         """Subscribe; ``writers`` are the nodes whose first message must not be missed."""
         subscription = self.create_subscription(kind, topic, take, qos)
-        self._inlets.append((topic, subscription, writers))
+        self.inlets[topic] = Inlet(subscription, writers, qos)
+
+    def drain(self, topic: str) -> int:
+        """Hand all that is queued on an inlet to its callback now, and count it."""
+        return self.inlets[topic].drain()
 
     def linked(self) -> None:
-        """Called once when every node of ``wait_for`` has matched, in both directions."""
+        """Called once when everything in ``wait_for`` has matched, in both directions."""
+
+    def preparing(self) -> str:
+        """Return what is done before the node is ready, such as compilation; empty: nothing."""
+        return ""
 
     def _look_for_peers(self) -> None:
         """Become ready when all writers have matched; begin when all peers are ready.
@@ -209,41 +220,45 @@ class ManagedNode(LifecycleNode):
         also when the writer has matched it already. So each node looks at its own readers
         first and then says that it is ready by announcing ``~/config``.
         """
-        wanted = {name for name in self.settings.wait_for if name}
-        if not self._told_waiting and time.monotonic() > self._link_begun + LINK_PATIENCE:
-            self._told_waiting = True
-            missing = sorted(wanted.difference(self.get_node_names()))
-            which = ", ".join(missing) or ", ".join(sorted(wanted))
-            self.get_logger().warning(f"still waiting for {which}; see the parameter wait_for")
-        if not self._ready:
-            if not all(self._hears(*inlet, wanted) for inlet in self._inlets):
-                return
+        busy = "" if self._ready else self.preparing()
+        if busy != self._busy:
+            self._busy, self._remind_at = busy, time.monotonic() + LINK_PATIENCE
+            self.get_logger().info(f"not ready yet: {busy}" if busy else "prepared")
+        if busy:
+            return
+        missing = [] if self._ready else self._peers.unheard(self.inlets)
+        if not missing and not self._ready:
             if "~/config" not in self.outlets:  # it is there already after a pause
                 self._announce_configuration()
             self._ready = True
-        namespace = self.get_namespace().rstrip("/")
-        for name in wanted:
-            announced = self.get_publishers_info_by_topic(f"{namespace}/{name}/config")
-            if all(info.node_name != name for info in announced):
-                return
-        if all(self._is_heard(topic, outlet, wanted) for topic, outlet in self.outlets.items()):
-            self._stop()
-            self._linked = self.running = True
-            self.report()
-            self.linked()
+        missing = missing or self._peers.unlinked(self.outlets)
+        if not missing:
+            self._begin()
+        elif time.monotonic() > self._remind_at:
+            self._remind_at = time.monotonic() + LINK_REMINDER
+            said = f"still waiting for {', '.join(missing)}; see the parameter wait_for"
+            self.get_logger().warning(said)
 
-    def _hears(
-        self, topic: str, inlet: Subscription, writers: tuple[str, ...], wanted: set[str]
-    ) -> bool:
-        found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
-        names = {info.node_name for info in found}
-        return wanted.intersection(writers) <= names and inlet.get_publisher_count() >= len(found)
+    def _begin(self) -> None:
+        self._stop()
+        self._peers.pin()
+        others = (*self._peers.names, *self._peers.topics)
+        self.get_logger().info(f"{self.get_name()} is ready: {', '.join(others) or 'alone'}")
+        self._linked = self.running = True
+        self.report()
+        self.linked()
 
-    def _is_heard(self, topic: str, outlet: Outlet, wanted: set[str]) -> bool:
-        found = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))
-        names = {info.node_name for info in found}
-        matched = outlet.publisher.get_subscription_count()
-        return wanted.intersection(outlet.readers) <= names and matched >= len(found)
+    def partner_lost(self, name: str, what: str) -> None:
+        """React to a partner in lockstep that has gone or was replaced: end with the plant."""
+        if name == "plant":
+            self.get_logger().info(f"{name} {what}: the run is over")
+            self.running, self.finished = False, True
+
+    def end(self, reason: str) -> None:
+        """End the node as failed, with one sentence."""
+        self.failure = reason
+        self.get_logger().error(reason)
+        self.running, self.finished = False, True
 
     def _announce_configuration(self) -> None:
         document = {
@@ -285,11 +300,26 @@ class ManagedNode(LifecycleNode):
         """Return further 1 Hz statuses: level, task, message and key-values of each."""
         return []
 
+    def look(self) -> None:
+        """Notice what has become of the loop; called every LOOK_PERIOD while it runs."""
+
+    def notice(self, name: str, level: str, text: str) -> None:
+        """Show a condition (warn or error) long enough to be seen; log it when it is new."""
+        if self.noticed.notice(name, level, text):
+            self.get_logger().warning(text)
+        if LEVELS.index(level) > LEVELS.index(self._told_level):
+            self.report()
+
     def report(self, extra: Iterable[tuple[str, str, list[tuple[str, object]]]] = ()) -> None:
         """Publish the health now, and ``extra`` as further statuses (task, text, values)."""
         if not self._linked:
             return
         level, text, values = self.health()
+        level = max(level, self.noticed.level, key=LEVELS.index)
+        text = "; ".join(said for said in (text, self.noticed.text) if said)
+        if self.failure:
+            level, text = "error", self.failure
+        self._told_level = level
         self._diagnostics.count += 1  # this message counts as well
         counts = [
             (f"published:{self.resolve_topic_name(topic)}", outlet.count)
@@ -310,6 +340,15 @@ class ManagedNode(LifecycleNode):
         """Return the identifier of the loop for ``hardware_id``."""
         return self.get_name()
 
-    def _each_second(self) -> None:
-        if self.running:
+    def _look_around(self) -> None:
+        """Look at the loop, now and then at the partners, and tell once a second or at once."""
+        if not self.running:
+            return
+        self._looks += 1
+        self.look()
+        if self._looks % PEER_LOOKS == 0 and getattr(self.settings, "pace", "") == "lockstep":
+            for name, what in self._peers.gone().items():
+                if self.running:
+                    self.partner_lost(name, what)
+        if self.running and self._looks % LOOKS == 0:
             self.report()

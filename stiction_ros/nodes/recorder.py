@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Collection
+from pathlib import Path
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -15,13 +19,16 @@ from stiction_ros.nodes.endpoints import message_class, offered_qos, reader_qos
 from stiction_ros.nodes.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND
 from stiction_ros.nodes.runner import run
+from stiction_ros.online.health import Noticed
 from stiction_ros.online.node_settings import RecorderNodeSettings
+from stiction_ros.records.bag_finish import CLOCK
 from stiction_ros.records.bag_writer import BagWriter, Packing, Splitting
+from stiction_ros.records.log_time import SIMULATED, LogTime
 from stiction_ros.records.message_definitions import definition
-from stiction_ros.records.topic_choice import TopicChoice
+from stiction_ros.records.topic_choice import OWN, TopicChoice
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
-_CLOCK_BYTES = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
+_STAMP = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
 
 
 class RecorderNode(ManagedNode):
@@ -31,21 +38,32 @@ class RecorderNode(ManagedNode):
         """Build the node ``recorder``; ``kwargs`` go to the ROS node."""
         super().__init__("recorder", RecorderNodeSettings, **kwargs)
         self.writer: BagWriter | None = None
+        self._bags: list[Path] = []
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
 
     def configure(self) -> None:
         settings = self.settings
         names = [self.resolve_topic_name(name) for name in settings.topics if name]
-        self._wanted = TopicChoice.of(names, settings.regex, settings.exclude_regex)
+        space = self.get_namespace()
+        self._wanted = TopicChoice.of(names, settings.regex, settings.exclude_regex, space)
         splitting = Splitting(settings.max_bag_size, round(settings.max_bag_duration * SECOND))
-        self.writer = BagWriter(settings.directory, Packing(settings.compression), splitting)
+        directory = free_directory(Path(settings.directory), self._bags)
+        self.writer = BagWriter(directory, Packing(settings.compression), splitting)
+        self._bags.append(directory)
+        if len(self._bags) > 1:
+            self.get_logger().info(f"recording into {directory}")
         self._topics: dict[str, QoSProfile] = {}
         self._skipped: dict[str, str] = {}
         self._unheard: dict[str, str] = {}
-        self._lost = 0
-        self._simulated: int | None = None
+        self._noticed = Noticed(time.monotonic)
+        self._lost = self._put_back = 0
+        self._times = LogTime()
+        own = settings.regex == OWN and space != "/"
+        self._own_pv = self.resolve_topic_name("pv") if own else ""
+        self._clock_runs = False
         self._looking = [
-            self.create_timer(DISCOVERY_PERIOD, self._discover),
-            self.create_timer(1.0, self._look_for_unheard),
+            self.create_timer(DISCOVERY_PERIOD, self._discover, clock=self._steady),
+            self.create_timer(1.0, self._look_around, clock=self._steady),
         ]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
@@ -55,9 +73,9 @@ class RecorderNode(ManagedNode):
         ]
         keys += [(f"skipped:{name}", why) for name, why in self._skipped.items()]
         keys += [(f"unheard:{name}", why) for name, why in self._unheard.items()]
-        keys.append(("lost", self._lost))
-        if self._lost:
-            return "error", f"the storage refused {self._lost} messages", keys
+        keys += [("lost", self._lost), ("put_back", self._put_back)]
+        if self._noticed.level == "error":
+            return "error", self._noticed.text, keys
         return ("warn" if self._skipped or self._unheard else "ok"), "recording", keys
 
     def finish(self) -> None:
@@ -73,8 +91,9 @@ class RecorderNode(ManagedNode):
             self.destroy_timer(timer)
         try:
             writer.close()
-        except OSError as error:
-            self.failure = f"{writer.directory}: not finished ({error.strerror}); repair it later"
+        except (OSError, InputError) as error:
+            why = error.strerror if isinstance(error, OSError) else error.what
+            self.failure = f"{writer.directory}: not finished ({why}); repair it later"
             self.get_logger().error(self.failure)
         else:
             self.get_logger().info(f"bag finished: {writer.directory}")
@@ -100,6 +119,8 @@ class RecorderNode(ManagedNode):
             except InputError as error:
                 self._skipped[name] = str(error)
                 self.get_logger().warning(f"{name} is not recorded: {error}")
+            except OSError as error:  # tried again at the next look
+                self._refused(error)
 
     def _record(self, name: str, kind: str, offered: list[TopicEndpointInfo]) -> None:
         assert self.writer is not None
@@ -116,6 +137,30 @@ class RecorderNode(ManagedNode):
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
+    def _look_around(self) -> None:
+        """Look once a second for what cannot be heard, and whether the bag is still there."""
+        self._look_for_unheard()
+        if self.writer is None:
+            return
+        try:
+            said = self.writer.put_back()
+        except OSError as error:
+            said = (
+                f"{self.writer.directory} was removed and cannot be written again "
+                f"({error.strerror}); make room for it under its name"
+            )
+        else:
+            self._put_back += bool(said)
+        if said and self._noticed.notice("removed", "error", said):
+            self.get_logger().error(said)
+
+    def _refused(self, error: OSError) -> None:
+        """Note that the storage refused something."""
+        assert self.writer is not None
+        said = f"{self.writer.directory}: {error.strerror}; {self._lost} messages lost so far"
+        if self._noticed.notice("storage", "error", said):
+            self.get_logger().error(said)
+
     def _look_for_unheard(self) -> None:
         """Tell of publishers that came later and offer less than the subscription asks for."""
         for name, asked in self._topics.items():
@@ -130,25 +175,49 @@ class RecorderNode(ManagedNode):
 
     def _writing(self, topic: str) -> Callable[[bytes, dict[str, int]], None]:
         """Return the callback of one topic; log time is simulated time where there is any."""
-        is_clock = topic == "/clock"
+        is_clock, is_own_pv = topic == CLOCK, topic == self._own_pv
 
         def write(data: bytes, info: dict[str, int]) -> None:
             if self.writer is None:
                 return
-            if is_clock:
-                seconds, rest = _CLOCK_BYTES.unpack_from(data, 4)
-                self._simulated = seconds * SECOND + rest
-                self.stamp = self._simulated
-            received = int(info["received_timestamp"])
-            log_time = received if self._simulated is None else self._simulated
             try:
+                if is_clock or is_own_pv:
+                    self._see(topic, data)
+                log_time = self._times.of(int(info["received_timestamp"]))
                 self.writer.write(topic, data, log_time, int(info["source_timestamp"]))
             except OSError as error:
                 self._lost += 1
-                if self._lost == 1:
-                    self.get_logger().error(f"{self.writer.directory}: {error.strerror}")
+                self._refused(error)
 
         return write
+
+    def _see(self, topic: str, data: bytes) -> None:
+        """Take the simulated time that a message tells.
+
+        A recorder of one loop goes by the stamps of its PV as soon as any clock runs, as
+        another loop's clock may be on the same topic.
+        """
+        assert self.writer is not None
+        self._clock_runs |= topic == CLOCK
+        if not self._clock_runs or (self._own_pv and topic == CLOCK):
+            return
+        seconds, rest = _STAMP.unpack_from(data, 4)
+        self.stamp = seconds * SECOND + rest
+        if self._times.see(self.stamp):
+            self.writer.add_metadata(SIMULATED, {"first": str(self.stamp)})
+
+
+def free_directory(wanted: Path, written: Collection[Path]) -> Path:
+    """Return where the next bag goes: where it is wanted, or beside an earlier one of this node.
+
+    Args:
+        wanted: by the parameter.
+        written: by this node before.
+    """
+    if wanted not in written or not wanted.exists():
+        return wanted
+    beside = (wanted.with_name(f"{wanted.name}_{number}") for number in itertools.count(2))
+    return next(path for path in beside if not path.exists())
 
 
 def main() -> int:

@@ -7,12 +7,21 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import rclpy
-from rclpy.exceptions import InvalidParameterValueException, ParameterException
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.exceptions import (
+    InvalidNamespaceException,
+    InvalidNodeNameException,
+    InvalidParameterValueException,
+    ParameterException,
+)
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from stiction_ros.errors import InputError
+from stiction_ros.nodes import parameter_files
 from stiction_ros.nodes.managed import ManagedNode
 from stiction_ros.orphans import DIE_WITH_PARENT, die_with_parent
 
@@ -22,6 +31,37 @@ HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-
 
 Parameters with their descriptions: ros2 param describe /{name} NAME
 """
+SWITCH = 0.0005  # s until a thread beside the loop must let go, in realtime
+
+_UNUSABLE = (
+    InputError,
+    ParameterException,
+    InvalidParameterValueException,
+    InvalidNamespaceException,
+    InvalidNodeNameException,
+    RCLError,
+    UnknownROSArgsError,
+)
+
+
+class _Interrupted(BaseException):
+    """A signal came while the node was being built."""
+
+
+class _Signals:
+    """Notes SIGINT and SIGTERM; while ``at_once``, they break off what is being done."""
+
+    def __init__(self) -> None:
+        self.came = False
+        self.at_once = True
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+
+    def _note(self, _number: int, _frame: Any) -> None:
+        self.came = True
+        if self.at_once:
+            self.at_once = False
+            raise _Interrupted
 
 
 def run(
@@ -36,19 +76,25 @@ def run(
     if "-h" in arguments[1:] or "--help" in arguments[1:]:
         print(HELP.format(name=name, description=description), end="")
         return 0
-    stop: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, _frame: stop.append(received))
-    if os.environ.get(DIE_WITH_PARENT):
-        die_with_parent(signal.SIGTERM, int(os.environ[DIE_WITH_PARENT]))
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node: ManagedNode | None = None
     try:
+        signals = _Signals()
+        if os.environ.get(DIE_WITH_PARENT):
+            die_with_parent(signal.SIGTERM, int(os.environ[DIE_WITH_PARENT]))
         try:
+            for path in parameter_files.given(arguments):
+                parameter_files.node_keys(path)
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             node = make()
-        except (ParameterException, InvalidParameterValueException) as error:
-            print(f"{name}: {error}".replace("\n", " "), file=sys.stderr)
+        except _UNUSABLE as error:
+            print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 2
+        for path in parameter_files.given(arguments):
+            said = parameter_files.unused(path, node.get_fully_qualified_name())
+            if said:
+                node.get_logger().warning(said)
+        if _is_realtime(node):
+            sys.setswitchinterval(SWITCH)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         if node.get_parameter("autostart").value:
@@ -57,14 +103,23 @@ def run(
             return 2
         gc.collect()
         gc.freeze()  # what was imported stays: collections need not look at it again
+        signals.at_once = False
         try:
-            while not stop and not node.finished:
+            while not signals.came and not node.finished:
                 executor.spin_once(timeout_sec=0.1)
         except ExternalShutdownException:
             return 0
         node.finish()
         return 1 if node.failure else 0
+    except _Interrupted:
+        if node is not None:
+            node.finish()
+        return 0
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _is_realtime(node: ManagedNode) -> bool:
+    return bool(node.has_parameter("pace") and node.get_parameter("pace").value == "realtime")

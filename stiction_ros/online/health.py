@@ -9,6 +9,11 @@ LEVELS = ("ok", "warn", "error")
 SHOWN = 2.5  # s after the last time, so that a status at 1 Hz tells of it twice at least
 
 
+def stopped_after(period: float) -> float:
+    """Return the silence, s, after which a loop of this wall time per sample has stopped."""
+    return max(3.0 * period, 0.5)
+
+
 @dataclasses.dataclass
 class _Noticed:
     level: str

@@ -19,6 +19,7 @@ from stiction_ros.online.signal_check import SignalCheck
 T = TypeVar("T")
 
 SECOND = 1e9
+LATEST = 2_140_000_000 * 10**9  # ns: stamps end in 2038, and those that follow must fit
 PATIENCE = 3  # samples of PV that wait for the OP in force before a run begins without
 SLACK = 3  # samples that a stamp may be further than the receiver's clock allows
 LATENESS = 0.1  # s that a PV is waited for at least
@@ -67,6 +68,9 @@ class InputPort:
         """Take in a measurement (p,), NaN for a tag that lacks; None: it has no tag of ours."""
         if pv is None:
             self.counts["wrong tags"] += 1
+            return
+        if not 0 <= stamp <= LATEST:
+            self.counts["ahead" if stamp > 0 else "stale"] += 1
             return
         self._seen["pv"] = now
         self._queue.append(_Arrived(stamp, pv))
@@ -134,8 +138,11 @@ class InputPort:
         if self.rules.lockstep or not self._begun:
             return ()
         period = self._pace.period
-        due = math.floor((now - self._blind_from - max(period, LATENESS)) / period)
-        lacking = due - (self._grid.number - self._pv_number)
+        since = now - self._blind_from
+        if since < period + max(period, LATENESS):
+            return ()
+        # A PV that comes again within a period of its time is not late yet.
+        lacking = math.floor(since / period) - 1 - (self._grid.number - self._pv_number)
         if lacking <= 0:
             return ()
         skipped = max(lacking - LONGEST_GAP, 0)
@@ -245,15 +252,16 @@ class InputPort:
 
     def _take_newest(self, now: float, arrived: list[_Arrived]) -> tuple[Sample, ...]:
         """Return the samples up to the newest that fits; not ``_begun`` after a new run."""
-        since = (now - self._pv_now) / self._pace.period
-        latest = self._pv_number - self._grid.number + SLACK + 2.0 * max(since, 0.0)
+        since = max(now - self._pv_now, 0.0) / self._pace.period
+        latest = self._pv_number - self._grid.number + SLACK + 2.0 * since
         fitting: dict[int, _Arrived] = {}
-        for one in arrived:
-            ahead = self._grid.ahead(one.stamp)
-            if 0 < ahead <= latest:
-                fitting.setdefault(ahead, one)
-            elif ahead > 0:
+        for ahead, one in sorted(
+            ((self._grid.ahead(one.stamp), one) for one in arrived), key=lambda pair: pair[0]
+        ):
+            if ahead > max(latest, max(fitting, default=0) + SLACK):
                 self.counts["ahead"] += 1
+            elif ahead > 0:
+                fitting.setdefault(ahead, one)
             else:
                 late = self._missed.pop(self._grid.number + ahead, False)
                 self.counts["late" if late else "stale"] += 1

@@ -7,6 +7,7 @@ import dataclasses
 from stiction_ros.online.gap_monitor import MonitorRule
 from stiction_ros.online.live_controller import LiveControllerSettings
 from stiction_ros.online.live_estimator import EstimatorSettings
+from stiction_ros.online.pairing import BRIDGED, Pairing
 from stiction_ros.settings import setting
 
 PACES = ("lockstep", "realtime")
@@ -18,7 +19,10 @@ class NodeSettings:
 
     autostart: bool = setting(True, "configure and activate without being told", fixed=True)
     wait_for: tuple[str, ...] = setting(
-        (), "nodes of this package that must be ready before this one begins", fixed=True
+        (),
+        "nodes of this package that must be ready, and topics (/pv, topic:pv) that must be "
+        "there, before this one begins",
+        fixed=True,
     )
 
 
@@ -45,6 +49,15 @@ class PlantNodeSettings(NodeSettings):
         fixed=True,
     )
     speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
+    commander: str = setting(
+        "controller",
+        "the only node whose op is taken, as it names itself in frame_id; without a leading "
+        "slash in the plant's namespace; empty for the first that commands",
+        fixed=True,
+    )
+    op_timeout: float = setting(
+        120.0, "s to wait for op in lockstep before the run is given up", low=0.1, high=1e5
+    )
     start_time: float = setting(
         1.0, "simulated time of the first sample, s", low=0.0, high=4e9, fixed=True
     )
@@ -80,11 +93,22 @@ class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
 
     loop: str = setting("loop", "name of the loop, for the models it publishes", fixed=True)
     sample_time: float = setting(1.0, "seconds between two samples", low=1e-6, fixed=True)
+    pace: str = setting(
+        "lockstep",
+        "lockstep: ends with the plant; realtime: waits for it to come back",
+        choices=PACES,
+        fixed=True,
+    )
+    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
     monitor_model: str = setting(
         "",
         "loop model file the monitor compares with; empty for the loop as it is identified",
         fixed=True,
     )
+
+    def pairing(self) -> Pairing:
+        """Return what pairs PV and OP; no bridge is longer than what a fit can wait for."""
+        return Pairing(self.sample_time, self.window, min(BRIDGED, self.fit_latency - 1))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,8 +120,9 @@ class RecorderNodeSettings(NodeSettings):
         (), "names of topics to record, beside those that regex fits", fixed=True
     )
     regex: str = setting(
-        ".*",
-        "regular expression of the full names of topics to record; empty for none",
+        "own",
+        "regular expression of the full names of topics to record; own: all in the recorder's "
+        "namespace and /clock, /diagnostics, /rosout, /parameter_events; empty for none",
         fixed=True,
     )
     exclude_regex: str = setting(

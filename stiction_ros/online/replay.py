@@ -104,7 +104,7 @@ def _estimate(
         where = f"{bag.estimator.node}/config: model"
         watched = LoopModel.from_mapping(dict(bag.estimator.model), where)
     estimator = ReplayedEstimator(settings, origin, told, watched=watched)
-    signals = [signal for signal in bag.signals if signal.kind in ("pv", "op")]
+    signals = [signal for signal in bag.signals if signal.kind in ("pv", "op", "op_applied")]
     for number, signal in enumerate(signals):
         if estimator.take(signal) and progress is not None:
             progress((number + 1) / len(signals))

@@ -22,14 +22,14 @@ from stiction_ros.records.run_metadata import mapping_of
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 STRING = "std_msgs/msg/String"
 PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
-_INPUTS = ("pv", "op", "sp", "dv")
+_INPUTS = ("pv", "op", "op_applied", "sp", "dv")
 _TEXTS = ("config", "loop_model")
 _KIND_BY_PARAMETER = {"confirmations": "estimator", "horizon": "controller"}
 
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """One message of ``pv``, ``op``, ``sp`` or ``dv``: its stamp in ns, tags and values."""
+    """One message of a signal, such as ``pv`` or ``op_applied``: stamp in ns, tags, values."""
 
     kind: str
     stamp: int

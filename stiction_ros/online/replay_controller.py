@@ -10,9 +10,13 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.online.applied_op import Given
+from stiction_ros.online.input_port import LONGEST_GAP
 from stiction_ros.online.live_controller import LiveController
 from stiction_ros.online.node_settings import ControllerNodeSettings
 from stiction_ros.online.replay_bag import ReplayBag
+from stiction_ros.online.samples import Sample
+from stiction_ros.online.signal_check import SignalCheck
 from stiction_ros.records.run_log import ModeChange
 
 SECOND = 10**9
@@ -56,16 +60,6 @@ class ReplayedControl:
     notes: tuple[str, ...]
 
 
-@dataclasses.dataclass(frozen=True)
-class _Inputs:
-    """One sample as the controller got it."""
-
-    stamp: int
-    pv: FloatArray
-    sp: FloatArray
-    dv: FloatArray | None
-
-
 def replay_controller(
     bag: ReplayBag,
     settings: ControllerNodeSettings,
@@ -73,7 +67,7 @@ def replay_controller(
     offers: tuple[Offer, ...],
     origin: int,
 ) -> ReplayedControl:
-    """Step the controller over the recorded ``pv``, ``sp`` and ``dv``.
+    """Step the controller over the recorded ``pv``, ``op_applied``, ``sp`` and ``dv``.
 
     Args:
         bag: the recorded run.
@@ -95,10 +89,17 @@ def replay_controller(
     for sample in _samples(bag, settings, model, notes):
         if first is None:
             first = (sample.stamp - origin + step // 2) // step
-        now = (sample.stamp - origin + step // 2) // step
+        now = first + sample.number
         while waiting and waiting[0].sample <= now:
             _offer(live, waiting.pop(0), first, notes)
         told = len(live.changes) if changes else 0
+        if sample.begins and sample.given.op is not None:
+            live.begin(sample.given.op)
+        elif sample.given.op is not None:
+            live.applied(sample.given.op)
+        if not sample.answered:
+            live.pass_over(sample.pv, sample.dv)
+            continue
         op = live.step(sample.pv, sample.sp, sample.dv).op
         match = _compared(match, op, recorded.get(sample.stamp), (sample.stamp - origin) / SECOND)
         frictions = dict(live.known_friction())
@@ -119,20 +120,52 @@ def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> 
 
 def _samples(
     bag: ReplayBag, settings: ControllerNodeSettings, model: LoopModel, notes: list[str]
-) -> Iterator[_Inputs]:
-    """Yield every sample that has all the controller waits for, oldest first."""
-    pv, dv, sp = _by_stamp(bag, "pv", model.outputs), _disturbances(bag, model), {}
-    if settings.sp_source == "schedule":
+) -> Iterator[Sample]:
+    """Yield every sample that has all the controller waits for, oldest first.
+
+    In realtime a sample without a recorded ``op`` was passed over, and one without ``pv`` was
+    stepped without; in lockstep every one was answered.
+    """
+    lockstep = settings.pace == "lockstep"
+    pv, dv = _by_stamp(bag, "pv", model.outputs), _disturbances(bag, model)
+    op, given = _recorded_op(bag, model), _by_stamp(bag, "op_applied", model.valve_names)
+    if lockstep and settings.sp_source == "schedule":
         sp = _by_stamp(bag, "sp", model.outputs)
     else:
         sp = _held_set_points(bag, model.outputs)
-    needs_dv = bool(model.process.measured_disturbances) and settings.pace == "lockstep"
-    for stamp in sorted(pv):
-        if stamp not in sp or (needs_dv and stamp not in dv):
-            missing = "sp" if stamp not in sp else "dv"
-            notes.append(f"{missing} is missing at {stamp / SECOND:.9g} s, the replay ends there")
+    needs_dv = bool(model.process.measured_disturbances) and lockstep
+    check = SignalCheck(model.instruments)
+    missing = np.full(len(model.outputs), np.nan)
+    step = round(model.sample_time * SECOND)
+    stamps = sorted(pv) if lockstep else [s for s in sorted({*pv, *op}) if s >= min(op, default=0)]
+    held_sp = held_dv = None
+    number, before = -1, 0
+    for stamp in stamps:
+        answered = lockstep or stamp in op
+        lacking = "sp" if answered and stamp not in sp else ""
+        if lacking or (needs_dv and stamp not in dv):
+            notes.append(
+                f"{lacking or 'dv'} is missing at {stamp / SECOND:.9g} s, the replay ends there"
+            )
             return
-        yield _Inputs(stamp, pv[stamp], sp[stamp], dv.get(stamp))
+        held_sp, held_dv = _good(check, sp.get(stamp), held_sp), dv.get(stamp, held_dv)
+        if held_sp is None:
+            continue  # no set-point that can be used has come yet
+        begins = number < 0
+        gap = 0 if begins else min((stamp - before + step // 2) // step - 1, LONGEST_GAP)
+        for _ in range(gap):
+            number += 1
+            told, before = Given(given.get(before)), before + step
+            yield Sample(number, before, missing, held_sp, held_dv, False, False, told)
+        number += 1
+        told = Given(given.get(stamp - step if begins else before))
+        shown = check.measured(stamp / SECOND, pv[stamp]) if stamp in pv else missing
+        yield Sample(number, stamp, shown, held_sp, held_dv, answered, begins, told)
+        before = stamp
+
+
+def _good(check: SignalCheck, sp: FloatArray | None, held: FloatArray | None) -> FloatArray | None:
+    return sp if sp is not None and check.within(sp) else held
 
 
 def _by_stamp(bag: ReplayBag, kind: str, names: tuple[str, ...]) -> dict[int, FloatArray]:

@@ -23,7 +23,7 @@ from stiction_ros.online.gap_monitor import GapLook
 from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
-from stiction_ros.online.pairing import PairedSample, Pairing
+from stiction_ros.online.pairing import PairedSample
 from stiction_ros.online.replay_bag import Signal
 from stiction_ros.records import Record
 
@@ -93,7 +93,7 @@ class ReplayedEstimator:
         self.first: int | None = None
         self.samples = 0
         self.missed = 0
-        self._pairs = Pairing(settings.sample_time)
+        self._pairs = settings.pairing()
         self._pairs.origin = origin
         self._told = told or {}
         self._fitter = fitter
@@ -108,7 +108,7 @@ class ReplayedEstimator:
         return self._pairs.stamp_of(0)
 
     def take(self, signal: Signal) -> list[ReplayedFit]:
-        """Take one message of ``pv`` or ``op`` and return the fits that it makes due."""
+        """Take one message of ``pv``, ``op`` or ``op_applied`` and return the fits due with it."""
         before = len(self.fits)
         if signal.kind == "pv":
             self._outputs = self._outputs or signal.names
@@ -117,7 +117,8 @@ class ReplayedEstimator:
         else:
             self._valves = self._valves or signal.names
             values = signal.of(self._valves)
-            paired = [] if values is None else self._pairs.add_op(signal.stamp, values)
+            add = self._pairs.add_op if signal.kind == "op" else self._pairs.add_applied
+            paired = [] if values is None else add(signal.stamp, values)
         for sample in paired:
             self._add(sample)
         return self.fits[before:]
@@ -131,8 +132,9 @@ class ReplayedEstimator:
             self.first = found.sample  # what came before it was not missed but not recorded
             if settings.monitor and found.sample == 0:
                 self._monitoring = Monitoring(settings, self._live, self._watched)
-        elif found.missed:
+        elif found.missed or found.begins:
             self._skip(self._live, found)
+        self.missed += found.bridged
         self.samples = found.sample + 1
         record = self._live.add(found.sample, found.op, found.pv)
         if record is not None:

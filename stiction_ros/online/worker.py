@@ -32,14 +32,21 @@ class FitWorker:
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
+        others = set(multiprocessing.active_children())
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
         self._ready = self._pool.submit(os.getpid)
-        self._pool.submit(compile_loops)  # before the first window is full
+        self._processes = set(multiprocessing.active_children()) - others
+        self._compiled = self._pool.submit(compile_loops)  # before the first window is full
 
     @property
     def pid(self) -> int:
         """Number of the process."""
         return self._ready.result()
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the process has all the machine code that a fit needs."""
+        return self._compiled.done()
 
     def submit(self, record: Record, options: IdentificationOptions) -> Future[Identification]:
         """Queue a fit; the future may hold the InputError of an unusable window."""
@@ -55,7 +62,13 @@ class FitWorker:
             return self._pool.submit(work, *arguments)
 
     def close(self) -> None:
-        """Drop queued fits and end the process once the running one is done."""
+        """Drop queued fits and end the process once the running one is done.
+
+        Compilation is no fit: nobody waits for it.
+        """
+        if not self._compiled.done():
+            for process in self._processes:
+                process.kill()
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 

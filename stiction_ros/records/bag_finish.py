@@ -14,6 +14,7 @@ from stiction_ros.records.bag_metadata import (
     metadata_record,
     metadata_yaml,
 )
+from stiction_ros.records.log_time import SIMULATED
 from stiction_ros.records.mcap_chunked import ChunkedFile
 from stiction_ros.records.mcap_scan import McapScan
 from stiction_ros.records.run_metadata import RUN, custom_data, merged
@@ -65,8 +66,8 @@ def storage_path(directory: Path, number: int = 0) -> Path:
 def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str, ...]:
     """Rewrite the journals of a bag chunked and indexed and write its ``metadata.yaml``.
 
-    Where there is a ``/clock``, what was received before its first message (configurations,
-    latched topics) came at wall time, years away; it gets that first simulated time.
+    Where there is a simulated time, what was received before it was known (configurations,
+    latched topics) came at wall time, years away; it gets the first simulated time.
 
     A journal is replaced when the new file is complete on the disk, so that a second kill
     loses nothing either.
@@ -84,31 +85,43 @@ def finish_bag(directory: str | Path, packing: Packing = Packing()) -> tuple[str
     """
     directory = Path(directory)
     files = found_files(directory)
-    clock = first_clock(files)
-    contents = [rewrite(file, packing, clock=clock) for file in files]
+    caps = log_time_caps(files)
+    contents = [rewrite(file, packing, cap=cap) for file, cap in zip(files, caps, strict=True)]
     write_listing(directory, contents)
     return tuple(note for content in contents for note in content.notes)
 
 
-def first_clock(files: Sequence[Path]) -> int | None:
-    """Return the log time of the first message on ``/clock``, ns, or None without one."""
-    for file in files:
-        for message in McapScan(file, salvage=True).messages():
-            if message.topic.name == CLOCK:
-                return message.log_time
-    return None
+def log_time_caps(files: Sequence[Path]) -> list[int | None]:
+    """Return for each file the log time, ns, that what came before simulated time gets.
+
+    It is the first simulated time, for the files up to the one in which it is; None for those
+    behind it, and for all when the bag knows no simulated time.
+    """
+    found: tuple[int, int] | None = None
+    for number, file in enumerate(files):
+        scan = McapScan(file, salvage=True)
+        for message in scan.messages():
+            told = [entry for name, entry in scan.metadata if name == SIMULATED]
+            if told and told[0].get("first", "").isdecimal():
+                return _caps(len(files), number, int(told[0]["first"]))
+            if found is None and message.topic.name == CLOCK:
+                found = number, message.log_time  # of a recorder that does not tell
+    return _caps(len(files), *found) if found is not None else [None] * len(files)
+
+
+def _caps(files: int, number: int, first: int) -> list[int | None]:
+    return [first if place <= number else None for place in range(files)]
 
 
 def rewrite(
-    path: Path, packing: Packing, *, clock: int | None = None, salvage: bool = False
+    path: Path, packing: Packing, *, cap: int | None = None, salvage: bool = False
 ) -> FileContent:
     """Rewrite one file chunked and indexed, in its place.
 
     Args:
         path: the file, a journal for example.
         packing: of the new file.
-        clock: first simulated time of the bag, ns; messages before the first on ``/clock``
-            whose log time is later get it.
+        cap: first simulated time of the bag, ns; until it comes messages get it as log time.
         salvage: leave out what is damaged, with a note, instead of raising.
 
     Raises:
@@ -122,7 +135,7 @@ def rewrite(
             target = ChunkedFile(
                 output, compression=packing.compression, chunk_size=packing.chunk_size
             )
-            channels = _copy(scan, target, clock)
+            channels = _copy(scan, target, cap)
             content = _content(path, scan, target, channels)
             if content.run:
                 target.metadata(RUN, content.run)
@@ -150,18 +163,18 @@ def write_listing(directory: Path, contents: Sequence[FileContent]) -> None:
     os.replace(partial, directory / METADATA)  # a reader sees the old one or the new one
 
 
-def _copy(scan: McapScan, target: ChunkedFile, clock: int | None) -> dict[BagTopic, int]:
+def _copy(scan: McapScan, target: ChunkedFile, cap: int | None) -> dict[BagTopic, int]:
     """Copy all messages and topics; return the channels of the topics."""
     channels: dict[BagTopic, int] = {}
     for topic, log_time, publish_time, data in scan.messages():
         channel = channels.get(topic)
         if channel is None:
             channel = channels[topic] = target.topic(topic)
-        if clock is not None:
-            if topic.name == CLOCK:
-                clock = None
+        if cap is not None:
+            if log_time <= cap:
+                cap = None
             else:
-                log_time = min(log_time, clock)
+                log_time = cap
         target.message(channel, log_time, publish_time, data)
     for topic in scan.topics.values():
         if topic not in channels:

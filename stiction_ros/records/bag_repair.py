@@ -13,7 +13,7 @@ from stiction_ros.records.bag_finish import (
     FileContent,
     Packing,
     content_of,
-    first_clock,
+    log_time_caps,
     rewrite,
     write_listing,
 )
@@ -74,10 +74,10 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
     contents = [_look(file) for file in files]
     notes = [note for content in contents for note in content.notes]
     ill = [content.damaged or not content.finished for content in contents]
-    clock = first_clock(files) if any(ill) else None
+    caps = log_time_caps(files) if any(ill) else [None] * len(files)
     for number, file in enumerate(files):
         if ill[number]:
-            contents[number] = _mend(file, contents[number], packing, clock)
+            contents[number] = _mend(file, contents[number], packing, caps[number])
     listing = _listing_faults(path, contents)
     if path.is_dir() and (any(ill) or listing):
         write_listing(path, contents)
@@ -108,11 +108,11 @@ def _look(path: Path) -> FileContent:
     return content_of(BagFile(path.name, dict(counts), first, last), scan)
 
 
-def _mend(path: Path, content: FileContent, packing: Packing, clock: int | None) -> FileContent:
+def _mend(path: Path, content: FileContent, packing: Packing, cap: int | None) -> FileContent:
     """Rewrite one file; a damaged one stays beside the new one under another name."""
     if content.damaged:
         shutil.copy2(path, path.with_suffix(".mcap.damaged"))
-    return rewrite(path, packing, clock=clock, salvage=True)
+    return rewrite(path, packing, cap=cap, salvage=True)
 
 
 def _listing_faults(path: Path, contents: list[FileContent]) -> list[str]:

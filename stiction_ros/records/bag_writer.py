@@ -96,10 +96,12 @@ class BagWriter:
         self._schemas: dict[tuple[str, str], int] = {}
         self._run = {"recorder": f"stiction_ros {__version__}"}
         self._number = 0
+        self._gone: set[int] = set()
         self._first: int | None = None
         self._closed = False
         _make_empty(self.directory)
-        self._begin_file()
+        self._journal: Journal
+        self._begin_file(0)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -159,9 +161,7 @@ class BagWriter:
         except KeyError:
             raise InputError(f"topic {topic} was not added", where=str(self.directory)) from None
         if self._limited and self._is_full(log_time):
-            self._journal.close()
-            self._number += 1
-            self._begin_file()
+            self._go_on()
         head = MESSAGE_RECORD.pack(
             MESSAGE,
             MESSAGE_HEAD.size + len(data),
@@ -180,6 +180,30 @@ class BagWriter:
         self._open()
         self._journal.put(Metadata(metadata=dict(mapping), name=name))
 
+    def put_back(self) -> str:
+        """Write again what somebody has removed while it was being recorded.
+
+        Of the present file nothing is lost; files that were complete cannot be written again.
+
+        Returns:
+            What was found and done, one sentence; empty when everything is there.
+
+        Raises:
+            OSError: the storage refuses, or another file stands in the way.
+        """
+        if self._journal.is_there:
+            return ""
+        self.directory.mkdir(parents=True, exist_ok=True)
+        self._journal.put_back()
+        gone = [
+            number
+            for number in range(self._number)
+            if number not in self._gone and not storage_path(self.directory, number).exists()
+        ]
+        self._gone.update(gone)
+        said = f"{self._journal.path} was removed and is written again"
+        return f"{said}; {len(gone)} files before it are lost" if gone else said
+
     def close(self) -> None:
         """Finish the bag; a second call does nothing.
 
@@ -188,6 +212,7 @@ class BagWriter:
         """
         if self._closed:
             return
+        self.put_back()
         self._closed = True
         self._journal.close()
         finish_bag(self.directory, self._packing)
@@ -216,17 +241,30 @@ class BagWriter:
             return True
         return bool(limits.size) and self._journal.size >= limits.size
 
-    def _begin_file(self) -> None:
-        """Open the journal of the next file and tell it what is known."""
-        path = storage_path(self.directory, self._number)
+    def _go_on(self) -> None:
+        """Begin the next file; where the storage refuses the present one stays in use."""
+        before = self._journal, self._schemas, self._first
+        try:
+            self._begin_file(self._number + 1)
+        except OSError:
+            if self._journal is not before[0]:
+                self._journal.discard()
+            self._journal, self._schemas, self._first = before
+            raise
+        before[0].close()
+
+    def _begin_file(self, number: int) -> None:
+        """Open the journal of a file and tell it what is known."""
+        path = storage_path(self.directory, number)
         self._journal = Journal(path)
         self._first = None
-        self._schemas.clear()
+        self._schemas = {}
         start = bag_information([BagFile(path.name, {}, None, None)], [])
         self._journal.put(Metadata(metadata=metadata_record(start), name=ROSBAG2))
         self._journal.put(Metadata(metadata=self._run, name=RUN))
         for entry in self._entries.values():
             self._announce(entry)
+        self._number = number
 
     def _announce(self, entry: _Entry) -> None:
         """Write the channel of a topic, and its schema when the file has not got it yet."""

@@ -7,6 +7,8 @@ import datetime
 import math
 from pathlib import Path
 
+import numpy as np
+
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.csv_names import (
@@ -34,8 +36,15 @@ def write_csv(record: Record, path: str | Path, *, iso: bool = False) -> None:
         iso: time as ISO 8601 stamps in UTC, to the microsecond, instead of seconds.
 
     Raises:
-        InputError: the file cannot be written, or no ISO stamp can say its times.
+        InputError: the file cannot be written, no ISO stamp can say its times, or it holds
+            several runs.
     """
+    if (np.diff(record.time) <= 0).any():
+        raise InputError(
+            "holds several runs, whose times fall back",
+            where=record.name,
+            fix="write each of its segments by itself",
+        )
     plain = (record.valves, record.outputs) == ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,))
     times = _iso(record) if iso else [repr(t) for t in (record.start + record.time).tolist()]
     header, columns = ["t"], [times]

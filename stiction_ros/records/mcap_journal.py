@@ -11,6 +11,8 @@ from mcap.records import Header
 
 from stiction_ros.records.mcap_format import MAGIC
 
+_BLOCK = 1 << 20
+
 
 class Writable(Protocol):
     """A record of the package ``mcap``."""
@@ -40,9 +42,44 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.size = 0
-        self._file = path.open("xb", buffering=0)
-        self.append(MAGIC)
-        self.put(Header(profile="ros2", library="stiction_ros"))
+        self._file = path.open("x+b", buffering=0)
+        try:
+            self.append(MAGIC)
+            self.put(Header(profile="ros2", library="stiction_ros"))
+        except OSError:
+            self.discard()
+            raise
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the file still stands under its name."""
+        try:
+            return os.path.samestat(os.stat(self.path), os.fstat(self._file.fileno()))
+        except OSError:
+            return False
+
+    def put_back(self) -> None:
+        """Write the file under its name again, after somebody has removed it.
+
+        What was written is still there until it is closed, so nothing is lost.
+        """
+        other = self.path.open("x+b", buffering=0)
+        try:
+            for begin in range(0, self.size, _BLOCK):
+                block = os.pread(self._file.fileno(), min(_BLOCK, self.size - begin), begin)
+                while block:
+                    block = block[other.write(block) :]
+        except OSError:
+            other.close()
+            self.path.unlink(missing_ok=True)
+            raise
+        self._file.close()
+        self._file = other
+
+    def discard(self) -> None:
+        """Close and remove the file."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
 
     def put(self, entry: Writable) -> None:
         """Append a record."""

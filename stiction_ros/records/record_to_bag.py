@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +24,9 @@ _LATEST = 2**31 * SECOND  # seconds of a stamp are a signed 32-bit number
 def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
     """Write ``record`` as a rosbag2 bag; log time and publish time are the samples' stamps.
 
+    Gaps and runs come back when it is read; a bag has no place for the mask, but for bad
+    samples, which are NaN. Where stamps fall back log time stands still.
+
     Args:
         record: its ``start`` is the stamp of the first sample, s.
         directory: the bag, made with its parents, must not hold anything yet.
@@ -36,7 +40,7 @@ def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
     """
     first = round(record.start * SECOND)
     stamps = [first + round(time * SECOND) for time in record.time.tolist()]
-    if stamps[0] < 0 or stamps[-1] >= _LATEST:
+    if min(stamps) < 0 or max(stamps) >= _LATEST:
         raise InputError(
             f"begins at {record.start:.9g} s, which no ROS stamp can say",
             where=record.name,
@@ -54,10 +58,12 @@ def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
     with BagWriter(directory) as writer:
         for topic, _, _ in signals:
             writer.add_topic(topic, JOINT_STATE, text, type_hash, QOS)
-        for row, stamp in enumerate(stamps):
+        for row, (stamp, log) in enumerate(
+            zip(stamps, itertools.accumulate(stamps, max), strict=True)
+        ):
             for topic, tags, values in signals:
                 data = joint_state_bytes(stamp, tags, values[row].tolist())
-                writer.write(topic, data, stamp, stamp)
+                writer.write(topic, data, log, stamp)
         return writer.counts
 
 

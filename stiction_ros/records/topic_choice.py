@@ -8,6 +8,11 @@ from collections.abc import Sequence
 
 from stiction_ros.errors import InputError
 
+OWN = "own"
+"""Instead of an expression: the topics of the recorder's namespace and those of the graph."""
+
+GLOBAL = ("clock", "diagnostics", "parameter_events", "rosout")
+
 
 @dataclasses.dataclass(frozen=True)
 class TopicChoice:
@@ -24,14 +29,25 @@ class TopicChoice:
     exclude: re.Pattern[str] | None
 
     @classmethod
-    def of(cls, names: Sequence[str], regex: str, exclude: str) -> TopicChoice:
+    def of(
+        cls, names: Sequence[str], regex: str, exclude: str, namespace: str = "/"
+    ) -> TopicChoice:
         """Build a choice from what parameters say; an empty expression fits nothing.
+
+        Args:
+            names: full names.
+            regex: of full names; :data:`OWN` for the loop of the namespace.
+            exclude: of full names.
+            namespace: of the recorder.
 
         Raises:
             InputError: no regular expression, or nothing is chosen at all.
         """
         if not names and not regex:
             raise InputError("no topic is chosen", where="recorder", fix="set topics or regex")
+        if regex == OWN:
+            own = re.escape(namespace.rstrip("/"))
+            regex = f"{own}/.*|/({'|'.join(GLOBAL)})" if own else ".*"
         return cls(frozenset(names), _compiled(regex, "regex"), _compiled(exclude, "exclude_regex"))
 
     def __contains__(self, topic: str) -> bool:

@@ -42,6 +42,7 @@ SIGNALS: dict[str, type[Any]] = {
     "pv": JointState,
     "sp": JointState,
     "op": JointState,
+    "op_applied": JointState,
     "stem": JointState,
     "stiction": JointState,
     "prediction": JointTrajectory,

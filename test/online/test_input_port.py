@@ -261,12 +261,22 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
     "a stale one": ([(2.5, "pv", 1), (3, "pv", 3)], "3+", {"stale": 1}),
     "stamp 0": ([(2.5, "pv", 0), (3, "pv", 3)], "3+", {"stale": 1}),
     "the same again": ([(2.5, "pv", 2), (3, "pv", 3)], "3+", {"stale": 1}),
-    "far ahead": ([(2.5, "pv", 4e9), (3, "pv", 3)], "3+", {"ahead": 1}),
+    "far ahead": ([(2.5, "pv", 2e9), (3, "pv", 3)], "3+", {"ahead": 1}),
+    "stamps that no clock shows": (
+        [(2.5, "pv", 4e9), (2.5, "pv", -1), (3, "pv", 3)],
+        "3+",
+        {"ahead": 1, "stale": 1},
+    ),
     "ahead of what the clock allows": ([(2.5, "pv", 9), (3, "pv", 3)], "3+", {"ahead": 1}),
     "a gap as long as the clock says": (
         [(9, "pv", 9)],
         "3-? 4-? 5-? 6-? 7-? 8-? 9+",
         {"missing": 6},
+    ),
+    "a backlog that is longer than the clock says": (
+        [(2.1, "queued", k) for k in range(3, 9)] + [(2.1, "queued", 99), (2.1, "pv", 9)],
+        "3- 4- 5- 6- 7- 8- 9+",
+        {"passed over": 6, "ahead": 1},
     ),
     "a stale one in the queue": (
         [(3, "queued", 1), (4, "queued", 3), (4, "pv", 4)],
@@ -274,8 +284,8 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         {"stale": 1, "passed over": 1},
     ),
     "older stamps that rise": (
-        [(3 + k / 10, "pv", -90 + k) for k in TEN] + [(4, "pv", -80)],
-        "^-81+ -80+",
+        [(3 + k / 10, "pv", k / 20) for k in TEN] + [(4, "pv", 1.45)],
+        "^0.45+ 1.45+",
         {"stale": SUCCESSION, "new runs": 1},
     ),
     "older stamps with good ones between": (
@@ -454,6 +464,18 @@ def test_a_pace_that_was_set_wrong_is_found_out() -> None:
         feed.event(k + 1, "pv", k)
     late = feed.samples[-20:]
     assert [word(sample) for sample in late] == [f"{k}+" for k in range(40, 60)]
+
+
+def test_fast_samples_are_waited_for_a_tenth_of_a_second_and_then_stepped_in_time() -> None:
+    feed = Feed(dataclasses.replace(REALTIME, step=S // 100, period=0.01))
+    for now, kind, stamp in ((0.0, "sp", 0), (0.0, "applied", 0.0), (0.01, "pv", 0.01)):
+        feed.event(now, kind, stamp)
+    feed.event(0.11, "tick", 0)
+    assert len(feed.samples) == 1
+    feed.event(0.1205, "tick", 0)
+    assert feed.words == "^0.01+ " + " ".join(f"{k / 100:g}-?" for k in range(2, 11)) + " 0.11+?"
+    feed.event(0.129, "pv", 0.12)
+    assert word(feed.samples[-1]) == "0.12+"
 
 
 def test_a_preview_is_held_against_the_range() -> None:

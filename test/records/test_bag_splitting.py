@@ -17,6 +17,7 @@ from stiction_ros.records.bag_messages import read_raw
 from stiction_ros.records.bag_reader import read_bag
 from stiction_ros.records.bag_repair import RepairStatus, repair_bag
 from stiction_ros.records.bag_writer import BagWriter, Splitting
+from stiction_ros.records.log_time import SIMULATED
 from stiction_ros.records.run_metadata import run_metadata
 
 CONFIG = "node: /plant\nversion: '0.1'\nseed: 7\n"
@@ -174,3 +175,83 @@ def test_the_time_of_a_file_counts_from_simulated_time(tmp_path: Path) -> None:
     bag.writer.close()
     assert names(tmp_path / "run") == ["metadata.yaml", "run_0.mcap"]
     np.testing.assert_array_equal(read_bag(tmp_path / "run").pv[:, 0], 7.0 + np.arange(50))
+
+
+def test_a_next_file_that_finds_no_room_leaves_the_present_one_in_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag = split_bag(tmp_path / "run", Splitting(size=8000))
+    files = names(tmp_path / "run")
+    monkeypatch.setattr("stiction_ros.records.mcap_journal.Journal.put", refused)
+    refusals = 0
+    for k in range(200, 300):
+        try:
+            bag.loop(1, start=k * SECOND)
+        except OSError:
+            refusals += 1
+    assert refusals
+    assert names(tmp_path / "run") == files
+    monkeypatch.undo()
+    bag.loop(100, start=400 * SECOND)
+    bag.writer.close()
+    assert raw(tmp_path / "run") == bag.written
+    found: list[str] = []
+    list(read_raw(tmp_path / "run", found))
+    assert found == []
+
+
+def refused(*_args: object) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_only_what_came_before_simulated_time_gets_the_first_one(tmp_path: Path) -> None:
+    """Also when a later file begins with other messages than the first on ``/clock``."""
+    bag = Bag(BagWriter(tmp_path / "run", Packing(), Splitting(duration=3 * SECOND)))
+    wall = 1_700_000_000 * SECOND
+    for _ in range(3):
+        bag.text("/plant/config", CONFIG, wall)
+    for k in range(20):
+        stamp = (5 + k) * SECOND
+        if k % 4 == 0:
+            bag.put("/clock", "rosgraph_msgs/msg/Clock", clock(stamp), stamp)
+        bag.joint("/pv", stamp, {"A": float(k)})
+        bag.joint("/op", stamp, {"V": float(k)})
+    bag.writer.close()
+    assert len(names(tmp_path / "run")) > 4
+    times = [log_time for _, log_time, _ in raw(tmp_path / "run")]
+    assert times == sorted(times)
+    assert times[:4] == [5 * SECOND] * 4
+
+
+def test_a_recorder_may_tell_the_first_simulated_time(tmp_path: Path) -> None:
+    bag = Bag(BagWriter(tmp_path / "run"))
+    wall = 1_700_000_000 * SECOND
+    bag.put("/clock", "rosgraph_msgs/msg/Clock", clock(99 * SECOND), wall)  # of another loop
+    bag.writer.add_metadata(SIMULATED, {"first": str(5 * SECOND)})
+    bag.loop(10)
+    bag.writer.close()
+    times = [log_time for _, log_time, _ in raw(tmp_path / "run")]
+    assert times == sorted(times)
+    assert (times[0], times[-1]) == (5 * SECOND, 14 * SECOND)
+
+
+def test_what_was_removed_is_written_again(tmp_path: Path) -> None:
+    bag = split_bag(tmp_path / "run", Splitting(size=8000))
+    assert bag.writer.put_back() == ""
+    count = len(names(tmp_path / "run"))
+    kept = len(raw(tmp_path / "run" / f"run_{count - 1}.mcap"))
+    shutil.rmtree(tmp_path / "run")
+    said = bag.writer.put_back()
+    assert f"run_{count - 1}.mcap was removed and is written again; {count - 1} files" in said
+    assert bag.writer.put_back() == ""
+    bag.text("/mode", "hold", 200 * SECOND)
+    bag.writer.close()
+    assert raw(tmp_path / "run") == bag.written[-kept - 1 :]
+
+
+def test_what_is_removed_just_before_the_end_is_finished_all_the_same(tmp_path: Path) -> None:
+    bag = Bag(BagWriter(tmp_path / "run"))
+    bag.loop(10)
+    shutil.rmtree(tmp_path / "run")
+    bag.writer.close()
+    assert raw(tmp_path / "run") == bag.written

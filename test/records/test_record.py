@@ -11,6 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
+from stiction_ros.records.bag_messages import read_raw
+from stiction_ros.records.bag_reader import read_bag_parts
 from stiction_ros.records.csv_file import read_csv_parts
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.parts import joined, longest_part, only_part
@@ -211,3 +213,24 @@ def test_only_one_good_part_is_one_record() -> None:
         only_part([record([B] + [G] * 9)], "r")
     with pytest.raises(InputError, match="more than one run: time falls back from 23 s to 5 s"):
         only_part([record(), record()], "r")
+
+
+def test_gaps_and_runs_go_through_a_bag(tmp_path: Path) -> None:
+    pytest.importorskip("sensor_msgs", reason="the definitions of sensor_msgs are not installed")
+    from stiction_ros.records.record_to_bag import write_bag
+
+    found = record(gaps=(Gap(20, 105.0), Gap(40, 5.0)), count=60)
+    write_bag(found, tmp_path / "bag")
+    parts = read_bag_parts(tmp_path / "bag")
+    assert joined(parts).segments == found.segments
+    np.testing.assert_array_equal(joined(parts).op, found.op)
+    times = [raw.log_time for raw in read_raw(tmp_path / "bag")]
+    assert times == sorted(times)
+
+
+def test_a_csv_file_holds_gaps_but_one_run_only(tmp_path: Path) -> None:
+    found = record(gaps=(Gap(20, 105.0),), count=40)
+    write_csv(found, tmp_path / "r.csv")
+    assert joined(read_csv_parts(tmp_path / "r.csv")).segments == found.segments
+    with pytest.raises(InputError, match="holds several runs"):
+        write_csv(record(gaps=(Gap(5, 5.0),)), tmp_path / "s.csv")

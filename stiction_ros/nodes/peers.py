@@ -1,0 +1,177 @@
+"""The partners of a node: who must be there before it begins, what lacks, and who has gone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+
+TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
+WATCHER = "recorder"  # reads every topic and commands nothing
+
+
+class Outlet:
+    """A publisher that counts, and knows which nodes must hear its first message."""
+
+    def __init__(self, publisher: Publisher, readers: tuple[str, ...], qos: QoSProfile) -> None:
+        self.publisher = publisher
+        self.readers = readers
+        self.qos = qos
+        self.count = 0
+
+    def publish(self, message: Any) -> None:
+        """Publish and count."""
+        self.count += 1
+        self.publisher.publish(message)
+
+
+class Inlet:
+    """A subscription, and the nodes whose first message must not be missed."""
+
+    def __init__(
+        self, subscription: Subscription, writers: tuple[str, ...], qos: QoSProfile
+    ) -> None:
+        self.subscription = subscription
+        self.writers = writers
+        self.qos = qos
+
+    def drain(self) -> int:
+        """Take all that is queued now, hand each message to the callback, and count them."""
+        taken = 0
+        while taken < self.qos.depth:
+            with self.subscription.handle:
+                found = self.subscription.handle.take_message(
+                    self.subscription.msg_type, self.subscription.raw
+                )
+            if found is None:
+                break
+            taken += 1
+            self.subscription.callback(found[0])
+        return taken
+
+
+class Peers:
+    """What ``wait_for`` asks: nodes of this package, which announce themselves, and topics.
+
+    A node is ready when it has announced ``~/config``, and linked when its topics have
+    matched in both directions. A topic is there when a publisher of it (or, where this node
+    publishes it, a reader other than the recorder) has matched, whatever its name: so a relay
+    or a driver can stand between the nodes.
+    """
+
+    def __init__(self, node: Node, wait_for: Sequence[str]) -> None:
+        """Wait for the entries of ``wait_for`` on behalf of ``node``."""
+        self._node = node
+        entries = [entry for entry in wait_for if entry]
+        self.names = tuple(sorted({e for e in entries if not _is_topic(e)}))
+        self.topics = tuple(
+            sorted(
+                {node.resolve_topic_name(e.removeprefix(TOPIC)) for e in entries if _is_topic(e)}
+            )
+        )
+        self._pinned: dict[str, frozenset[tuple[int, ...]]] = {}
+
+    def unheard(self, inlets: dict[str, Inlet]) -> list[str]:
+        """Return what lacks until no first message can be missed; empty when nothing does."""
+        missing, known = [], self._present()
+        for topic, inlet in inlets.items():
+            full = self._node.resolve_topic_name(topic)
+            found = self._node.get_publishers_info_by_topic(full)
+            names = {info.node_name for info in found}
+            missing += [
+                known.get(name) or f"{name} (does not publish {topic})"
+                for name in self.names
+                if name in inlet.writers and name not in names
+            ]
+            usable = [i for i in found if _fit(i.qos_profile, inlet.qos)]
+            if inlet.subscription.get_publisher_count() < len(usable):
+                missing.append(f"{topic} (not every publisher is matched)")
+            elif full in self.topics and not usable:
+                missing.append(f"{topic} (nobody publishes it)")
+        own = {self._node.resolve_topic_name(topic) for topic in inlets}
+        return _once([*missing, *self._foreign_topics(own)])
+
+    def unlinked(self, outlets: dict[str, Outlet]) -> list[str]:
+        """Return what lacks until all partners are ready and hear; empty when nothing does."""
+        missing, known = [], self._present()
+        for name in self.names:
+            if not self._announced(name):
+                missing.append(known.get(name) or f"{name} (not ready)")
+        for topic, outlet in outlets.items():
+            full = self._node.resolve_topic_name(topic)
+            found = self._node.get_subscriptions_info_by_topic(full)
+            names = {info.node_name for info in found}
+            missing += [
+                known.get(name) or f"{name} (does not read {topic})"
+                for name in self.names
+                if name in outlet.readers and name not in names
+            ]
+            usable = [i for i in found if _fit(outlet.qos, i.qos_profile)]
+            if outlet.publisher.get_subscription_count() < len(usable):
+                missing.append(f"{topic} (not every reader is matched)")
+            elif full in self.topics and all(i.node_name == WATCHER for i in usable):
+                missing.append(f"{topic} (nobody reads it)")
+        return _once(missing)
+
+    def pin(self) -> None:
+        """Remember who is there now; :meth:`gone` compares with it."""
+        names = [name for name in self.names if name != WATCHER]
+        self._pinned = {name: self._announced(name) for name in names}
+
+    def gone(self) -> dict[str, str]:
+        """Return partners that are not those of :meth:`pin`, and what became of them."""
+        lost = {}
+        for name, before in self._pinned.items():
+            now = self._announced(name)
+            if now != before:
+                lost[name] = "was replaced" if now - before else "has gone"
+        return lost
+
+    def _announced(self, name: str) -> frozenset[tuple[int, ...]]:
+        """Return the identities of those that announce themselves under ``name``."""
+        namespace = self._node.get_namespace().rstrip("/")
+        found = self._node.get_publishers_info_by_topic(f"{namespace}/{name}/config")
+        return frozenset(tuple(i.endpoint_gid) for i in found if i.node_name == name)
+
+    def _present(self) -> dict[str, str]:
+        """Return what to say of the partners that are not in the graph at all."""
+        there = set(self._node.get_node_names())
+        return {name: f"{name} (no such node)" for name in self.names if name not in there}
+
+    def _foreign_topics(self, own: Iterable[str]) -> list[str]:
+        """Return the awaited topics that this node does not use and nobody publishes."""
+        node = self._node
+        used = {*own, *(publisher.topic_name for publisher in node.publishers)}
+        return [
+            f"{topic} (nobody publishes it)"
+            for topic in self.topics
+            if topic not in used and not node.count_publishers(topic)
+        ]
+
+
+def publishers_of(node: Node, topic: str) -> list[str]:
+    """Return the full names of the nodes that publish a topic, as often as they do."""
+    found = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
+    return [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found]
+
+
+def _is_topic(entry: str) -> bool:
+    return entry.startswith(("/", "~", TOPIC))
+
+
+def _fit(offered: QoSProfile, asked: QoSProfile) -> bool:
+    """Tell whether a reader can match; one that cannot is waited for by nobody."""
+    lossy = offered.reliability == ReliabilityPolicy.BEST_EFFORT
+    fleeting = offered.durability == DurabilityPolicy.VOLATILE
+    return not (
+        (lossy and asked.reliability == ReliabilityPolicy.RELIABLE)
+        or (fleeting and asked.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+    )
+
+
+def _once(said: list[str]) -> list[str]:
+    return list(dict.fromkeys(said))

@@ -1,0 +1,102 @@
+"""Which OP a plant or driver takes: from one commander, for the present sample, once."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections import Counter
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+OLDEST = 3  # samples: an OP that is later than this was meant for another state of the loop
+
+
+class Reception(enum.Enum):
+    """What became of one OP."""
+
+    TAKEN = "taken"
+    LATE = "late"
+    """Taken, though its sample had passed."""
+    REPEATED = "repeated"
+    """Not newer than the last one taken: the first OP of a sample wins."""
+    NAME = "name"
+    TAGS = "tags"
+    NUMBER = "number"
+    PAST = "past"
+    FUTURE = "future"
+
+
+@dataclasses.dataclass(frozen=True)
+class CommandRules:
+    """What a plant or driver asks of an OP.
+
+    Attributes:
+        commander: full name of the only node that may command; empty for the first that does.
+        step: from one sample to the next, ns.
+        exact: only the OP that bears the stamp of the present sample is taken (lockstep).
+    """
+
+    commander: str
+    step: int
+    exact: bool
+
+
+class OpPort:
+    """Judges OPs by :class:`CommandRules` and counts what became of them.
+
+    Attributes:
+        commander: full name of the node that commands; empty before the first.
+        counts: by :class:`Reception`.
+    """
+
+    def __init__(self, rules: CommandRules) -> None:
+        """Start without any OP."""
+        self._rules = rules
+        self.commander = rules.commander
+        self.counts: Counter[Reception] = Counter()
+        self._last: int | None = None
+
+    def judge(self, sender: str, stamp: int, op: FloatArray | None, present: int) -> Reception:
+        """Return whether an OP is taken.
+
+        Args:
+            sender: full name that it bears; empty when it bears none.
+            stamp: of the sample that it is for, ns.
+            op: shape (m,), or None when it has not a value for each valve.
+            present: stamp of the present sample, ns.
+        """
+        found = self._reception(sender, stamp, op, present)
+        self.counts[found] += 1
+        if found in (Reception.TAKEN, Reception.LATE):
+            self._last, self.commander = stamp, sender
+        return found
+
+    def _reception(self, sender: str, stamp: int, op: FloatArray | None, present: int) -> Reception:
+        exact, step = self._rules.exact, self._rules.step
+        if not sender or sender != (self.commander or sender):
+            return Reception.NAME
+        if op is None:
+            return Reception.TAGS
+        if not np.isfinite(op).all():
+            return Reception.NUMBER
+        if stamp > present + (0 if exact else step // 2):
+            return Reception.FUTURE
+        if self._last is not None and stamp <= self._last:
+            return Reception.REPEATED
+        if stamp < present - (0 if exact else OLDEST * step):
+            return Reception.PAST
+        return Reception.LATE if stamp <= present - (step - step // 2) else Reception.TAKEN
+
+    def complaint(self, found: Reception, sender: str) -> str:
+        """Return what is wrong with an OP in one sentence; empty when nothing is."""
+        return {
+            Reception.LATE: "op comes after its sample has passed",
+            Reception.NAME: f"op of {sender or 'a node that bears no name'} is refused, "
+            f"{self.commander or 'a named node'} commands",
+            Reception.TAGS: f"op of {sender} without a value for each valve is refused",
+            Reception.NUMBER: f"op of {sender} that is not finite is refused",
+            Reception.PAST: f"op of {sender} for a sample long past is refused",
+            Reception.FUTURE: f"op of {sender} for a sample to come is refused",
+        }.get(found, "")
