@@ -13,7 +13,7 @@ from typing import Any
 from stiction_ros.cli import compare
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
-from stiction_ros.cli.scenarios import SCENARIOS, find, node_parameters
+from stiction_ros.cli.scenarios import SCENARIOS, find, loop_nodes
 from stiction_ros.errors import InputError
 from stiction_ros.online.session import Scenario
 
@@ -69,12 +69,7 @@ def _run_scenario(
     from stiction_ros.report.run_report import report_run
 
     name = scenario.name
-    nodes = node_parameters(scenario.path, directory)
-    seed = scenario.seed if options.seed is None else options.seed
-    nodes["plant"]["seed"] = seed
-    if options.speed is not None:
-        for name_of_node in ("plant", "controller", "estimator"):
-            nodes[name_of_node].update(pace="realtime", speed=options.speed)
+    nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
     processes = NodeProcesses(nodes, directory)
     begin = time.monotonic()
     try:
