@@ -18,12 +18,14 @@ from stiction_ros.cli import (
     demo,
     example,
     experiment,
+    faults,
     fit_linear,
     gap,
     identify,
     repair,
     replay,
     report,
+    soak,
     study,
     study_control,
     study_monitor,
@@ -46,6 +48,8 @@ COMMANDS = (
     study,
     study_control,
     study_monitor,
+    faults,
+    soak,
     bench,
 )
 

@@ -1,0 +1,166 @@
+"""``stiction faults``: faults put into a running graph, and what becomes of it."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shutil
+import signal
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.cli.json_output import write_json
+from stiction_ros.cli.node_processes import require_ros, ros_environment
+from stiction_ros.cli.progress import bar
+from stiction_ros.errors import InputError
+from stiction_ros.faults.catalogue import FAULTS, find, table
+from stiction_ros.faults.fault import Fault, Pace, Phase
+from stiction_ros.faults.judge import Outcome
+
+Case = tuple[Fault, Pace, Phase]
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "faults",
+        help="put faults into a running graph and judge what becomes of it",
+        description="Start the nodes of a loop as processes, put one fault into it, and hold "
+        "what is seen against what is expected: before and after the swap, in both paces, one "
+        "case after another. docs/faults.md tells all of them.",
+    )
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument(
+        "--only", action="append", metavar="NAME", help="this fault; may be repeated"
+    )
+    which.add_argument("--all", action="store_true", help="every fault (up to an hour)")
+    which.add_argument("--list", action="store_true", help="print the table of all faults")
+    parser.add_argument("--pace", choices=[p.value for p in Pace], help="in this pace alone")
+    parser.add_argument(
+        "--phase", choices=[p.value for p in Phase], help="on this side of the swap"
+    )
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
+    parser.add_argument(
+        "--speed", type=float, default=25.0, metavar="N", help="of realtime pace (25)"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="keep logs and bags of cases that fail here (out/faults)"
+    )
+    parser.add_argument("--json", metavar="F", help="write every outcome; - for stdout")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.list:
+        print(table(), end="")
+        return 0
+    faults = FAULTS if options.all else tuple(find(name) for name in options.only)
+    cases = [
+        (fault, pace, phase)
+        for fault in faults
+        for pace, phase in fault.cases
+        if options.pace in (None, pace.value) and options.phase in (None, phase.value)
+    ]
+    if not cases:
+        raise InputError("no case is left", fix="leave --pace and --phase out")
+    if not options.speed > 0.0:
+        raise InputError(f"{options.speed:g} is not positive", where="--speed")
+    require_ros()
+    signal.signal(signal.SIGTERM, _interrupt)
+    outcomes = run_cases(cases, options)
+    if options.json is not None:
+        write_json(options.json, [outcome.to_json() for outcome in outcomes])
+    if options.json != "-":
+        _print(outcomes)
+    return 0 if outcomes and all(outcome.passed for outcome in outcomes) else 1
+
+
+def run_cases(cases: Sequence[Case], options: argparse.Namespace) -> list[Outcome]:
+    """Run one case after another; logs and bags of those that fail are kept."""
+    from stiction_ros.faults.case import Options, run_case
+
+    kept = Path(options.out or "out/faults")
+    outcomes = []
+    with _domain(), bar("faults") as show:
+        for number, (fault, pace, phase) in enumerate(cases):
+            title = f"{fault.name}-{pace}-{phase}"
+            show(number / len(cases), title)
+            with tempfile.TemporaryDirectory(prefix="stiction_fault_") as folder:
+                settings = Options(options.seed, options.speed)
+                outcome = run_case(fault, pace, phase, Path(folder), settings)
+                if not outcome.passed:
+                    _keep(Path(folder), kept / title)
+            outcomes.append(outcome)
+    return outcomes
+
+
+@contextlib.contextmanager
+def _domain() -> Iterator[None]:
+    """Give all cases the same environment: this machine only, a domain of its own."""
+    import os
+
+    before = os.environ.get("ROS_DOMAIN_ID")
+    os.environ["ROS_DOMAIN_ID"] = ros_environment()["ROS_DOMAIN_ID"]
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["ROS_DOMAIN_ID"]
+
+
+def _keep(folder: Path, target: Path) -> None:
+    try:
+        if target.exists():
+            shutil.rmtree(target)
+        shutil.copytree(folder, target)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
+
+
+def _print(outcomes: Sequence[Outcome]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    shown = Table(
+        "fault",
+        "pace",
+        "swap",
+        "OP beyond, %",
+        "without OP, s",
+        "noticed, s",
+        "recovered, s",
+        "bag",
+        "verdict",
+    )
+    for one in outcomes:
+        recovered = "ended" if one.ended else _seconds(one.recovered)
+        shown.add_row(
+            one.fault,
+            one.pace.value,
+            one.phase.value,
+            f"{one.beyond:.2f}",
+            _seconds(one.without),
+            _seconds(one.noticed),
+            recovered,
+            "yes" if one.bag else "no",
+            "pass" if one.passed else "FAIL",
+        )
+    console.print(shown)
+    for one in outcomes:
+        for reason in one.reasons:
+            console.print(f"{one.fault}, {one.pace}, {one.phase}: {reason}", markup=False)
+    passed = sum(one.passed for one in outcomes)
+    seconds = sum(one.seconds for one in outcomes)
+    console.print(f"{passed} of {len(outcomes)} cases pass, {seconds / 60:.1f} minutes")
+
+
+def _seconds(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1f}"
+
+
+def _interrupt(_number: int, _frame: Any) -> None:
+    raise KeyboardInterrupt

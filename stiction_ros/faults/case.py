@@ -1,0 +1,167 @@
+"""One case: a loop is started, a fault put into it, and what happens is noted."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from pathlib import Path
+
+from stiction_ros.faults.bag_check import check_bag
+from stiction_ros.faults.fault import Bag, Fault, Pace, Phase
+from stiction_ros.faults.flow import CALM, new_ops, recovered
+from stiction_ros.faults.judge import LOOP, Outcome, judge
+from stiction_ros.faults.notices import GONE_WITHIN, SHOWN_WITHIN, level_at, look_for
+from stiction_ros.faults.observation import BagFound, Ended, Known, Observation
+from stiction_ros.faults.reference import allowed_move
+from stiction_ros.faults.running import RunningLoop
+from stiction_ros.faults.setting_up import HAND_OVER, SETTLING, WARM_UP
+
+START = 90.0  # s until the first samples; a first start compiles
+SWAP = 20.0  # s until the controller has taken the prepared model
+QUIET = 6.0  # s until what the start has brought is no longer shown
+LOOK = 2.5  # s that every loop is looked at after its fault, at least
+AWARE = ("embedding", "inversion")
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """How cases are run.
+
+    Attributes:
+        seed: of the plant's noise.
+        speed: simulated seconds per second of realtime pace.
+    """
+
+    seed: int = 1
+    speed: float = 25.0
+
+
+def run_case(
+    fault: Fault, pace: Pace, phase: Phase, directory: Path, options: Options = Options()
+) -> Outcome:
+    """Run and judge one case.
+
+    Args:
+        fault, pace, phase: which.
+        directory: an empty one, for parameters, logs and the bag.
+        options: how.
+    """
+    started = time.monotonic()
+    allowed = allowed_move(phase, options.seed)
+    loop = RunningLoop(fault, pace, phase, options.seed, options.speed, directory)
+    watched = _Watched(loop, fault)
+    try:
+        loop.start()
+        watched.run()
+        seen = watched.observation(time.monotonic())
+    finally:
+        loop.stop()
+    heard = {topic: tuple(taken) for topic, taken in loop.probe.heard.items()}
+    bag = BagFound() if fault.bag is Bag.LOST else check_bag(loop.bag, heard)
+    seen = dataclasses.replace(
+        seen,
+        bag=bag,
+        logs={name: node.log for name, node in loop.nodes.items()},
+        remarks=tuple(loop.remarks),
+    )
+    outcome = judge(fault, pace, seen, allowed)
+    return dataclasses.replace(outcome, seconds=time.monotonic() - started)
+
+
+class _Watched:
+    """One loop on its way through a case."""
+
+    def __init__(self, loop: RunningLoop, fault: Fault) -> None:
+        self._loop, self._fault = loop, fault
+        self._begun = self._over = time.monotonic()
+        self._before = Known()
+
+    def run(self) -> None:
+        """Start the loop, put the fault into it, look at what becomes of it."""
+        loop, fault = self._loop, self._fault
+        if not fault.from_start:
+            if not self._ready():
+                self._begun = self._over = time.monotonic()
+                return
+            self._before = loop.known
+            self._begun = time.monotonic()
+        fault.put(loop)
+        if fault.from_start:
+            self._ready()
+            self._before = loop.known
+        self._over = time.monotonic()
+        notices = fault.noticed_in(loop.pace)
+        bound = max(fault.recovery, GONE_WITHIN + SHOWN_WITHIN if notices else 0.0, LOOK) + CALM
+        loop.wait_until(self._settled, bound)
+
+    def observation(self, until: float) -> Observation:
+        """Return what was seen so far."""
+        loop = self._loop
+        ended = {
+            name: Ended(node.code, node.log, node.by_fault)
+            for name, node in loop.nodes.items()
+            if node.code is not None
+        }
+        heard = {topic: tuple(taken) for topic, taken in loop.probe.heard.items()}
+        return Observation(
+            loop.phase,
+            loop.period,
+            loop.step,
+            self._begun,
+            self._over,
+            until,
+            heard["op_applied"],
+            heard["op"],
+            heard["pv"],
+            tuple(loop.probe.statuses),
+            self._before,
+            loop.known,
+            ended,
+        )
+
+    def _ready(self) -> bool:
+        """Wait until the loop runs, in the phase that is asked for."""
+        loop = self._loop
+        taken = loop.heard("pv")
+        if not loop.wait_until(lambda: len(taken) >= WARM_UP or self._ended(), START):
+            loop.remark(f"only {len(taken)} samples came within {START:g} s of the start")
+            return False
+        if self._ended():
+            loop.remark(f"{', '.join(self._ended())} ended at the start")
+            return False
+        if loop.phase is Phase.AFTER and not self._swapped():
+            return False
+        loop.wait_until(self._quiet, QUIET)
+        return True
+
+    def _swapped(self) -> bool:
+        loop = self._loop
+        taken = loop.heard("pv")
+        loop.wait_until(lambda: len(taken) >= HAND_OVER + WARM_UP, START)
+        loop.offer(loop.model)
+        if not loop.wait_until(lambda: loop.known.mode in AWARE or self._ended(), SWAP):
+            loop.remark(f"the prepared model was not taken within {SWAP:g} s")
+            return False
+        return loop.wait_samples(SETTLING)
+
+    def _quiet(self) -> bool:
+        now = time.monotonic()
+        statuses = tuple(self._loop.probe.statuses)
+        return all(level_at(statuses, name, now) == "ok" for name in LOOP)
+
+    def _ended(self) -> list[str]:
+        return [name for name, node in self._loop.nodes.items() if node.code is not None]
+
+    def _settled(self) -> bool:
+        """Return whether nothing more is to be expected: to wait longer would tell no more."""
+        now = time.monotonic()
+        loop, fault = self._loop, self._fault
+        if loop.pace in fault.ends and all(loop.nodes[name].code is not None for name in LOOP):
+            return True
+        if now - self._over < LOOK:
+            return False
+        seen = self.observation(now)
+        back = recovered(seen, new_ops(seen))
+        known = fault.forgets or loop.known == self._before
+        shown = all(not look_for(one, seen).reason for one in fault.noticed_in(loop.pace))
+        return back is not None and known and shown
