@@ -17,7 +17,7 @@ BIN := $(VENV)/bin
 DONE := $(VENV)/installed$(subst /,-,$(subst $() $(),-,$(CURDIR)))
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 SOURCES := setup.py setup.cfg pyproject.toml package.xml stiction_ros/__init__.py \
-    $(wildcard resource/* launchers/* config/*)
+    $(wildcard resource/* launchers/* launch/* config/*)
 
 setup: $(DONE)
 

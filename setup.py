@@ -23,6 +23,7 @@ setup(
             f"share/{NAME}/config",
             sorted(glob("config/*.yaml") + glob("config/*.xml") + glob("config/*.json")),
         ),
+        (f"share/{NAME}/launch", sorted(glob("launch/*.launch.py"))),
         (f"lib/{NAME}", LAUNCHERS),
     ],
 )

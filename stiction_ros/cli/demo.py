@@ -13,7 +13,7 @@ from typing import Any
 from stiction_ros.cli import compare
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
-from stiction_ros.cli.scenarios import SCENARIOS, find, node_parameters
+from stiction_ros.cli.scenarios import SCENARIOS, find, loop_nodes
 from stiction_ros.errors import InputError
 from stiction_ros.online.session import Scenario
 
@@ -69,12 +69,7 @@ def _run_scenario(
     from stiction_ros.report.run_report import report_run
 
     name = scenario.name
-    nodes = node_parameters(scenario.path, directory)
-    seed = scenario.seed if options.seed is None else options.seed
-    nodes["plant"]["seed"] = seed
-    if options.speed is not None:
-        nodes["plant"].update(pace="realtime", speed=options.speed)
-        nodes["controller"]["pace"] = "realtime"
+    nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
     processes = NodeProcesses(nodes, directory)
     begin = time.monotonic()
     try:
@@ -122,6 +117,9 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
             cells = ["–" if value is None else f"{value:.4g}" for value in values]
             table.add_row(output, key, *cells)
     console.print(table)
+    if summary["pv_to_op_ms"]:
+        times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
+        console.print(f"{name}: PV to OP in ms: {times}")
     for topic, count in summary["messages"].items():
         # The recorder cannot hold its own last message.
         lost = (count["published"] or 0) - count["recorded"] - (topic == "/diagnostics")

@@ -14,13 +14,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from stiction_ros.cli.scenarios import STARTED, write_parameters
 from stiction_ros.config_files import config_directories
 from stiction_ros.errors import InputError
 from stiction_ros.orphans import DIE_WITH_PARENT
 
-STARTED = ("recorder", "estimator", "controller", "plant")
 ENDED = ("plant", "controller", "estimator", "recorder")  # who still has readers goes first
 PATIENCE = 60.0  # s for a node to end before it is killed
 GOODBYE = 5.0  # s from the end of a node that follows the plant to that of the plant
@@ -40,8 +38,7 @@ class NodeProcesses:
         self.directory = directory
         self._names = [name for name in STARTED if name in nodes]
         self._parameters = directory / "parameters.yaml"
-        document = {name: {"ros__parameters": dict(values)} for name, values in nodes.items()}
-        self._parameters.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+        write_parameters(nodes, self._parameters)
         self._processes: dict[str, subprocess.Popen[str]] = {}
         self._readers: list[threading.Thread] = []
         self._last: dict[str, str] = {}

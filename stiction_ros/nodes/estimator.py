@@ -156,7 +156,7 @@ class EstimatorNode(ManagedNode):
         self._heard[topic] = time.monotonic()
         given = tuple(message.name)
         if given and values_of(message, names) is not None:
-            self._strange.clear()
+            self._strange = Counter({k: n for k, n in self._strange.items() if k[0] != topic})
             return True
         self._refused[topic] += 1
         self.notice(f"tags of {topic}", "warn", f"{topic} without a value for each tag is left out")

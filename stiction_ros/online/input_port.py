@@ -23,6 +23,7 @@ LATEST = 2_140_000_000 * 10**9  # ns: stamps end in 2038, and those that follow 
 PATIENCE = 3  # samples of PV that wait for the OP in force before a run begins without
 SLACK = 3  # samples that a stamp may be further than the receiver's clock allows
 LATENESS = 0.1  # s that a PV is waited for at least
+AWAKE = 1.0  # s in which a receiver that stood still may get the rest of what came
 LONGEST_GAP = 200  # samples; after a longer one a run begins anew
 KEPT = 5000  # messages of each kind that wait for the others of their sample
 
@@ -61,6 +62,8 @@ class InputPort:
         self._waiting = self._behind = 0
         self._pv_number, self._pv_now, self._blind_from = -1, 0.0, 0.0
         self._taken_at, self._in_time = 0.0, True
+        self._looked: float | None = None
+        self._awake, self._before = -math.inf, (-1, 0.0)  # the last PV before it slept
 
     # ---- what comes in ---------------------------------------------------------------------
 
@@ -125,6 +128,7 @@ class InputPort:
         arrived, self._queue = self._queue, []
         if not arrived:
             return ()
+        self._look_at(now)
         self._pace.show(now, arrived[-1].stamp, self.rules.step)
         if self._begun:
             samples = self._take_newest(now, arrived)
@@ -134,12 +138,17 @@ class InputPort:
         return self._begin(now, arrived[-1])
 
     def overdue(self, now: float) -> tuple[Sample, ...]:
-        """Return samples whose PV should have come by ``now`` and has not, the last answered."""
+        """Return samples whose PV should have come by ``now`` and has not, the last answered.
+
+        To be called regularly, several times in a sample or every 20 ms.
+        """
         if self.rules.lockstep or not self._begun:
             return ()
         period = self._pace.period
+        self._look_at(now)
+        self._looked = now
         since = now - self._blind_from
-        if since < period + max(period, LATENESS):
+        if since < period + max(period, LATENESS) or now - self._awake < LATENESS:
             return ()
         # A PV that comes again within a period of its time is not late yet.
         lacking = math.floor(since / period) - 1 - (self._grid.number - self._pv_number)
@@ -165,6 +174,7 @@ class InputPort:
         """
         self._queue.clear()
         self._refused.clear()
+        self._looked = None
         if not self.rules.lockstep:
             self._begun, self._waiting = False, 0
 
@@ -250,10 +260,20 @@ class InputPort:
 
     # ---- realtime --------------------------------------------------------------------------
 
+    def _look_at(self, now: float) -> None:
+        """Note when the receiver itself stood still: what came is only now on its way."""
+        patience = max(self._pace.period, LATENESS)
+        if self._looked is not None and now - self._looked > patience:
+            self._looked = self._awake = now
+            self._before = self._pv_number, self._pv_now
+
     def _take_newest(self, now: float, arrived: list[_Arrived]) -> tuple[Sample, ...]:
         """Return the samples up to the newest that fits; not ``_begun`` after a new run."""
-        since = max(now - self._pv_now, 0.0) / self._pace.period
-        latest = self._pv_number - self._grid.number + SLACK + 2.0 * since
+        number, heard = self._pv_number, self._pv_now
+        if now - self._awake < AWAKE:
+            number, heard = self._before
+        since = max(now - heard, 0.0) / self._pace.period
+        latest = number - self._grid.number + SLACK + 2.0 * since
         fitting: dict[int, _Arrived] = {}
         for ahead, one in sorted(
             ((self._grid.ahead(one.stamp), one) for one in arrived), key=lambda pair: pair[0]
@@ -272,6 +292,7 @@ class InputPort:
                 )
                 if self._refused.add(one.stamp, follows or one.stamp < self._grid.stamp):
                     self._end_run()
+                    break
             return ()
         self._refused.clear()
         return self._follow(now, fitting)

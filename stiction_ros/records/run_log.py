@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records.answer_times import answer_times
 from stiction_ros.records.bag_messages import BagMessage, MessageDecoder, read_raw
 from stiction_ros.records.bag_reader import bag_source
 from stiction_ros.records.gap_log import GapLog, gap_log
@@ -64,6 +65,7 @@ class RunLog:
         stem_estimate: the controller's estimate of the stem positions at the record's
             samples, shape (N, m), %, NaN where none was published; None when there is none.
         gaps: what the monitor told.
+        pv_to_op_ms: p50, p99, p999 and max of the times from PV to OP; empty in lockstep.
         wall_seconds: from the first to the last publication, on the publishers' clock.
     """
 
@@ -81,6 +83,7 @@ class RunLog:
     stem_estimate: FloatArray | None = None
     wall_seconds: float = float("nan")
     gaps: GapLog = GapLog({}, {})
+    pv_to_op_ms: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def seconds(self, stamp: int) -> float:
         """Return the time of a stamp in s since the first sample."""
@@ -181,6 +184,7 @@ def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
         stem_estimate=stem_estimate(said, record, start),
         wall_seconds=(max(sent) - min(sent)) / 1e9,
         gaps=gap_log(said),
+        pv_to_op_ms=answer_times(said),
     )
 
 

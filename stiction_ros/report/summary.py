@@ -47,6 +47,7 @@ def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
             )
             if phase is not None
         },
+        "pv_to_op_ms": dict(log.pv_to_op_ms) or None,
         "messages": messages(log.published, log.recorded),
         "notes": list(log.notes),
     }

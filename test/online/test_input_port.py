@@ -298,6 +298,11 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         "^5009+ 5010+",
         {"ahead": SUCCESSION, "new runs": 1},
     ),
+    "a clock that was set, with a queue": (
+        [(2.5, "queued", 5000 + k) for k in range(3 * SUCCESSION)] + [(2.5, "pv", 5030)],
+        "^5030+",
+        {"ahead": 3 * SUCCESSION + 1, "new runs": 1},
+    ),
     "stamps far ahead at random": (
         [(3 + k / 10, "pv", 5000 * (1 + k)) for k in TEN] + [(4, "pv", 3)],
         "3+",
@@ -314,6 +319,21 @@ REALTIME_TABLE: dict[str, tuple[list[tuple[Any, ...]], str, dict[str, int]]] = {
         {"blind": 2},
     ),
     "nothing comes for long": ([(6.1, "tick", 0)], "3-? 4-? 5+?", {"blind": 3}),
+    "the receiver itself stood still": (
+        [(2.1, "tick", 0), (9.1, "tick", 0), (9.15, "queued", 3), (9.15, "pv", 4)],
+        "3- 4+",
+        {"passed over": 1},
+    ),
+    "it stood still and the middle is lost": (
+        [(2.1, "tick", 0), (9.1, "pv", 3), (9.11, "pv", 8), (9.12, "pv", 9)],
+        "3+ 4-? 5-? 6-? 7-? 8+ 9+",
+        {"missing": 4},
+    ),
+    "it stood still and nothing has come": (
+        [(2.1, "tick", 0), (5.1, "tick", 0), (5.15, "tick", 0), (5.25, "tick", 0)],
+        "3-? 4+?",
+        {"blind": 2},
+    ),
     "late": (
         [(4.1, "tick", 0), (4.2, "pv", 3), (4.3, "pv", 4)],
         "3+? 4+",

@@ -57,3 +57,10 @@ def test_without_a_swap_the_status_says_so(healthy: RunLog) -> None:
     assert found["status"] == "no_swap"
     assert found["swap_time"] is None
     assert found["phases"].keys() == {"before"}
+
+
+def test_times_from_pv_to_op_are_null_in_lockstep(log: RunLog) -> None:
+    assert summary(tell(log))["pv_to_op_ms"] is None
+    times = {"p50": 1.0, "p99": 2.0, "p999": 3.0, "max": 4.0}
+    log = dataclasses.replace(log, pv_to_op_ms=times)
+    assert summary(tell(log))["pv_to_op_ms"] == times

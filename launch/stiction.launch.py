@@ -1,0 +1,56 @@
+"""Starts a loop: recorder, estimator, controller and plant, as the command ``stiction demo`` does.
+
+ros2 launch stiction_ros stiction.launch.py scenario:=siso speed:=25.0 directory:=run1
+"""
+
+from pathlib import Path
+
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
+from stiction_ros.cli.scenarios import SCENARIOS, find, loop_nodes, write_parameters
+
+ARGUMENTS = {
+    "scenario": ("siso", f"{' or '.join(SCENARIOS)}, or a *.scenario.yaml file"),
+    "directory": ("run", "folder for the parameter file and the bag; there must be no bag in it"),
+    "speed": ("max", "simulated seconds per second, or max for lockstep"),
+    "seed": ("", "seed of the noise; empty for that of the scenario"),
+    "namespace": ("", "of all nodes"),
+}
+
+
+def nodes_of(context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    """Return the nodes; their parameters stand in one file below ``directory``."""
+    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    directory = Path(given["directory"]).resolve()
+    directory.mkdir(parents=True, exist_ok=True)
+    nodes = loop_nodes(
+        find(given["scenario"]),
+        directory,
+        seed=int(given["seed"]) if given["seed"] else None,
+        speed=None if given["speed"] == "max" else float(given["speed"]),
+    )
+    parameters = directory / "parameters.yaml"
+    write_parameters(nodes, parameters, any_namespace=True)
+    return [
+        Node(
+            package="stiction_ros",
+            executable=name,
+            name=name,
+            namespace=given["namespace"],
+            parameters=[str(parameters)],
+            output="screen",
+        )
+        for name in nodes
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the arguments and the nodes."""
+    arguments = [
+        DeclareLaunchArgument(name, default_value=value, description=text)
+        for name, (value, text) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=nodes_of)])
