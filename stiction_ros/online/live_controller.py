@@ -12,37 +12,23 @@ import numpy as np
 from stiction_ros.control import (
     ControlDesign,
     ControlMode,
-    ControlSettings,
     MpcController,
     StepResult,
 )
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.online.approach import Approach
 from stiction_ros.online.background import AtOnce, Background
+from stiction_ros.online.controller_settings import AUTO, LiveControllerSettings
 from stiction_ros.online.hand_over import HandOver
 from stiction_ros.online.known_friction import alike, frictions_of, spreads_of
-from stiction_ros.online.offers import Judge, OfferRule, last_samples
+from stiction_ros.online.offers import Judge, last_samples
 from stiction_ros.online.past import Past
-from stiction_ros.online.schedule import FitSchedule
-from stiction_ros.online.watch import Watch, WatchRule
-from stiction_ros.settings import setting
+from stiction_ros.online.watch import Watch
 
-AUTO = "auto"
 HISTORY_SAMPLES = 20_000
 REMEMBERED = 20  # frictions that were rolled back
-
-
-@dataclasses.dataclass(frozen=True)
-class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule):
-    """Everything that can be set on the controller of a running loop."""
-
-    mode: str = setting(
-        AUTO,
-        "auto: the estimator swaps it; otherwise fixed",
-        choices=(AUTO, *(mode.value for mode in ControlMode)),
-    )
-    adopt_process: bool = setting(False, "also take the process from the estimator's loop model")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,6 +84,7 @@ class LiveController:
         self._told: tuple[FloatArray, bool] | None = None  # what the valves were given
         self._in_force, self._sure = np.array(model.stem_start), True
         self._keep = True
+        self._approach = Approach()
         self._retuned: HandOver | None = None
         self._offered: HandOver | None = None
         self._returning: HandOver | None = None
@@ -141,12 +128,14 @@ class LiveController:
     def begin(self, op: FloatArray) -> None:
         """Begin a run, or begin anew, with ``op`` (m,), %, in force.
 
-        The past is forgotten, what is known of the friction stays. The first OP is ``op``.
+        The past is forgotten, what is known of the friction stays. The first OP is ``op``, and
+        the set-point is approached from PV.
         """
         self._in_force, self._sure = np.array(op, dtype=float), True
         self._latest = self._told = None
         self._past.clear()
         self._keep = True
+        self._approach = Approach()
         self._controller.forget()
         for change in (self._retuned, self._offered, self._returning):
             if change is not None:
@@ -245,8 +234,15 @@ class LiveController:
         self._settle()
         upset = self._upset(dv)
         self._commit_what_is_due()
+        aim = self._approach.aim(pv, sp, self.settings.approach_samples)
         result = self._controller.step(
-            pv, sp, upset, self._in_force, preview, known=self._sure, keep=self._keep
+            pv,
+            aim,
+            upset,
+            self._in_force,
+            preview if aim is sp else None,
+            known=self._sure,
+            keep=self._keep,
         )
         if self._unknown:
             text = "; ".join(t for t in (result.reason, self._unknown) if t)
@@ -280,6 +276,8 @@ class LiveController:
             self._raised = controller.frictions
             self._note(controller.raised, sample)
         given_up = result.mode is ControlMode.HOLD and controller.mode is not ControlMode.HOLD
+        if result.mode is ControlMode.HOLD:
+            self._approach = Approach()
         if given_up and not self._given_up:
             change = ModeChange(sample, ControlMode.HOLD, result.reason, self._known.name)
             self.changes.append(change)

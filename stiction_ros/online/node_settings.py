@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+from stiction_ros.online.controller_settings import LiveControllerSettings
 from stiction_ros.online.gap_monitor import MonitorRule
-from stiction_ros.online.live_controller import LiveControllerSettings
 from stiction_ros.online.live_estimator import EstimatorSettings
 from stiction_ros.online.pairing import BRIDGED, Pairing
 from stiction_ros.settings import setting

@@ -8,7 +8,8 @@ from stiction_ros.control import ControlMode
 from stiction_ros.effects import from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings
+from stiction_ros.online.controller_settings import LiveControllerSettings
+from stiction_ros.online.live_controller import LiveController
 
 STEPS = 3
 MODES = (ControlMode.UNAWARE, ControlMode.EMBEDDING)

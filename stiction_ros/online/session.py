@@ -27,9 +27,10 @@ from stiction_ros.loop import (
 )
 from stiction_ros.loop.reading import Section, load_yaml
 from stiction_ros.loop.valve_changes import valve_changes_text
+from stiction_ros.online.controller_settings import LiveControllerSettings
 from stiction_ros.online.gap_finding import GapFinding
 from stiction_ros.online.gap_monitor import GapLook, MonitorRule
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings, ModeChange
+from stiction_ros.online.live_controller import LiveController, ModeChange
 from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitoring import Monitoring, check_model
 from stiction_ros.online.node_settings import (
@@ -40,6 +41,7 @@ from stiction_ros.online.node_settings import (
     RecorderNodeSettings,
 )
 from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.online.signal_check import SignalCheck
 from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 
@@ -182,6 +184,7 @@ class _Loop:
 
     def __init__(self, scenario: Scenario, plant: LoopModel, identify: bool) -> None:
         self.controller = LiveController(scenario.controller, scenario.process)
+        self._check = SignalCheck(scenario.process.instruments)
         self.estimator: LiveEstimator | None = None
         if identify:
             self.estimator = LiveEstimator(
@@ -198,7 +201,8 @@ class _Loop:
         self._sample = 0
 
     def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
-        result = self.controller.step(measurement.pv, sp, measurement.dv)
+        pv = self._check.measured(measurement.time, measurement.pv)
+        result = self.controller.step(pv, sp, measurement.dv)
         self.stems.append(self.controller.observed.stem)
         if self.estimator is not None:
             record = self.estimator.add(self._sample, result.op, measurement.pv)

@@ -42,8 +42,12 @@ class Watch:
         self.active = False
 
     def add(self, pv: FloatArray, sp: FloatArray, failed: bool) -> None:
-        """Take in one sample; one without a measurement says nothing of the controller."""
+        """Take in one sample; one without a measurement says nothing of the controller.
+
+        Neither do the samples behind it, as behind a move of the set-point.
+        """
         if not (np.isfinite(pv).all() and np.isfinite(sp).all()):
+            self._since_move = 0
             return
         if self._last_sp is not None and not np.array_equal(sp, self._last_sp):
             self._since_move = 0

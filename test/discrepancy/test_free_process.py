@@ -22,7 +22,8 @@ from stiction_ros.discrepancy.process_refit import (
 )
 from stiction_ros.effects import Behaviour, Characteristic, HeStiction
 from stiction_ros.loop import LoopModel, Plant
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings
+from stiction_ros.online.controller_settings import LiveControllerSettings
+from stiction_ros.online.live_controller import LiveController
 from stiction_ros.records import Record
 
 QUICK = GapOptions(quick=True, free_process=True)

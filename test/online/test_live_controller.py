@@ -14,10 +14,8 @@ from stiction_ros.control import ControlMode, StepStatus
 from stiction_ros.effects import ChoudhuryStiction, HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints
-from stiction_ros.online.live_controller import (
-    LiveController,
-    LiveControllerSettings,
-)
+from stiction_ros.online.controller_settings import LiveControllerSettings
+from stiction_ros.online.live_controller import LiveController
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))
 PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
@@ -33,6 +31,7 @@ SETTINGS = LiveControllerSettings(
     watch_samples=0,
     hand_over_samples=1,
     offer_samples=0,
+    approach_samples=0,
 )
 KNOWN = PROCESS.with_valve_effects({"V1": [HeStiction(5.0, 2.0)]})
 
@@ -397,6 +396,22 @@ def test_the_first_op_of_a_run_is_the_one_in_force() -> None:
     second = live.step(np.array([50.0]), np.array([58.0]))
     assert first.op.tolist() == [63.0]
     assert second.op[0] != 63.0
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_after_a_start_or_a_hold_the_set_point_is_approached(hold: bool) -> None:
+    moves = {}
+    for samples in (0, 20):
+        live = LiveController(settings(approach_samples=samples), PROCESS)
+        live.begin(np.array([50.0]))
+        if hold:
+            for _ in range(60):
+                live.step(np.array([50.0]), np.array([50.0]))
+            for _ in range(30):
+                live.step(np.array([np.nan]), np.array([50.0]))
+        op = [live.step(np.array([50.0]), np.array([60.0])).op[0] for _ in range(25)]
+        moves[samples] = np.abs(np.diff(op)).max()
+    assert moves[20] < 0.5 * moves[0]
 
 
 def test_a_run_that_begins_anew_forgets_the_past_and_keeps_the_friction() -> None:

@@ -9,7 +9,8 @@ from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, ControlSettings, History, MpcController
 from stiction_ros.effects import HeStiction
 from stiction_ros.loop import LoopModel, SetPoints, simulate_closed_loop
-from stiction_ros.online.live_controller import LiveController, LiveControllerSettings
+from stiction_ros.online.controller_settings import LiveControllerSettings
+from stiction_ros.online.live_controller import LiveController
 from stiction_ros.online.offers import Judge, Maker, OfferRule
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))

@@ -111,3 +111,13 @@ def test_a_sample_that_is_no_number_hides_nothing(when: str) -> None:
     if when == "after":
         feed(watch, np.nan, 1)
     assert feed(watch, 5.0, 40) != ""
+
+
+def test_samples_behind_one_without_a_measurement_are_left_out() -> None:
+    watch = swapped()
+    for _ in range(60):
+        watch.add(np.array([np.nan]), np.array([0.0]), True)
+        for _ in range(RULE.watch_settle):
+            watch.add(np.array([9.0]), np.array([0.0]), False)
+        assert watch.verdict() == ""
+    assert feed(watch, 1.0, 40) == ""
