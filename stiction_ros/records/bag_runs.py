@@ -168,10 +168,14 @@ def _usual_step(stamps: Sequence[int]) -> float:
 
 
 def _connected(chains: Sequence[Run]) -> list[Run]:
-    """Join chains of which one begins where another has ended, in stamps and in the log."""
+    """Join chains of which one begins where another has ended, in stamps and in the log.
+
+    A run does not go on when another one has begun after its end.
+    """
     runs: list[Run] = []
     for chain in chains:
-        before = [run for run in runs if run.last < chain.first and run.end < chain.begin]
+        newest = max((run.begin for run in runs if len(run.place) >= NEW_RUN), default=0)
+        before = [run for run in runs if run.last < chain.first and newest <= run.end < chain.begin]
         if before:
             max(before, key=lambda run: run.end).append(chain)
         else:

@@ -71,9 +71,9 @@ def logs(draw: st.DrawFn) -> list[Message]:
     for number in range(draw(st.integers(1, 3))):
         first = max(begun - draw(st.integers(0, 300)), 0) if number else begun
         begun = first
-        run = list(sent(number, first, draw(st.integers(40, 120))))
+        run = list(sent(number, first, draw(st.integers(60, 120))))
         if draw(st.booleans()):  # a pause
-            begin = draw(st.integers(36, len(run) - 1))  # its beginning tells that it is new
+            begin = draw(st.integers(90, len(run) - 1))  # its beginning tells that it is new
             left = run[:begin] + run[begin + draw(st.integers(1, 200)) :]
             run = left if len(left) >= 120 else run
         for _ in range(draw(st.integers(0, 4))):
