@@ -24,10 +24,12 @@ from stiction_ros.online.node_settings import RecorderNodeSettings
 from stiction_ros.records.bag_finish import CLOCK
 from stiction_ros.records.bag_writer import BagWriter, Packing, Splitting
 from stiction_ros.records.log_time import SIMULATED, LogTime
+from stiction_ros.records.loop_signals import JOINT_STATE
 from stiction_ros.records.message_definitions import definition
 from stiction_ros.records.topic_choice import OWN, TopicChoice
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
+CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 _STAMP = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
 
 
@@ -131,7 +133,7 @@ class RecorderNode(ManagedNode):
         self.create_subscription(
             message_class(kind),
             name,
-            self._writing(name),
+            self._writing(name, kind),
             qos,
             raw=True,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
@@ -173,15 +175,15 @@ class RecorderNode(ManagedNode):
                     self.get_logger().warning(f"{name} of {self._unheard[name]} is not recorded")
                     break
 
-    def _writing(self, topic: str) -> Callable[[bytes, dict[str, int]], None]:
+    def _writing(self, topic: str, kind: str) -> Callable[[bytes, dict[str, int]], None]:
         """Return the callback of one topic; log time is simulated time where there is any."""
-        is_clock, is_own_pv = topic == CLOCK, topic == self._own_pv
+        tells_time = (topic, kind) in {(CLOCK, CLOCK_TYPE), (self._own_pv, JOINT_STATE)}
 
         def write(data: bytes, info: dict[str, int]) -> None:
             if self.writer is None:
                 return
             try:
-                if is_clock or is_own_pv:
+                if tells_time:
                     self._see(topic, data)
                 log_time = self._times.of(int(info["received_timestamp"]))
                 self.writer.write(topic, data, log_time, int(info["source_timestamp"]))

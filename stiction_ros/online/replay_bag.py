@@ -139,7 +139,7 @@ def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> Replay
     notes += _changed_parameters(inside, configs.values())
     signals = tuple(_signals(inside))
     stamps = [signal.stamp for signal in signals if signal.kind == "pv"]
-    runs, _ = tell_runs(stamps, range(len(stamps)))
+    runs = tell_runs(stamps, range(len(stamps))).runs
     if len(runs) > 1:
         notes.append(f"holds {len(runs)} runs, a replay needs one run from its first sample")
     return ReplayBag(

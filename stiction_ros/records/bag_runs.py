@@ -18,11 +18,20 @@ from stiction_ros.records.regular import GAP
 NEW_RUN = 10
 """Messages that make a run beside another; fewer are out of order."""
 
+LATE = 3
+"""Messages out of order that may have come late, and are put where they are missing."""
+
 AGAIN = 0.75
 """How far off, in usual steps, a message counts that shows the present sample again."""
 
-FORGOTTEN = 50
+STALE = 0.1
+"""How much further off a chain counts for each message that did not continue it."""
+
+FORGOTTEN = 25
 """Messages after which a chain that none of them continued is over."""
+
+NEAR = 30
+"""Messages of all signals between a sample and another signal's message for it, at most."""
 
 
 @dataclasses.dataclass
@@ -30,7 +39,7 @@ class Run:
     """Messages of one run.
 
     Attributes:
-        place: stamp in ns to the message's number in the log; the last one of each stamp.
+        place: stamp in ns to the message's number in the log; the first one of each stamp.
         begin, end: numbers of its first and last message in the log.
         first, last: smallest and largest stamp, ns.
     """
@@ -48,7 +57,7 @@ class Run:
 
     def take(self, stamp: int, number: int) -> None:
         """Add a message whose stamp is not older than the last."""
-        self.place[stamp] = number
+        self.place.setdefault(stamp, number)
         self.end, self.last = number, stamp
 
     def append(self, other: Run) -> None:
@@ -57,8 +66,23 @@ class Run:
         self.end, self.last = other.end, other.last
 
 
-def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> tuple[list[Run], int]:
-    """Return the runs in the order in which they begin, and how many messages are in none.
+@dataclasses.dataclass(frozen=True)
+class Told:
+    """What the stamps of a signal tell.
+
+    Attributes:
+        runs: in the order in which they begin.
+        strays: stretches too short for a run, in the same order.
+        lost: messages in no run.
+    """
+
+    runs: tuple[Run, ...]
+    strays: tuple[Run, ...]
+    lost: int
+
+
+def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> Told:
+    """Tell the runs apart.
 
     Args:
         stamps: of one signal in the order of the log, ns.
@@ -66,25 +90,40 @@ def tell_runs(stamps: Sequence[int], numbers: Sequence[int]) -> tuple[list[Run],
     """
     pieces = _connected(_chains(stamps, numbers))
     if not pieces:
-        return [], 0
+        return Told((), (), 0)
     longest = max(pieces, key=lambda run: len(run.place))
-    runs = [run for run in pieces if run is longest or len(run.place) >= NEW_RUN]
-    lost = 0
-    for stray in (run for run in pieces if not any(run is kept for kept in runs)):
-        for stamp, number in stray.place.items():
-            lost += not _inserted(runs, stamp, number)
-    return runs, lost
+    runs: list[Run] = []
+    strays: list[Run] = []
+    late: list[Run] = []
+    for run in pieces:
+        if run is longest or len(run.place) >= NEW_RUN:
+            runs.append(run)
+        else:
+            (late if len(run.place) <= LATE else strays).append(run)
+    lost = sum(len(run.place) for run in strays)
+    for run in late:
+        lost += sum(not _inserted(runs, *message) for message in run.place.items())
+    return Told(tuple(runs), tuple(strays), lost)
 
 
-def run_of(runs: Sequence[Run], stamp: int, number: int) -> Run | None:
-    """Return the run in which a message of another signal belongs; None when there is none.
+def run_of(runs: Sequence[Run], stamp: int, number: int) -> Run:
+    """Return the run to which a message of another signal belongs.
 
-    Of the runs that have its stamp it is the one that has it nearest in the log.
+    It is the one that has its stamp nearest in the log, unless that is far away, as when the
+    sample itself was lost: then it is the run that had begun last.
+
+    Args:
+        runs: one at least.
+        stamp: of the message, ns.
+        number: its place in the log.
     """
+    active = next((run for run in reversed(runs) if run.begin <= number), runs[0])
     known = [run for run in runs if stamp in run.place]
-    if len(known) < 2:
-        return known[0] if known else None
-    return min(known, key=lambda run: abs(run.place[stamp] - number))
+    if not known:
+        return active
+    nearest = min(known, key=lambda run: abs(run.place[stamp] - number))
+    near = abs(nearest.place[stamp] - number) <= NEAR
+    return nearest if near or stamp in active.place else active
 
 
 def _chains(stamps: Sequence[int], numbers: Sequence[int]) -> list[Run]:
@@ -97,7 +136,10 @@ def _chains(stamps: Sequence[int], numbers: Sequence[int]) -> list[Run]:
         best, best_off = -1, float("inf")
         for place in range(len(alive) - 1, -1, -1):
             ahead = stamp - alive[place][1].last
+            if not ahead and place < len(alive) - 1:
+                continue  # a sample is shown again at once
             off = abs(ahead - step) if ahead else AGAIN * step
+            off += STALE * step * (k - alive[place][0])
             if 0 <= ahead <= GAP * step and off < best_off:
                 best, best_off = place, off
         if best < 0:
@@ -126,10 +168,14 @@ def _usual_step(stamps: Sequence[int]) -> float:
 
 
 def _connected(chains: Sequence[Run]) -> list[Run]:
-    """Join chains of which one begins where another has ended, in stamps and in the log."""
+    """Join chains of which one begins where another has ended, in stamps and in the log.
+
+    A run does not go on when another one has begun after its end.
+    """
     runs: list[Run] = []
     for chain in chains:
-        before = [run for run in runs if run.last < chain.first and run.end < chain.begin]
+        newest = max((run.begin for run in runs if len(run.place) >= NEW_RUN), default=0)
+        before = [run for run in runs if run.last < chain.first and newest <= run.end < chain.begin]
         if before:
             max(before, key=lambda run: run.end).append(chain)
         else:
@@ -144,7 +190,7 @@ def _inserted(runs: Sequence[Run], stamp: int, number: int) -> bool:
         for run in runs
         if stamp not in run.place
         and run.first < stamp < run.last
-        and run.begin <= number <= run.end + FORGOTTEN
+        and run.begin <= number <= run.end + NEAR
     ]
     if len(near) != 1:
         return False

@@ -108,13 +108,15 @@ class _Loop:
                 where=source.where,
                 fix=signals.skipped(space, what, tags),
             )
-        self.runs, lost = tell_runs([g.stamp for g in pv], [g.number for g in pv])
+        told = tell_runs([g.stamp for g in pv], [g.number for g in pv])
+        self.runs = told.runs
+        self._every = sorted((*told.runs, *told.strays), key=lambda run: run.begin)
         widths = {"pv": self.outputs, "sp": self.outputs, "op": self.valves}
         widths |= {"op_applied": self.valves, "stem": self.valves}
         skipped = [signals.skipped(space, signal, tags) for signal, tags in widths.items()]
         self.notes = [sentence for sentence in skipped if sentence]
-        if lost:
-            self.notes.append(f"{lost} messages of pv whose stamps are out of order left out")
+        if told.lost:
+            self.notes.append(f"{told.lost} messages of pv whose stamps are out of order left out")
         if len(self.runs) > 1:
             self.notes.append(f"{len(self.runs)} runs are told apart: stamps fall back")
         self._pv = {g.number: g.values for g in pv}
@@ -153,13 +155,23 @@ class _Loop:
         return LoopRun(run.begin, run.end, begin, moved)
 
     def _by_run(self, given: Sequence[Given]) -> list[Samples]:
-        """Return the messages of a signal for each run; the last of a stamp counts."""
+        """Return the messages of a signal for each run.
+
+        Of several that bear one stamp the one counts that is nearest to its PV in the log, or
+        the last one where there is no PV.
+        """
         found: list[Samples] = [{} for _ in self.runs]
+        off: list[dict[int, int]] = [{} for _ in self.runs]
         places = {id(run): number for number, run in enumerate(self.runs)}
         for message in given:
-            run = run_of(self.runs, message.stamp, message.number)
-            number = self._active(message.number) if run is None else places[id(run)]
-            found[number][message.stamp] = message.values
+            stamp = message.stamp
+            run = run_of(self._every, stamp, message.number)
+            number = places.get(id(run))
+            if number is None:
+                continue  # of a stretch that is no run
+            away = abs(run.place.get(stamp, message.number) - message.number)
+            if away <= off[number].get(stamp, away):
+                found[number][stamp], off[number][stamp] = message.values, away
         return found
 
     def _set_points(self, given: Sequence[Given]) -> list[Samples]:
@@ -172,11 +184,6 @@ class _Loop:
             if before and min(found[number], default=run.last) > run.first:
                 found[number][run.first] = before[-1].values
         return found
-
-    def _active(self, number: int) -> int:
-        """Return the run that had begun last when a message came."""
-        begun = [k for k, run in enumerate(self.runs) if run.begin <= number]
-        return begun[-1] if begun else 0
 
     def _op(self, number: int, pv: Mapping[int, Any], notes: list[str]) -> Samples:
         """Return OP by stamp: what was applied where that is known, else what was commanded."""

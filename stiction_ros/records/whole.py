@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -87,12 +90,14 @@ class Whole:
     def _parts(self, first: int, last: int, cut_holes: bool) -> tuple[list[Part], int]:
         """Return the stretch as it is, or its pieces between holes, and how many rows are lost."""
         part = regular_part(self.time, first, last)
-        if part.note or not cut_holes or last - first < 3:
+        steps = np.diff(part.time)
+        usual = float(np.median(np.diff(self.time)))
+        apart = bool((steps > HOLE * usual).any())
+        if not (cut_holes and apart):
             return [part], 0
-        edges = split_at_gaps(self.time[first:last], HOLE)
-        pieces = [(first + a, first + b) for a, b in edges if b - a > 1]
-        if len(edges) == 1 or not pieces:
-            return [part], 0
+        cuts = np.flatnonzero(np.diff(self.time[first:last]) > HOLE * usual) + first + 1
+        edges = itertools.pairwise([first, *cuts.tolist(), last])
+        pieces = [(a, b) for a, b in edges if b - a > 1]
         lost = last - first - sum(b - a for a, b in pieces)
         return [regular_part(self.time, a, b) for a, b in pieces], lost
 
@@ -109,6 +114,8 @@ class Whole:
                 refused.append(error)
         if refused and (not found or not source.cut_holes):
             raise refused[0]
+        if not found:
+            sample_time(self.time, source.where, source.place)  # tells where it is irregular
         if refused:
             notes.append(f"{len(refused)} irregular parts left out: {refused[0].what}")
             found = [dataclasses.replace(r, notes=(*r.notes, notes[-1])) for r in found]

@@ -5,19 +5,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.records.bag_runs import run_of, tell_runs
+from stiction_ros.records.bag_runs import Told, run_of, tell_runs
 
 STEP = 10**9
 
 
 def told(stamps: list[int]) -> list[list[int]]:
     """Return the stamps of each run, in steps."""
-    runs, _ = tell_runs([stamp * STEP for stamp in stamps], list(range(len(stamps))))
-    return [sorted(stamp // STEP for stamp in run.place) for run in runs]
+    found = tell(stamps).runs
+    return [sorted(stamp // STEP for stamp in run.place) for run in found]
+
+
+def tell(stamps: list[int]) -> Told:
+    return tell_runs([stamp * STEP for stamp in stamps], range(len(stamps)))
 
 
 def test_nothing_is_no_run() -> None:
-    assert tell_runs([], []) == ([], 0)
+    assert tell_runs([], []) == Told((), (), 0)
 
 
 def test_a_gap_is_no_new_run() -> None:
@@ -69,34 +73,50 @@ def test_lost_messages_break_no_run(lost: set[int]) -> None:
 @pytest.mark.parametrize("stray", [[-5], [10**9], [3, 2], [40, 10**6, 7]])
 def test_a_few_stamps_out_of_order_are_no_run(stray: list[int]) -> None:
     log = [*range(50), *stray, *range(50, 90)]
-    runs, lost = tell_runs([s * STEP for s in log], list(range(len(log))))
-    assert [len(run.place) for run in runs] == [90]
-    assert lost == len(stray)
+    found = tell(log)
+    assert [len(run.place) for run in found.runs] == [90]
+    assert found.lost == len(stray)
 
 
 def test_swapped_messages_are_put_in_order() -> None:
     log = [*range(30), 31, 30, *range(32, 60)]
     assert told(log) == [list(range(60))]
-    assert tell_runs([s * STEP for s in log], list(range(60)))[1] == 0
+    assert tell(log).lost == 0
 
 
 def test_a_sample_that_is_shown_again_is_one_sample() -> None:
     log = [*range(30), 29, 29, 29, *range(30, 50)]
-    runs, lost = tell_runs([s * STEP for s in log], list(range(len(log))))
-    assert (len(runs), len(runs[0].place), lost) == (1, 50, 0)
-    assert runs[0].place[29 * STEP] == 32  # what was said last
+    found = tell(log)
+    assert (len(found.runs), len(found.runs[0].place), found.lost) == (1, 50, 0)
+    assert found.runs[0].place[29 * STEP] == 29  # what was said first
 
 
 def test_the_jitter_of_a_clock_is_no_run() -> None:
     random = np.random.default_rng(2)
     stamps = (np.arange(300) * STEP + random.uniform(-0.4, 0.4, 300) * STEP).astype(int).tolist()
-    runs, lost = tell_runs(stamps, list(range(300)))
-    assert ([len(run.place) for run in runs], lost) == ([300], 0)
+    found = tell_runs(stamps, range(300))
+    assert ([len(run.place) for run in found.runs], found.lost) == ([300], 0)
 
 
 def test_another_signal_goes_to_the_run_that_is_nearest_in_the_log() -> None:
     log = [*range(100), *range(100)]
-    runs, _ = tell_runs([s * STEP for s in log], list(range(200)))
+    runs = tell(log).runs
     assert run_of(runs, 50 * STEP, 51) is runs[0]
     assert run_of(runs, 50 * STEP, 152) is runs[1]
-    assert run_of(runs, 500 * STEP, 152) is None
+    assert run_of(runs, 99 * STEP, 101) is runs[0]  # late, when the second has begun
+    assert run_of(runs, 500 * STEP, 152) is runs[1]
+    assert run_of(runs, 500 * STEP, 52) is runs[0]
+
+
+def test_another_signal_does_not_go_to_a_run_that_is_long_over() -> None:
+    log = [*range(100), *range(50), *range(51, 100)]
+    runs = tell(log).runs
+    assert run_of(runs, 50 * STEP, 150) is runs[1]
+
+
+def test_a_stretch_too_short_for_a_run_is_told_of_but_not_mixed_in() -> None:
+    log = [*range(0, 50), *range(10, 18), *range(50, 90)]
+    found = tell(log)
+    assert [len(run.place) for run in found.runs] == [90]
+    assert [len(run.place) for run in found.strays] == [8]
+    assert found.lost == 8
