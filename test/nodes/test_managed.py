@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -172,6 +173,28 @@ def test_simulated_time_that_stands_still_stops_no_timer(graph: Graph, when: str
     node.set_parameters([Parameter("use_sim_time", value=False)])
     node.start()
     graph.spin_until(lambda: node.running, "the node to run again")
+
+
+@pytest.mark.parametrize(
+    "stopped", [("plant",), ("controller",), ("plant", "controller", "recorder")]
+)
+def test_a_loop_starts_and_runs_with_simulated_time(
+    graph: Graph, stopped: tuple[str, ...], tmp_path: Path
+) -> None:
+    values: dict[str, dict[str, Any]] = {
+        "plant": {"model": "example1.loop.yaml", "set_points": "siso.set_points.yaml"},
+        "controller": {"model": "example1_process.loop.yaml", "fit_first": 10**6},
+        "recorder": {"directory": str(tmp_path / "bag")},
+    }
+    values["plant"]["samples"] = 20
+    nodes = {}
+    for name, given in values.items():
+        others = [other for other in values if other != name] if name != "recorder" else [""]
+        more = {"wait_for": others, "use_sim_time": name in stopped}
+        nodes[name] = graph.add(name, given | more)
+        nodes[name].start()
+    graph.spin_until(lambda: nodes["plant"].finished, "the last sample")
+    assert nodes["plant"].plant.sample == 20
 
 
 # ---- partners in lockstep ----------------------------------------------------------------------
