@@ -17,7 +17,6 @@ from stiction_ros.orphans import die_with_parent
 from stiction_ros.records import Record
 
 T = TypeVar("T")
-POLITE = 10  # steps of priority below the nodes
 
 
 class FitWorker:
@@ -74,8 +73,7 @@ class FitWorker:
 
 
 def _settle() -> None:
-    """Prepare the worker process, behind which no node of a loop has to wait."""
-    os.nice(POLITE)
+    """Prepare the worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None and parent.pid is not None:
