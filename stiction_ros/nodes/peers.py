@@ -123,12 +123,18 @@ class Peers:
         self._pinned = {name: self._announced(name) for name in names}
 
     def gone(self) -> dict[str, str]:
-        """Return partners that are not those of :meth:`pin`, and what became of them."""
+        """Return partners that are not those of :meth:`pin`, and what became of them.
+
+        Of several under one name, as while a killed one has not been given up, one must stay.
+        """
         lost = {}
         for name, before in self._pinned.items():
             now = self._announced(name)
-            if now != before:
-                lost[name] = "was replaced" if now - before else "has gone"
+            if now - before:
+                lost[name] = "was replaced"
+            elif not now:
+                lost[name] = "has gone"
+            self._pinned[name] = now
         return lost
 
     def _announced(self, name: str) -> frozenset[tuple[int, ...]]:

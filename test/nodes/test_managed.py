@@ -18,6 +18,7 @@ from std_msgs.msg import String
 from stiction_ros.nodes import managed
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import joint_state
+from stiction_ros.nodes.peers import Peers
 from stiction_ros.online.node_settings import NodeSettings
 from stiction_ros.settings import setting
 
@@ -213,6 +214,29 @@ def test_a_node_in_lockstep_ends_with_the_plant(graph: Graph, back: bool) -> Non
         plant(graph)
     graph.spin_until(lambda: node.finished, "the end")
     assert (node.running, node.failure) == (False, "")
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "lost"),
+    [
+        ({1}, {1}, ""),
+        ({1}, set(), "has gone"),
+        ({1}, {2}, "was replaced"),
+        ({1}, {1, 2}, "was replaced"),
+        ({1, 2}, {2}, ""),  # the first was killed before the run and is given up now
+        ({1, 2}, set(), "has gone"),
+    ],
+)
+def test_what_has_become_of_a_partner(
+    graph: Graph, before: set[int], now: set[int], lost: str
+) -> None:
+    peers = Peers(graph.plain(), ["plant", "recorder"])
+    there = [frozenset((one,) for one in before)]
+    peers._announced = lambda _name: there[0]
+    peers.pin()
+    assert peers.gone() == {}
+    there[0] = frozenset((one,) for one in now)
+    assert peers.gone() == ({"plant": lost} if lost else {})
 
 
 def test_a_node_in_realtime_goes_on_without_the_plant(graph: Graph) -> None:
