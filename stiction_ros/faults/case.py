@@ -64,8 +64,20 @@ def run_case(
         logs={name: node.log for name, node in loop.nodes.items()},
         remarks=tuple(loop.remarks),
     )
+    _tell(seen, directory / "statuses.txt")
     outcome = judge(fault, pace, seen, allowed)
     return dataclasses.replace(outcome, seconds=time.monotonic() - started)
+
+
+def _tell(seen: Observation, path: Path) -> None:
+    """Write every change of a status, in seconds after the fault began."""
+    told: dict[str, tuple[str, str]] = {}
+    lines = [f"the fault was over after {seen.over - seen.begun:.2f} s"]
+    for one in seen.statuses:
+        if told.get(one.node) != (one.level, one.text):
+            told[one.node] = one.level, one.text
+            lines.append(f"{one.wall - seen.begun:8.2f} {one.node} {one.level}: {one.text}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 class _Watched:
