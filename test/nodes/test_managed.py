@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from stiction_ros.nodes import managed
+from stiction_ros.nodes import managed, peers
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import joint_state
 from stiction_ros.nodes.peers import Peers
@@ -73,6 +73,11 @@ def warnings(node: Small, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(node, "get_logger", Logger)
     return said
+
+
+@pytest.fixture(autouse=True)
+def _no_grace(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "GRACE", 0.0)
 
 
 # ---- who must be there -------------------------------------------------------------------------
@@ -230,13 +235,27 @@ def test_a_node_in_lockstep_ends_with_the_plant(graph: Graph, back: bool) -> Non
 def test_what_has_become_of_a_partner(
     graph: Graph, before: set[int], now: set[int], lost: str
 ) -> None:
-    peers = Peers(graph.plain(), ["plant", "recorder"])
+    found = Peers(graph.plain(), ["plant", "recorder"])
     there = [frozenset((one,) for one in before)]
-    peers._announced = lambda _name: there[0]
-    peers.pin()
-    assert peers.gone() == {}
+    found._announced = lambda _name: there[0]
+    found.pin()
+    assert found.gone() == {}
     there[0] = frozenset((one,) for one in now)
-    assert peers.gone() == ({"plant": lost} if lost else {})
+    assert found.gone() == ({"plant": lost} if lost else {})
+
+
+def test_a_partner_that_stood_still_for_a_moment_has_not_gone(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, there = [0.0], [frozenset({(1,)})]
+    monkeypatch.setattr(peers, "GRACE", 5.0)
+    monkeypatch.setattr(peers.time, "monotonic", lambda: now[0])
+    found = Peers(graph.plain(), ["plant"])
+    found._announced = lambda _name: there[0]
+    found.pin()
+    for second, present, lost in [(1, 0, 0), (5, 0, 0), (5.5, 1, 0), (9, 0, 0), (14, 0, 1)]:
+        now[0], there[0] = second, frozenset({(1,)} if present else ())
+        assert bool(found.gone()) is bool(lost)
 
 
 def test_a_node_in_realtime_goes_on_without_the_plant(graph: Graph) -> None:

@@ -13,7 +13,7 @@ from graph import Graph
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-from stiction_ros.nodes import managed
+from stiction_ros.nodes import managed, peers
 from stiction_ros.nodes import plant as plant_module
 from stiction_ros.nodes.managed import SIGNAL_QOS
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns
@@ -24,6 +24,7 @@ from stiction_ros.online.health import Noticed
 def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five statuses a second, and conditions that are shown for half a second."""
     monkeypatch.setattr(managed, "LOOKS", 2)
+    monkeypatch.setattr(peers, "GRACE", 0.0)
     monkeypatch.setattr(managed, "Noticed", functools.partial(Noticed, shown=0.5))
 
 
