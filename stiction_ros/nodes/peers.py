@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
+GRACE = 0.5  # s for which a partner may be missing before it has gone
 WATCHER = "recorder"  # reads every topic and commands nothing
 
 
@@ -74,6 +76,7 @@ class Peers:
             )
         )
         self._pinned: dict[str, frozenset[tuple[int, ...]]] = {}
+        self._missing: dict[str, float] = {}
 
     def unheard(self, inlets: dict[str, Inlet]) -> list[str]:
         """Return what lacks until no first message can be missed; empty when nothing does."""
@@ -121,14 +124,26 @@ class Peers:
         """Remember who is there now; :meth:`gone` compares with it."""
         names = [name for name in self.names if name != WATCHER]
         self._pinned = {name: self._announced(name) for name in names}
+        self._missing = {}
 
     def gone(self) -> dict[str, str]:
-        """Return partners that are not those of :meth:`pin`, and what became of them."""
+        """Return partners that are not those of :meth:`pin`, and what became of them.
+
+        Of several under one name, as while a killed one has not been given up, one must stay.
+        One that is missing for a moment only stood still: the middleware gives up whoever is
+        silent, and finds them again.
+        """
         lost = {}
+        clock = time.monotonic()
         for name, before in self._pinned.items():
             now = self._announced(name)
-            if now != before:
-                lost[name] = "was replaced" if now - before else "has gone"
+            if now - before:
+                lost[name] = "was replaced"
+            elif now:
+                self._pinned[name] = now
+                self._missing.pop(name, None)
+            elif clock - self._missing.setdefault(name, clock) >= GRACE:
+                lost[name] = "has gone"
         return lost
 
     def _announced(self, name: str) -> frozenset[tuple[int, ...]]:

@@ -164,10 +164,12 @@ class PlantNode(ManagedNode):
         complaint = self.op_port.complaint(found, sender)
         if complaint:
             self.notice(found.value, "warn", complaint)
-        if op is None or found not in (Reception.TAKEN, Reception.LATE):
+        if op is None or found is Reception.NAME:
+            return
+        self.round_trips.answer(stamp, time.monotonic())  # also of one that is refused as late
+        if found not in (Reception.TAKEN, Reception.LATE):
             return
         self._heard, self._op = time.monotonic(), op
-        self.round_trips.answer(stamp, self._heard)
         if not self._realtime:
             self._advance()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,9 +15,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from stiction_ros.nodes import managed
+from stiction_ros.nodes import managed, peers
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import joint_state
+from stiction_ros.nodes.peers import Peers
 from stiction_ros.online.node_settings import NodeSettings
 from stiction_ros.settings import setting
 
@@ -71,6 +73,11 @@ def warnings(node: Small, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(node, "get_logger", Logger)
     return said
+
+
+@pytest.fixture(autouse=True)
+def _no_grace(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "GRACE", 0.0)
 
 
 # ---- who must be there -------------------------------------------------------------------------
@@ -174,6 +181,28 @@ def test_simulated_time_that_stands_still_stops_no_timer(graph: Graph, when: str
     graph.spin_until(lambda: node.running, "the node to run again")
 
 
+@pytest.mark.parametrize(
+    "stopped", [("plant",), ("controller",), ("plant", "controller", "recorder")]
+)
+def test_a_loop_starts_and_runs_with_simulated_time(
+    graph: Graph, stopped: tuple[str, ...], tmp_path: Path
+) -> None:
+    values: dict[str, dict[str, Any]] = {
+        "plant": {"model": "example1.loop.yaml", "set_points": "siso.set_points.yaml"},
+        "controller": {"model": "example1_process.loop.yaml", "fit_first": 10**6},
+        "recorder": {"directory": str(tmp_path / "bag")},
+    }
+    values["plant"]["samples"] = 20
+    nodes = {}
+    for name, given in values.items():
+        others = [other for other in values if other != name] if name != "recorder" else [""]
+        more = {"wait_for": others, "use_sim_time": name in stopped}
+        nodes[name] = graph.add(name, given | more)
+        nodes[name].start()
+    graph.spin_until(lambda: nodes["plant"].finished, "the last sample")
+    assert nodes["plant"].plant.sample == 20
+
+
 # ---- partners in lockstep ----------------------------------------------------------------------
 
 
@@ -190,6 +219,43 @@ def test_a_node_in_lockstep_ends_with_the_plant(graph: Graph, back: bool) -> Non
         plant(graph)
     graph.spin_until(lambda: node.finished, "the end")
     assert (node.running, node.failure) == (False, "")
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "lost"),
+    [
+        ({1}, {1}, ""),
+        ({1}, set(), "has gone"),
+        ({1}, {2}, "was replaced"),
+        ({1}, {1, 2}, "was replaced"),
+        ({1, 2}, {2}, ""),  # the first was killed before the run and is given up now
+        ({1, 2}, set(), "has gone"),
+    ],
+)
+def test_what_has_become_of_a_partner(
+    graph: Graph, before: set[int], now: set[int], lost: str
+) -> None:
+    found = Peers(graph.plain(), ["plant", "recorder"])
+    there = [frozenset((one,) for one in before)]
+    found._announced = lambda _name: there[0]
+    found.pin()
+    assert found.gone() == {}
+    there[0] = frozenset((one,) for one in now)
+    assert found.gone() == ({"plant": lost} if lost else {})
+
+
+def test_a_partner_that_stood_still_for_a_moment_has_not_gone(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, there = [0.0], [frozenset({(1,)})]
+    monkeypatch.setattr(peers, "GRACE", 5.0)
+    monkeypatch.setattr(peers.time, "monotonic", lambda: now[0])
+    found = Peers(graph.plain(), ["plant"])
+    found._announced = lambda _name: there[0]
+    found.pin()
+    for second, present, lost in [(1, 0, 0), (5, 0, 0), (5.5, 1, 0), (9, 0, 0), (14, 0, 1)]:
+        now[0], there[0] = second, frozenset({(1,)} if present else ())
+        assert bool(found.gone()) is bool(lost)
 
 
 def test_a_node_in_realtime_goes_on_without_the_plant(graph: Graph) -> None:

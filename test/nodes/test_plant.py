@@ -13,7 +13,7 @@ from graph import Graph
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-from stiction_ros.nodes import managed
+from stiction_ros.nodes import managed, peers
 from stiction_ros.nodes import plant as plant_module
 from stiction_ros.nodes.managed import SIGNAL_QOS
 from stiction_ros.nodes.messages import SECOND, joint_state, to_ns
@@ -24,6 +24,7 @@ from stiction_ros.online.health import Noticed
 def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five statuses a second, and conditions that are shown for half a second."""
     monkeypatch.setattr(managed, "LOOKS", 2)
+    monkeypatch.setattr(peers, "GRACE", 0.0)
     monkeypatch.setattr(managed, "Noticed", functools.partial(Noticed, shown=0.5))
 
 
@@ -211,8 +212,18 @@ def test_times_from_pv_to_op_are_told_and_late_ones_counted(graph: Graph) -> Non
     told = hand.values()
     found = [float(told[f"pv_to_op_ms_{name}"]) for name in ("p50", "p99", "p999", "max")]
     assert found == sorted(found)
-    assert 0.0 < found[0] < 50.0 <= found[-1]
-    assert told["late_op"] == "1"
+    assert found[0] > 0.0
+    assert found[-1] > 5.0  # the late one: the sample after it was shown already
+    assert int(told["late_op"]) >= 1
+
+
+def test_an_op_that_is_refused_as_late_counts_among_the_times(graph: Graph) -> None:
+    hand = Commander(graph, pace="realtime", speed=20.0)
+    graph.spin_until(lambda: len(hand.seen["pv"]) == 8, "eight samples")
+    hand.send(1)
+    graph.spin_until(hand.told(b"\x01", "for a sample long past"), "the refusal")
+    assert hand.plant.round_trips.answered == 1
+    assert hand.plant.round_trips.longest > 0.3
 
 
 def test_ticks_keep_to_the_grid_of_wall_time_and_missed_ones_are_counted(graph: Graph) -> None:
@@ -223,10 +234,10 @@ def test_ticks_keep_to_the_grid_of_wall_time_and_missed_ones_are_counted(graph: 
     grid = (node._due - begin) / node._period
     assert grid == pytest.approx(node.plant.sample - first + node._missed, abs=1e-6)
     time.sleep(0.2)  # what a callback that takes long does to the executor
-    before = node.plant.sample
+    before, missed = node.plant.sample, node._missed
+    graph.spin_until(lambda: node._missed >= missed + 8, "the ticks that were missed")
+    assert node.plant.sample <= before + 2
     graph.spin_until(hand.told(b"\x01", "the plant is slower than its speed"), "the warning")
-    assert node._missed >= 8
-    assert node.plant.sample <= before + 3
 
 
 def test_another_speed_is_taken_in_mid_run(graph: Graph) -> None:

@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from foreign_readers import differences
 
 from stiction_ros.cli.node_processes import NodeProcesses, ros_environment
+from stiction_ros.nodes.peers import GRACE
 from stiction_ros.online.replay import replay
 from stiction_ros.online.replay_result import Match
 from stiction_ros.online.session import Scenario, run_live
@@ -197,7 +198,7 @@ def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
     wait_until(lambda: not running(str(out)))
 
 
-LEASE = 3.0  # s without a sign of life, of fastdds.xml
+LEASE = 5.0 + GRACE  # s without a sign of life, of fastdds.xml, and what a partner is given
 
 
 def test_a_partner_that_was_killed_ends_a_run_in_lockstep_soon_with_a_sentence(tmp_path):

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
@@ -26,3 +27,10 @@ def test_a_process_that_died_is_replaced_for_the_next_fit() -> None:
         assert worker.pid != first
     finally:
         worker.close()
+
+
+def test_a_process_that_still_compiles_is_not_waited_for() -> None:
+    worker = FitWorker()
+    begin = time.monotonic()
+    worker.close()  # at once: the process has not even loaded its modules
+    assert time.monotonic() - begin < 1.0
