@@ -92,15 +92,20 @@ class ControllerNode(ControllerInputs):
         self.port.rest()
         self.listening = True
         self._running_since = time.monotonic()
-        period = self.model.sample_time / self.settings.speed
-        every = min(max(period / 2, QUICKEST), SLOWEST)
-        self._late_timer = self.create_timer(every, self._go_on_without)
+        self._look_for_late(self.model.sample_time / self.settings.speed)
 
     def deactivate(self) -> None:
         self.listening = False
+        self._look_for_late(None)
+
+    def _look_for_late(self, period: float | None) -> None:
+        """Look several times in a ``period`` (s) what is due; None: no more."""
         if self._late_timer is not None:
             self.destroy_timer(self._late_timer)
             self._late_timer = None
+        if period is not None:
+            every = min(max(period / 2, QUICKEST), SLOWEST)
+            self._late_timer = self.create_timer(every, self._go_on_without)
 
     def finish(self) -> None:
         super().finish()
@@ -124,7 +129,10 @@ class ControllerNode(ControllerInputs):
     def retune(self, settings: Any) -> None:
         self.live.retune(settings)
         if settings.speed != self.settings.speed:
-            self.port.retune(self.model.sample_time / settings.speed)
+            period = self.model.sample_time / settings.speed
+            self.port.retune(period)
+            if self.listening:
+                self._look_for_late(period)
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         now = time.monotonic()

@@ -119,6 +119,8 @@ def run(
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+        for number in (signal.SIGINT, signal.SIGTERM):  # Python would die of one while it ends
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _is_realtime(node: ManagedNode) -> bool:

@@ -195,3 +195,30 @@ def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
     assert process.returncode == (-number if number == signal.SIGKILL else 130)
     assert "Traceback" not in said
     wait_until(lambda: not running(str(out)))
+
+
+LEASE = 3.0  # s without a sign of life, of fastdds.xml
+
+
+def test_a_partner_that_was_killed_ends_a_run_in_lockstep_soon_with_a_sentence(tmp_path):
+    nodes = {name: dict(v) for name, v in Scenario.load(scenario(tmp_path)).nodes.items()}
+    nodes["recorder"]["directory"] = str(tmp_path / "bag")
+    nodes["plant"]["samples"] = 20_000
+    processes = NodeProcesses(nodes, tmp_path)
+    try:
+        processes.start()
+        wait_until(lambda: processes.sample > 0)
+        controller = processes._processes["controller"]
+        controller.kill()
+        begin = time.monotonic()
+        wait_until(lambda: processes._processes["plant"].poll() is not None)
+        assert time.monotonic() - begin < LEASE + 3.0
+        wait_until(lambda: processes._processes["estimator"].poll() is not None)
+    finally:
+        processes.stop()
+    codes = {name: process.returncode for name, process in processes._processes.items()}
+    assert codes == {"plant": 1, "controller": -9, "estimator": 0, "recorder": 0}
+    said = {name: (tmp_path / "log" / f"{name}.log").read_text() for name in codes}
+    assert "controller has gone at sample" in said["plant"]
+    assert "plant has gone: the run is over" in said["estimator"]
+    assert "Traceback" not in "".join(said.values())

@@ -1,0 +1,60 @@
+"""The access control file allows what the nodes do, and no second commander."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from graph import Graph
+
+from stiction_ros.cli.scenarios import STARTED, find, loop_nodes
+from stiction_ros.config_files import find_config
+
+
+@pytest.fixture
+def graph() -> Iterator[Graph]:
+    built = Graph()
+    yield built
+    built.close()
+
+
+def allowed(node: str, kind: str, right: str) -> set[str]:
+    """Return the names (of topics or services) that ``node`` has a right to."""
+    root = ElementTree.parse(find_config("sros2_policy.xml")).getroot()
+    (enclave,) = root.findall(f"./enclaves/enclave[@path='/stiction_ros/{node}']")
+    profile = enclave.find(f"./profiles/profile[@node='{node}']")
+    assert profile is not None
+    found = profile.findall(f"./{kind}s[@{right}='ALLOW']/{kind}")
+    return {str(one.text) for one in found}
+
+
+def test_op_comes_from_the_controller_alone() -> None:
+    publishers = [node for node in STARTED if "/op" in allowed(node, "topic", "publish")]
+    assert publishers == ["controller"]
+
+
+def test_the_nodes_may_do_what_they_do(graph: Graph, tmp_path: Path) -> None:
+    values = loop_nodes(find("tank"), tmp_path)
+    built: dict[str, Any] = {}
+    for name in STARTED:
+        built[name] = graph.add(name, values[name] | {"wait_for": [""]})
+        built[name].trigger_configure()
+        assert built[name].failure == ""
+    said: set[str] = {"/sp_preview"}
+    for name, node in built.items():
+        topics = {t for t, _ in node.get_publisher_names_and_types_by_node(name, "/")}
+        topics.add(f"/{name}/config")  # announced when the node is ready
+        topics |= {"/dv"} if name == "plant" else set()  # of models with measured disturbances
+        said |= topics
+        assert topics == allowed(name, "topic", "publish")
+        services = {s for s, _ in node.get_service_names_and_types_by_node(name, "/")}
+        assert services == allowed(name, "service", "reply")
+    for name, node in built.items():
+        heard = {t for t, _ in node.get_subscriber_names_and_types_by_node(name, "/")}
+        may = allowed(name, "topic", "subscribe")
+        assert heard <= may
+        assert may <= said
+    assert said == allowed("recorder", "topic", "subscribe")
