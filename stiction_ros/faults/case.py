@@ -48,7 +48,7 @@ def run_case(
         options: how.
     """
     started = time.monotonic()
-    allowed = allowed_move(phase, options.seed)
+    allowed = allowed_move(Phase.AFTER if fault.swaps else phase, options.seed)
     loop = RunningLoop(fault, pace, phase, options.seed, options.speed, directory)
     watched = _Watched(loop, fault)
     try:
@@ -91,7 +91,7 @@ class _Watched:
 
     def __init__(self, loop: RunningLoop, fault: Fault) -> None:
         self._loop, self._fault = loop, fault
-        self._begun = self._over = time.monotonic()
+        self._over = time.monotonic()
         self._before = Known()
 
     def run(self) -> None:
@@ -99,10 +99,11 @@ class _Watched:
         loop, fault = self._loop, self._fault
         if not fault.from_start:
             if not self._ready():
-                self._begun = self._over = time.monotonic()
+                self._over = time.monotonic()
+                loop.begins()
                 return
             self._before = loop.known
-            self._begun = time.monotonic()
+        loop.begins()
         fault.put(loop)
         if fault.from_start:
             self._ready()
@@ -127,7 +128,7 @@ class _Watched:
             loop.phase,
             loop.period,
             loop.step,
-            self._begun,
+            loop.begun,
             self._over,
             until,
             heard["op_applied"],

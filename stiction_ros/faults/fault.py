@@ -70,6 +70,8 @@ class Fault:
             loop by its nature.
         recovery: s from its end until OP must flow again.
         bag: what is expected of the bag.
+        swaps: whether the controller may take a friction before the swap, so that its moves are
+            those of afterwards.
         forgets: whether the controller may lose what it knew of the friction.
         from_start: it is there from the start, and ``put`` has nothing to do.
         parameters: of nodes, in place of the usual ones.
@@ -86,6 +88,7 @@ class Fault:
     silence: float = 1.0
     recovery: float = 5.0
     bag: Bag = Bag.WHOLE
+    swaps: bool = False
     forgets: bool = False
     from_start: bool = False
     parameters: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
