@@ -41,17 +41,19 @@ LEVELS = ("ok", "warn", "error")
 
 @dataclasses.dataclass(frozen=True)
 class Notice:
-    """A diagnostic that must show the fault, and end with it.
+    """A diagnostic that must show the fault, and end with it unless it ``stays``.
 
     Attributes:
         node: whose status.
         level: warn or error; a worse one will do.
         paces: in which it is expected.
+        stays: whether it may be shown for as long as the run lasts.
     """
 
     node: str
     level: str
     paces: tuple[Pace, ...] = BOTH_PACES
+    stays: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
