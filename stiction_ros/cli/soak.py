@@ -106,7 +106,8 @@ def _print(name: str, found: Soaked) -> None:
     minutes = found.seconds / 60
     console.print(f"{name}: {found.samples} samples in {minutes:.1f} minutes")
     _list(console, "missed", found.missed)
-    _list(console, "kept of the past", found.kept)
+    _list(console, "told besides", found.told)
+    _list(console, "samples of the past kept at most", found.kept)
     table = Table("node", "RSS at a tenth, MB", "at the end, MB", "ratio")
     for node, memory in found.memory.items():
         sizes = (f"{memory.tenth / 1e6:.1f}", f"{memory.end / 1e6:.1f}")

@@ -20,6 +20,7 @@ START = 90.0  # s until the first samples; a first start compiles
 SWAP = 20.0  # s until the controller has taken the prepared model
 QUIET = 6.0  # s until what the start has brought is no longer shown
 LOOK = 2.5  # s that every loop is looked at after its fault, at least
+ENDING = 30.0  # s until a node that was killed is no longer seen in the graph
 AWARE = ("embedding", "inversion")
 
 
@@ -47,7 +48,7 @@ def run_case(
         options: how.
     """
     started = time.monotonic()
-    allowed = allowed_move(phase, options.seed)
+    allowed = allowed_move(Phase.AFTER if fault.swaps else phase, options.seed)
     loop = RunningLoop(fault, pace, phase, options.seed, options.speed, directory)
     watched = _Watched(loop, fault)
     try:
@@ -56,7 +57,12 @@ def run_case(
         seen = watched.observation(time.monotonic())
     finally:
         loop.stop()
-    heard = {topic: tuple(taken) for topic, taken in loop.probe.heard.items()}
+    # Where the suite stands between the nodes nobody waits for the recorder at the start.
+    since = seen.begun if fault.relayed else 0.0
+    heard = {
+        topic: [one for one in taken if one.wall >= since]
+        for topic, taken in loop.probe.heard.items()
+    }
     bag = BagFound() if fault.bag is Bag.LOST else check_bag(loop.bag, heard)
     seen = dataclasses.replace(
         seen,
@@ -85,7 +91,7 @@ class _Watched:
 
     def __init__(self, loop: RunningLoop, fault: Fault) -> None:
         self._loop, self._fault = loop, fault
-        self._begun = self._over = time.monotonic()
+        self._over = time.monotonic()
         self._before = Known()
 
     def run(self) -> None:
@@ -93,10 +99,11 @@ class _Watched:
         loop, fault = self._loop, self._fault
         if not fault.from_start:
             if not self._ready():
-                self._begun = self._over = time.monotonic()
+                self._over = time.monotonic()
+                loop.begins()
                 return
             self._before = loop.known
-            self._begun = time.monotonic()
+        loop.begins()
         fault.put(loop)
         if fault.from_start:
             self._ready()
@@ -104,6 +111,8 @@ class _Watched:
         self._over = time.monotonic()
         notices = fault.noticed_in(loop.pace)
         bound = max(fault.recovery, GONE_WITHIN + SHOWN_WITHIN if notices else 0.0, LOOK) + CALM
+        if loop.pace in fault.ends:
+            bound = ENDING
         loop.wait_until(self._settled, bound)
 
     def observation(self, until: float) -> Observation:
@@ -119,7 +128,7 @@ class _Watched:
             loop.phase,
             loop.period,
             loop.step,
-            self._begun,
+            loop.begun,
             self._over,
             until,
             heard["op_applied"],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from stiction_ros.faults.fault import Fault, Notice, Pace, Phase
 from stiction_ros.faults.running import RunningLoop
@@ -31,11 +30,10 @@ def second_controller(name: str) -> Callable[[RunningLoop], None]:
     """Return what runs another controller for a while."""
 
     def put(loop: RunningLoop) -> None:
-        more: dict[str, Any] = {}
-        loop.beside("controller", name, more)
-        node = f"{name}: status"
-        if not loop.wait_until(lambda: node in loop.probe.values, 30.0):
+        loop.beside("controller", name)
+        if not loop.wait_until(lambda: loop.probe.publishers("op") > 1, 30.0):
             loop.remark("the second controller did not start")
+        loop.begins()
         loop.wait(BESIDE)
         loop.end_beside()
 
@@ -64,12 +62,14 @@ FAULTS = (
         "thousands of OPs under another name do not stop the loop",
         flood("op", values=1e6, frame_id=STRANGER),
         notices=REFUSED,
+        phases=(Phase.AFTER,),
     ),
     Fault(
         "op-malformed",
         "an OP under the right name that cannot be read is refused",
         said("op", MALFORMED, frame_id=COMMANDER),
         notices=REFUSED,
+        phases=(Phase.AFTER,),
     ),
     Fault(
         "op-stamps",

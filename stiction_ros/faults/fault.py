@@ -41,17 +41,19 @@ LEVELS = ("ok", "warn", "error")
 
 @dataclasses.dataclass(frozen=True)
 class Notice:
-    """A diagnostic that must show the fault, and end with it.
+    """A diagnostic that must show the fault, and end with it unless it ``stays``.
 
     Attributes:
         node: whose status.
         level: warn or error; a worse one will do.
         paces: in which it is expected.
+        stays: whether it may be shown for as long as the run lasts.
     """
 
     node: str
     level: str
     paces: tuple[Pace, ...] = BOTH_PACES
+    stays: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,6 +72,8 @@ class Fault:
             loop by its nature.
         recovery: s from its end until OP must flow again.
         bag: what is expected of the bag.
+        swaps: whether the controller may take a friction before the swap, so that its moves are
+            those of afterwards.
         forgets: whether the controller may lose what it knew of the friction.
         from_start: it is there from the start, and ``put`` has nothing to do.
         parameters: of nodes, in place of the usual ones.
@@ -86,6 +90,7 @@ class Fault:
     silence: float = 1.0
     recovery: float = 5.0
     bag: Bag = Bag.WHOLE
+    swaps: bool = False
     forgets: bool = False
     from_start: bool = False
     parameters: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)

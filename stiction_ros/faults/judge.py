@@ -13,6 +13,7 @@ from stiction_ros.faults.observation import Known, Observation
 
 LEAST_SAMPLES = 50  # applied OPs in succession below which nothing can be said
 LONGEST_LINE = 2000  # characters of a line in a log: more is text from the network
+AGAIN = 3.0  # s without a new OP in lockstep: the plant shows a sample again each second
 LOOP = ("plant", "controller", "estimator")
 SHARE = 0.1  # by which a known friction may differ after the fault
 
@@ -111,8 +112,9 @@ def _flow(fault: Fault, seen: Observation, without: float, back: float | None) -
     found = []
     if back > fault.recovery:
         found.append(f"OP flows again after {back:.1f} s, allowed are {fault.recovery:g}")
-    if without > max(fault.silence, 10 * seen.period):
-        found.append(f"no new OP for {without:.1f} s, allowed are {fault.silence:g}")
+    allowed = max(fault.silence, 10 * seen.period if seen.period else AGAIN)
+    if without > allowed:
+        found.append(f"no new OP for {without:.1f} s, allowed are {allowed:g}")
     return found
 
 

@@ -45,6 +45,8 @@ def look_for(notice: Notice, seen: Observation) -> Noticing:
     allowed = max(SHOWN_WITHIN, SHOWN_SAMPLES * seen.period)
     if shown > allowed:
         return Noticing(shown, None, f"{name} after {shown:.1f} s, allowed are {allowed:.1f}")
+    if notice.stays:
+        return Noticing(shown, None, "")
     bad = [s.wall for s in own if LEVELS.index(s.level) >= wanted]
     good = [s.wall for s in own if s.wall > max(*bad, seen.over)] if bad else []
     if not good:

@@ -8,10 +8,12 @@ from collections.abc import Callable
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.faults.fault import Fault, Pace, Phase
 from stiction_ros.faults.running import RunningLoop
+from stiction_ros.faults.setting_up import HAND_OVER
 from stiction_ros.loop import LoopModel
 
 WATCH = 15.0  # s in which a poison is refused, or taken and rolled back
 POISONS = ((60.0, 59.0), (20.0, 1.0))
+TAKEN = 0.1  # by which the friction that was taken may differ
 ALIASES = 9  # levels of ten: a thousand million values
 KEYS = 300_000
 BYTES = 20_000_000
@@ -91,6 +93,20 @@ def poison(frictions: tuple[tuple[float, float], ...], apart: float) -> Callable
     return put
 
 
+def swap(loop: RunningLoop) -> None:
+    """Offer wrong frictions, which are refused, then the true one, which is taken."""
+    loop.wait_samples(2 * HAND_OVER)
+    loop.offer(_with(loop.model, *POISONS[0]))
+    loop.wait(1.0)
+    loop.offer(loop.model)
+    if not loop.wait_until(lambda: loop.known.friction, WATCH):
+        loop.remark("the true friction was not taken")
+    loop.wait_samples(3 * HAND_OVER)
+    known, true = loop.known.friction.get("V1.f_s", 0.0), 5.0
+    if not abs(known - true) <= TAKEN * true:
+        loop.remark(f"f_S is {known:.3g} after the swap, true is {true:.3g}")
+
+
 def many(loop: RunningLoop) -> None:
     """Offer two hundred models within four seconds, all good."""
     for number in range(200):
@@ -113,11 +129,30 @@ def _take_back(loop: RunningLoop) -> None:
 REFUSED = "is refused in one sentence; the text is not repeated in the log"
 
 FAULTS = (
+    Fault(
+        "swap",
+        "a model that is refused and one that is taken make no step late; f_S is not raised",
+        swap,
+        phases=(Phase.BEFORE,),
+        silence=0.5,
+        swaps=True,
+        forgets=True,
+    ),
     Fault("model-aliases", f"a model whose aliases multiply {REFUSED}", offered(aliases)),
     Fault("model-giant", f"a model of 20 MB {REFUSED}", offered(giant, 3.0)),
     Fault("model-many-keys", f"a model of 300 000 keys {REFUSED}", offered(many_keys, 2.0)),
-    Fault("model-deep", f"a model of 20 000 levels {REFUSED}", offered(deep)),
-    Fault("model-nonsense", f"what is no model of this loop {REFUSED}", nonsense),
+    Fault(
+        "model-deep",
+        f"a model of 20 000 levels {REFUSED}",
+        offered(deep),
+        phases=(Phase.AFTER,),
+    ),
+    Fault(
+        "model-nonsense",
+        f"what is no model of this loop {REFUSED}",
+        nonsense,
+        phases=(Phase.AFTER,),
+    ),
     Fault(
         "model-flood",
         "two hundred models for later on do not make a step long",

@@ -37,6 +37,7 @@ class RunningLoop:
         self.step = round(self.model.sample_time * 1e9)
         self.period = self.model.sample_time / speed if pace is Pace.REALTIME else 0.0
         self.remarks: list[str] = []
+        self.begun = 0.0
         self.bag = directory / "bag"
         self._environment = ros_environment()
         self._parameters = case_parameters(fault, pace, seed, speed, self.bag)
@@ -68,6 +69,10 @@ class RunningLoop:
             if node.code is None and not node.end():
                 self.remark(f"{name} did not end when it was asked to")
         self.probe.close()
+
+    def begins(self) -> None:
+        """Say that the fault begins now, and not when it was prepared."""
+        self.begun = time.monotonic()
 
     def beside(self, kind: str, name: str, parameters: Mapping[str, Any] | None = None) -> None:
         """Start one more node of ``kind`` that nobody has asked for."""

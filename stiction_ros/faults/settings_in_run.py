@@ -175,6 +175,7 @@ FAULTS = (
         "the control goes on; the recorder says so",
         bag_deleted,
         phases=(Phase.AFTER,),
+        notices=(Notice("recorder", "error", stays=True),),
         bag=Bag.LOST,
     ),
 )

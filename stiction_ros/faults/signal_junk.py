@@ -130,7 +130,12 @@ FAULTS = (
         said("pv", STAMPS),
         notices=SEEN,
     ),
-    Fault("pv-flood", "thousands of old PVs do not stop the loop", flood("pv", offset=-30.0)),
+    Fault(
+        "pv-flood",
+        "thousands of old PVs do not stop the loop",
+        flood("pv", offset=-30.0),
+        phases=(Phase.AFTER,),
+    ),
     Fault(
         "sp-malformed",
         "a set-point that cannot be read is refused, the last holds",
@@ -152,6 +157,7 @@ FAULTS = (
         "op-applied-junk",
         "what is said of the OP in force and cannot be is refused",
         said("op_applied", (*MALFORMED, *STAMPS, {"values": 1e6, "offset": 1e5})),
+        phases=(Phase.AFTER,),
     ),
     Fault(
         "dv-junk",
@@ -163,6 +169,7 @@ FAULTS = (
         "sp-preview-junk",
         "set-points to come that make no sense are refused",
         wild_previews,
+        phases=(Phase.AFTER,),
     ),
     Fault(
         "stiction-junk",
@@ -176,5 +183,6 @@ FAULTS = (
         "clock-junk",
         "a second simulated time stops neither loop nor recorder",
         strange_clock,
+        phases=(Phase.AFTER,),
     ),
 )

@@ -6,12 +6,15 @@ import dataclasses
 import math
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.node_processes import ros_environment
 from stiction_ros.faults.node_process import NodeProcess
+from stiction_ros.online.live_controller import HISTORY_SAMPLES
+from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.settings import from_mapping
 
 STARTED = ("recorder", "estimator", "controller", "plant")
 ENDED = ("plant", "controller", "estimator", "recorder")
@@ -19,7 +22,21 @@ TENTH = 0.1
 READINGS = 5  # of memory, of which the median counts
 LOOK = 1.0  # s between two readings
 GROWTH = 1.02  # largest ratio of the memory at the end to that at a tenth
-MISSED = (("plant", "late_op"), ("estimator", "missed_samples"), ("controller", "passed_over"))
+# Keys of the statuses: what must be 0, and what is told besides.
+MISSED = (
+    ("controller", "missing"),
+    ("controller", "passed_over"),
+    ("estimator", "missed_samples"),
+    ("estimator", "bridged_samples"),
+)
+TOLD = (
+    ("plant", "late_op"),
+    ("plant", "unanswered"),
+    ("plant", "missed_ticks"),
+    ("plant", "shown_again"),
+    ("plant", "pv_to_op_ms_p999"),
+    ("plant", "pv_to_op_ms_max"),
+)
 STALL = 300.0  # s without a sample
 
 
@@ -42,8 +59,9 @@ class Soaked:
 
     Attributes:
         samples, seconds: how long it was.
-        missed: counts of what was missed, by node and key.
-        kept: what the nodes say that they keep of the past, by node and key.
+        missed: samples that were missed, by node and key.
+        told: what else the nodes have counted, by node and key.
+        kept: most samples of the past that a node keeps.
         memory: of every node.
         failures: nodes that ended when they should not have, a run that stood still.
     """
@@ -51,7 +69,8 @@ class Soaked:
     samples: int
     seconds: float
     missed: Mapping[str, int]
-    kept: Mapping[str, str]
+    told: Mapping[str, str]
+    kept: Mapping[str, int]
     memory: Mapping[str, Memory]
     failures: tuple[str, ...] = ()
 
@@ -161,8 +180,9 @@ def soak(
     return Soaked(
         _number(probe.values, "plant", "sample"),
         took,
-        _missed(probe.values),
-        _kept(probe.values),
+        {key: int(value) for key, value in _values(probe.values, MISSED).items()},
+        _values(probe.values, TOLD),
+        kept(nodes),
         readings.memory(),
         tuple(failures),
     )
@@ -172,18 +192,17 @@ def _number(values: Mapping[str, Mapping[str, str]], node: str, key: str) -> int
     return int(values.get(f"{node}: status", {}).get(key, 0))
 
 
-def _missed(values: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
+def _values(
+    values: Mapping[str, Mapping[str, str]], keys: Sequence[tuple[str, str]]
+) -> dict[str, str]:
     return {
-        f"{node} {key}": _number(values, node, key)
-        for node, key in MISSED
+        f"{node} {key}": values[f"{node}: status"][key]
+        for node, key in keys
         if key in values.get(f"{node}: status", {})
     }
 
 
-def _kept(values: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    return {
-        f"{name.partition(':')[0]} {key}": value
-        for name, entries in values.items()
-        for key, value in entries.items()
-        if key.startswith("kept")
-    }
+def kept(nodes: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
+    """Return the most samples of the past that controller and estimator keep."""
+    window = from_mapping(EstimatorNodeSettings, nodes["estimator"], "estimator").window
+    return {"controller": HISTORY_SAMPLES, "estimator": window}

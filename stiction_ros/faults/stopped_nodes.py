@@ -82,11 +82,10 @@ def deactivate(name: str) -> Callable[[RunningLoop], None]:
     """Return what deactivates a node and activates it again."""
 
     def put(loop: RunningLoop) -> None:
-        before = loop.last("op_applied")
         if not loop.probe.change_state(name, DEACTIVATE):
             loop.remark(f"{name} did not let itself be deactivated")
         loop.wait(AWAY)
-        sent = len(loop.heard("op"))
+        before, sent = loop.last("op_applied"), len(loop.heard("op"))
         if not loop.probe.change_state(name, ACTIVATE):
             loop.remark(f"{name} did not let itself be activated again")
         if name == "controller" and loop.wait_until(lambda: len(loop.heard("op")) > sent, START):

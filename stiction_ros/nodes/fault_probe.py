@@ -165,6 +165,11 @@ class Probe:
             message.points.append(point)
         self._publisher(JointTrajectory, "sp_preview", SIGNAL_QOS).publish(message)
 
+    def publishers(self, topic: str) -> int:
+        """Return how many nodes publish a topic."""
+        name = self.node.resolve_topic_name(topic)
+        return len(self.node.get_publishers_info_by_topic(name))
+
     def silence(self, topic: str) -> None:
         """Take back the publisher of a topic."""
         publisher = self._publishers.pop(topic, None)

@@ -21,7 +21,7 @@ from observations import (
     statuses,
 )
 
-from stiction_ros.faults.fault import Bag, Phase
+from stiction_ros.faults.fault import Bag, Notice, Phase
 from stiction_ros.faults.judge import judge
 from stiction_ros.faults.observation import BagFound, Ended, Known
 
@@ -164,6 +164,13 @@ def test_a_diagnostic_that_ends_too_late_fails():
     assert "ended 8.0 s after" in " ".join(
         judge(fault(notices=noticed()), REALTIME, seen, ALLOWED).reasons
     )
+
+
+def test_a_diagnostic_that_stays_is_asked_to_come_only():
+    told = tuple((105.5 + k, "error") for k in range(9))
+    stays = fault(notices=(Notice("plant", "error", stays=True),))
+    assert outcome(stays, statuses=statuses(*told)).passed
+    assert not outcome(stays).passed
 
 
 def test_a_longer_sample_gives_a_diagnostic_longer():

@@ -14,8 +14,9 @@ from stiction_ros.faults.soak import Memory, Readings, Soaked
 GOOD = Soaked(
     86_400,
     300.0,
-    {"plant late_op": 0, "estimator missed_samples": 0},
-    {"controller kept_samples": "20000"},
+    {"controller passed_over": 0, "estimator missed_samples": 0},
+    {"plant late_op": "3"},
+    {"controller": 20_000, "estimator": 2500},
     {"plant": Memory(80e6, 81e6)},
 )
 
@@ -31,7 +32,7 @@ def test_a_run_without_growth_and_loss_passes():
         {"memory": {"plant": Memory(80e6, 82e6)}},
         {"memory": {"plant": Memory(80e6, math.nan)}},
         {"memory": {}},
-        {"missed": {"plant late_op": 1}},
+        {"missed": {"estimator missed_samples": 1}},
         {"missed": {}},
         {"samples": 0},
         {"failures": ("controller ended with code 1",)},
