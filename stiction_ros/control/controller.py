@@ -177,7 +177,7 @@ class MpcController:
         preview: FloatArray | None = None,
         *,
         known: bool = True,
-        keep: bool = False,
+        reach: float = np.inf,
     ) -> StepResult:
         """Return what to apply now.
 
@@ -190,10 +190,11 @@ class MpcController:
                 holds on; None when ``sp`` holds on.
             known: whether ``applied`` is surely what the valves were given; where it is not, no
                 slip is judged.
-            keep: leave OP at ``applied`` whatever is planned, as at the first sample of a run.
+            reach: how far OP may be from ``applied`` whatever is planned, %, as at the first
+                sample of a run.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._step(pv, sp, dv, applied, preview, known, keep)
+            return self._step(pv, sp, dv, applied, preview, known, reach)
 
     def pass_over(
         self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
@@ -217,7 +218,7 @@ class MpcController:
         applied: FloatArray,
         preview: FloatArray | None,
         known: bool,
-        keep: bool,
+        reach: float,
     ) -> StepResult:
         begin = time.perf_counter()
         trouble = _unusable(pv=pv, sp=sp, dv=dv)
@@ -230,7 +231,7 @@ class MpcController:
             self.observer.state, target, self.stem, applied, self.valves.forms, trouble
         )
         proposal, strategy = self._choose(situation)
-        op = applied if keep else self._valid(proposal.op, applied)
+        op = self._valid(np.clip(proposal.op, applied - reach, applied + reach), applied)
         self._decide(op, proposal.plan)
         seconds = time.perf_counter() - begin
         miss = np.zeros(len(sp)) if target is None else target.miss

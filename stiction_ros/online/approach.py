@@ -14,24 +14,18 @@ class Approach:
     the whole error at once moves the valves further than any move of the set-point does.
     """
 
-    def __init__(self) -> None:
-        """Begin with the next measurement."""
-        self._from: FloatArray | None = None
+    def __init__(self, pv: FloatArray, sp: FloatArray, samples: int) -> None:
+        """Begin at ``pv`` (p,), to be at the set-points after ``samples``, ``sp`` (p,) now."""
+        self._from, self._samples = pv - sp, samples
         self._sample = 0
 
-    def aim(self, pv: FloatArray, sp: FloatArray, samples: int) -> FloatArray:
-        """Return what to aim at now, shape (p,): ``sp`` itself when the approach is over.
+    @property
+    def over(self) -> bool:
+        """Whether the next aim is the set-point itself."""
+        return self._sample >= self._samples
 
-        Args:
-            pv: measurement, shape (p,); what is not finite begins nothing.
-            sp: set-points, shape (p,).
-            samples: length of the approach.
-        """
-        if self._from is None:
-            if not np.isfinite(pv).all():
-                return sp
-            self._from = pv - sp
+    def aim(self, sp: FloatArray) -> FloatArray:
+        """Return what to aim at in the next sample, shape (p,), with set-points ``sp`` (p,)."""
         self._sample += 1
-        if self._sample > samples:
-            return sp
-        return np.asarray(sp + (1.0 - self._sample / (samples + 1)) * self._from)
+        left = max(1.0 - self._sample / (self._samples + 1), 0.0)
+        return np.asarray(sp + left * self._from)

@@ -28,6 +28,7 @@ from stiction_ros.online.past import Past
 from stiction_ros.online.watch import Watch
 
 HISTORY_SAMPLES = 20_000
+FIRST_MOVE = 1.0  # %; largest move of the first OP after a start or a hold
 REMEMBERED = 20  # frictions that were rolled back
 
 
@@ -83,8 +84,8 @@ class LiveController:
         self._latest: tuple[FloatArray, FloatArray, FloatArray] | None = None  # OP, PV, DV
         self._told: tuple[FloatArray, bool] | None = None  # what the valves were given
         self._in_force, self._sure = np.array(model.stem_start), True
-        self._keep = True
-        self._approach = Approach()
+        self._first = True
+        self._approach: Approach | None = None
         self._retuned: HandOver | None = None
         self._offered: HandOver | None = None
         self._returning: HandOver | None = None
@@ -128,14 +129,13 @@ class LiveController:
     def begin(self, op: FloatArray) -> None:
         """Begin a run, or begin anew, with ``op`` (m,), %, in force.
 
-        The past is forgotten, what is known of the friction stays. The first OP is ``op``, and
-        the set-point is approached from PV.
+        The past is forgotten, what is known of the friction stays. The first OP is within
+        ``FIRST_MOVE`` of ``op``; where the plan goes further, the set-point is approached from PV.
         """
         self._in_force, self._sure = np.array(op, dtype=float), True
         self._latest = self._told = None
         self._past.clear()
-        self._keep = True
-        self._approach = Approach()
+        self._first, self._approach = True, None
         self._controller.forget()
         for change in (self._retuned, self._offered, self._returning):
             if change is not None:
@@ -234,20 +234,20 @@ class LiveController:
         self._settle()
         upset = self._upset(dv)
         self._commit_what_is_due()
-        aim = self._approach.aim(pv, sp, self.settings.approach_samples)
+        approaching = self._approach is not None and not self._approach.over
         result = self._controller.step(
             pv,
-            aim,
+            self._approach.aim(sp) if self._approach is not None and approaching else sp,
             upset,
             self._in_force,
-            preview if aim is sp else None,
+            None if approaching else preview,
             known=self._sure,
-            keep=self._keep,
+            reach=FIRST_MOVE if self._first else np.inf,
         )
+        self._approach_if_far(result, pv, sp)
         if self._unknown:
             text = "; ".join(t for t in (result.reason, self._unknown) if t)
             result = dataclasses.replace(result, reason=text)
-        self._keep = False
         self._latest = result.op, np.array(pv, dtype=float), upset
         self._sample += 1
         self._tell(result)
@@ -256,6 +256,14 @@ class LiveController:
         if reason:
             self._roll_back(reason)
         return result
+
+    def _approach_if_far(self, result: StepResult, pv: FloatArray, sp: FloatArray) -> None:
+        """Approach the set-points from PV where the first plan after a start or hold goes far."""
+        first, self._first = self._first, result.mode is ControlMode.HOLD
+        if self._first or not first or result.plan is None:
+            return
+        if np.any(np.abs(result.plan.op - self._in_force) > FIRST_MOVE):
+            self._approach = Approach(pv, sp, self.settings.approach_samples)
 
     def _upset(self, dv: FloatArray | None) -> FloatArray:
         return np.zeros(self._design.model.e.shape[1]) if dv is None else dv
@@ -276,8 +284,6 @@ class LiveController:
             self._raised = controller.frictions
             self._note(controller.raised, sample)
         given_up = result.mode is ControlMode.HOLD and controller.mode is not ControlMode.HOLD
-        if result.mode is ControlMode.HOLD:
-            self._approach = Approach()
         if given_up and not self._given_up:
             change = ModeChange(sample, ControlMode.HOLD, result.reason, self._known.name)
             self.changes.append(change)
