@@ -93,6 +93,7 @@ class _Watched:
         self._loop, self._fault = loop, fault
         self._over = time.monotonic()
         self._before = Known()
+        self._written: dict[str, int] = {}  # characters in the logs when the fault began
 
     def run(self) -> None:
         """Start the loop, put the fault into it, look at what becomes of it."""
@@ -103,6 +104,7 @@ class _Watched:
                 loop.begins()
                 return
             self._before = loop.known
+        self._written = {name: len(node.log) for name, node in loop.nodes.items()}
         loop.begins()
         fault.put(loop)
         if fault.from_start:
@@ -114,12 +116,14 @@ class _Watched:
         if loop.pace in fault.ends:
             bound = ENDING
         loop.wait_until(self._settled, bound)
+        for topic in loop.probe.unheard:
+            loop.remark(f"nobody heard what was said on {topic}")
 
     def observation(self, until: float) -> Observation:
         """Return what was seen so far."""
         loop = self._loop
         ended = {
-            name: Ended(node.code, node.log, node.by_fault)
+            name: Ended(node.code, node.log[self._written.get(name, 0) :], node.by_fault)
             for name, node in loop.nodes.items()
             if node.code is not None
         }

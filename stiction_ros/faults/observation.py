@@ -49,7 +49,7 @@ class Ended:
 
     Attributes:
         code: exit code, negative for a signal.
-        log: all that it has written.
+        log: what it has written since the fault began.
         by_fault: whether the fault itself has ended it.
     """
 

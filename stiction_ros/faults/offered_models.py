@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from stiction_ros.effects.stiction_he import HeStiction
 from stiction_ros.faults.fault import Fault, Pace, Phase
@@ -24,8 +25,9 @@ def offered(make: Callable[[], str], settle: float = 1.0) -> Callable[[RunningLo
     """Return what offers one hostile text."""
 
     def put(loop: RunningLoop) -> None:
-        loop.offer_text(make())
-        loop.wait(settle)
+        with _answered(loop):
+            loop.offer_text(make())
+            loop.wait(settle)
         _take_back(loop)
 
     return put
@@ -84,10 +86,11 @@ def poison(frictions: tuple[tuple[float, float], ...], apart: float) -> Callable
     """Return what offers wrong frictions one after another, ``apart`` seconds."""
 
     def put(loop: RunningLoop) -> None:
-        for static, dynamic in frictions:
-            loop.offer(_with(loop.model, static, dynamic))
-            loop.wait(apart)
-        loop.wait(WATCH)
+        with _answered(loop):
+            for static, dynamic in frictions:
+                loop.offer(_with(loop.model, static, dynamic))
+                loop.wait(apart)
+            loop.wait(WATCH)
         _take_back(loop)
 
     return put
@@ -117,6 +120,15 @@ def many(loop: RunningLoop) -> None:
 
 def _with(model: LoopModel, static: float, dynamic: float) -> LoopModel:
     return model.with_valve_effects({"V1": [HeStiction(static, dynamic)]})
+
+
+@contextlib.contextmanager
+def _answered(loop: RunningLoop) -> Iterator[None]:
+    """Remark it when the controller has not said a word of what was offered."""
+    before = len(loop.nodes["controller"].log)
+    yield
+    if len(loop.nodes["controller"].log) == before:
+        loop.remark("the controller has said nothing of what was offered")
 
 
 def _take_back(loop: RunningLoop) -> None:

@@ -64,6 +64,7 @@ class Probe:
         self.statuses: list[Shown] = []
         self.values: dict[str, dict[str, str]] = {}  # by name of the status
         self.known = Known()
+        self.unheard: list[str] = []  # topics on which nobody heard what was said
         self._own: set[tuple[str, int, bytes]] = set()
         self._rules: dict[str, Rule] = {}
         self._publishers: dict[str, Any] = {}
@@ -182,6 +183,8 @@ class Probe:
             end = time.monotonic() + 2.0
             while time.monotonic() < end and not self._matched(topic):
                 time.sleep(0.02)
+            if not self._matched(topic):
+                self.unheard.append(topic)
         return self._publishers[topic]
 
     def _matched(self, topic: str) -> bool:

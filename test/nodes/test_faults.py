@@ -26,7 +26,7 @@ from stiction_ros.online.session import Scenario, run_live
 
 SAMPLES = 60
 SEED = 4
-SPEED = 50.0
+SPEED = 20.0
 SAME_OP = 1.0  # %, between the OP in force and the first of a new controller
 APPLIED = "applied"  # what was heard on op_applied
 OK, ERROR = b"\x00", b"\x02"
@@ -55,13 +55,17 @@ def parameters(pace: Pace) -> dict[str, dict[str, Any]]:
     return case_parameters(Fault("", "", nothing), pace, SEED, SPEED, Path("bag"))
 
 
-def start(graph: Graph, pace: Pace, samples: int = 0) -> dict[str, Any]:
-    """Start plant, controller and estimator; a listener stands in for the recorder."""
+def start(graph: Graph, pace: Pace, names: tuple[str, ...], samples: int = 0) -> dict[str, Any]:
+    """Start the nodes of these names; a listener stands in for the recorder."""
     recorder, applied = graph.listen("recorder"), graph.seen[APPLIED]
     recorder.create_subscription(JointState, "op_applied", applied.append, SIGNAL_QOS)
     found = parameters(pace)
     found["plant"]["samples"] = samples
-    built = {name: graph.add(name, found[name]) for name in NODES}
+    for values in found.values():
+        values["wait_for"] = [
+            other for other in values.get("wait_for", ()) if other in (*names, "recorder")
+        ]
+    built = {name: graph.add(name, found[name]) for name in names}
     for node in built.values():
         node.start()
         assert node.failure == ""
@@ -126,7 +130,7 @@ JUNK: dict[str, dict[str, Say]] = {
 def test_junk_changes_no_number_of_a_run_in_lockstep(graph: Graph, junk: dict[str, Say]) -> None:
     for topic, say in junk.items():
         stranger(graph, topic, say)
-    built = start(graph, Pace.LOCKSTEP, SAMPLES)
+    built = start(graph, Pace.LOCKSTEP, ("plant", "controller"), SAMPLES)
     graph.spin_until(lambda: built["plant"].finished, "the plant's last sample")
     graph.spin_until(lambda: len(graph.seen["stem"]) == SAMPLES, "every stem")
     last = SAMPLES * SECOND
@@ -149,8 +153,8 @@ def level(graph: Graph, node: str) -> bytes:
 
 
 def test_a_loop_in_real_time_notices_who_is_gone_and_goes_on(graph: Graph) -> None:
-    built = start(graph, Pace.REALTIME)
-    graph.spin_until(lambda: len(graph.seen["op"]) >= 20, "the loop to run")
+    built = start(graph, Pace.REALTIME, NODES)
+    graph.spin_until(lambda: len(graph.seen["op"]) >= 10, "the loop to run")
 
     built["plant"].trigger_deactivate()
     begun = time.monotonic()
@@ -159,7 +163,7 @@ def test_a_loop_in_real_time_notices_who_is_gone_and_goes_on(graph: Graph) -> No
     assert time.monotonic() - begun <= 3.0
     sent = len(graph.seen["op"])
     built["plant"].trigger_activate()
-    graph.spin_until(lambda: len(graph.seen["op"]) > sent + 20, "the loop to go on")
+    graph.spin_until(lambda: len(graph.seen["op"]) > sent + 10, "the loop to go on")
 
     old = built["controller"]
     graph.executor.remove_node(old)
@@ -172,4 +176,4 @@ def test_a_loop_in_real_time_notices_who_is_gone_and_goes_on(graph: Graph) -> No
     graph.spin_until(lambda: len(graph.seen["op"]) > sent, "the first OP")
     assert abs(graph.seen["op"][sent].position[0] - applied) <= SAME_OP
     for node in NODES:
-        graph.spin_until(lambda node=node: level(graph, node) == OK, f"{node} to be well")
+        graph.spin_until(lambda node=node: level(graph, node) != ERROR, f"{node} to be well")
