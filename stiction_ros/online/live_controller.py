@@ -28,7 +28,7 @@ from stiction_ros.online.past import Past
 from stiction_ros.online.watch import Watch
 
 HISTORY_SAMPLES = 20_000
-FIRST_MOVE = 1.0  # %; largest move of the first OP after a start or a hold
+FIRST_MOVE = 0.9  # %; largest move of the first OP after a start or a hold
 REMEMBERED = 20  # frictions that were rolled back
 
 
