@@ -65,7 +65,7 @@ class RecorderNode(ManagedNode):
         self._clock_runs = False
         self._looking = [
             self.create_timer(DISCOVERY_PERIOD, self._discover, clock=self._steady),
-            self.create_timer(1.0, self._look_around, clock=self._steady),
+            self.create_timer(1.0, self._look_at_the_bag, clock=self._steady),
         ]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
@@ -139,7 +139,7 @@ class RecorderNode(ManagedNode):
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
-    def _look_around(self) -> None:
+    def _look_at_the_bag(self) -> None:
         """Look once a second for what cannot be heard, and whether the bag is still there."""
         self._look_for_unheard()
         if self.writer is None:
