@@ -25,6 +25,7 @@ from stiction_ros.cli import (
     replay,
     report,
     study,
+    study_change,
     study_control,
     study_monitor,
 )
@@ -44,6 +45,7 @@ COMMANDS = (
     report,
     repair,
     study,
+    study_change,
     study_control,
     study_monitor,
     bench,
