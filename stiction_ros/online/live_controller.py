@@ -142,7 +142,9 @@ class LiveController:
         now, new = self._controller, offered.controller
         if now.frictions == new.frictions and now.design.model is new.design.model:
             return ""
-        return doubt(self.settings, (now, new), self._history())
+        told = [e["last_samples"] for e in offered.model.provenance if "last_samples" in e]
+        last = min(told) + self.settings.fit_latency if told else None
+        return doubt(self.settings, (now, new), self._history(), last)
 
     def _prepare_offer(
         self, model: LoopModel, at: int, settings: LiveControllerSettings, design: ControlDesign

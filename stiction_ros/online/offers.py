@@ -30,7 +30,12 @@ class OfferRule:
     offer_ratio: float = setting(1.5, "by how much it may explain them worse", low=1.0)
 
 
-def doubt(rule: OfferRule, controllers: tuple[MpcController, MpcController], past: History) -> str:
+def doubt(
+    rule: OfferRule,
+    controllers: tuple[MpcController, MpcController],
+    past: History,
+    last: int | None = None,
+) -> str:
     """Return why the second of two controllers contradicts the past, or an empty text.
 
     Args:
@@ -38,6 +43,9 @@ def doubt(rule: OfferRule, controllers: tuple[MpcController, MpcController], pas
         controllers: the one in force and the offered one; neither is changed.
         past: up to the present sample.
     """
+    if last is not None:
+        before, after = (_misfit(one, past, min(last, len(past.op))) for one in controllers)
+        return "" if after <= rule.offer_ratio * before else "it explains its samples worse"
     recent = controllers[0].design.hand_over_samples
     samples = min(rule.offer_samples, len(past.op))
     if samples < recent:
