@@ -27,6 +27,7 @@ from stiction_ros.cli import (
     report,
     soak,
     study,
+    study_change,
     study_control,
     study_monitor,
 )
@@ -46,6 +47,7 @@ COMMANDS = (
     report,
     repair,
     study,
+    study_change,
     study_control,
     study_monitor,
     faults,

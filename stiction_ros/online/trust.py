@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
+from typing import Self
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.identification import ValveEstimate, VerdictKind
 from stiction_ros.settings import setting
 
 Interval = tuple[float, float]
+
+UNIMPORTANT = 0.01  # of f_S: a change of f_S or f_D that needs no new controller
+RESOLUTION = 1.01  # by which a friction offered exceeds one that is rejected
+TRIED = 1.06  # of the lower end: how far up from it a friction that is not settled may lie
+SETTLED = 1.12  # ratio of the ends of an interval of f_S from which on its middle is taken
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,12 +42,47 @@ class TrustRule:
 
 @dataclasses.dataclass(frozen=True)
 class TrustedFriction:
-    """Friction of one valve that the controller may rely on; % of travel."""
+    """Friction of one valve that the controller may rely on; % of travel.
+
+    After a growth of friction only one move that failed and one that did not may be known, with
+    much in between. Then the friction is not ``settled``: it is offered at the lower end of its
+    interval, so that the next moves find out more.
+    """
 
     static_friction: float
     static_interval: Interval
     dynamic_friction: float
     dynamic_interval: Interval
+    settled: bool = True
+
+    @property
+    def offered_interval(self) -> Interval:
+        """The values of f_S that the controller should reckon with."""
+        low, high = self.static_interval
+        return (low, high) if self.settled else (low, min(high, TRIED * low))
+
+    def narrowed(
+        self, static: Interval, dynamic: float, dynamic_interval: Interval, *, anew: bool
+    ) -> Self:
+        """Return the friction as the moves since it changed tell it.
+
+        Args:
+            static, dynamic_interval: intervals that these moves allow.
+            dynamic: f_D, taken only where the one in force lies outside its interval.
+            anew: whether the moves are all since the change, so that they say it all.
+        """
+        both = static if anew else _intersect(self.static_interval, static) or static
+        settled = both[1] <= SETTLED * both[0]
+        value = 0.5 * (both[0] + both[1]) if settled else RESOLUTION * both[0]
+        known = dynamic_interval[0] <= self.dynamic_friction <= dynamic_interval[1]
+        return dataclasses.replace(
+            self,
+            static_friction=value,
+            static_interval=both,
+            dynamic_friction=self.dynamic_friction if known else dynamic,
+            dynamic_interval=self.dynamic_interval if known else dynamic_interval,
+            settled=settled,
+        )
 
     def behaviour(self) -> HeStiction:
         """Return He's law with these values."""
@@ -60,8 +101,11 @@ class ValveTrust:
         self._disjoint_windows = 0
         self._disjoint_verdict: VerdictKind | None = None
 
-    def update(self, estimate: ValveEstimate) -> TrustedFriction | None:
-        """Take in the estimate of one more window and return what is trusted now."""
+    def update(self, estimate: ValveEstimate, firm: bool = False) -> TrustedFriction | None:
+        """Take in the estimate of one more window and return what is trusted now.
+
+        A ``firm`` trust is narrowed, but not replaced.
+        """
         slack = self.rule.tolerance * estimate.static_friction
         found = TrustedFriction(
             estimate.static_friction,
@@ -71,7 +115,7 @@ class ValveTrust:
         )
         sticky = estimate.verdict is VerdictKind.STICKY
         if self.trusted is not None:
-            self._revise(found, estimate.verdict)
+            self._revise(found, estimate.verdict, firm)
         elif sticky:
             both = _combine(self._pending, found) if self._pending is not None else None
             self._sticky_windows = self._sticky_windows + 1 if both is not None else 1
@@ -82,11 +126,18 @@ class ValveTrust:
             self._sticky_windows, self._pending = 0, None
         return self.trusted
 
-    def _revise(self, found: TrustedFriction, verdict: VerdictKind) -> None:
+    def renew(self, friction: TrustedFriction | None) -> None:
+        """Trust what a change that was seen has left, None for a healthy valve."""
+        self.trusted, self._pending = friction, None
+        self._sticky_windows = self._disjoint_windows = 0
+
+    def _revise(self, found: TrustedFriction, verdict: VerdictKind, firm: bool) -> None:
         assert self.trusted is not None
         both = _combine(self.trusted, found)
         if both is not None:
             self.trusted, self._disjoint_windows = both, 0
+            return
+        if firm:
             return
         if verdict is not self._disjoint_verdict:
             self._disjoint_windows, self._disjoint_verdict = 0, verdict
@@ -112,16 +163,41 @@ class Trust:
         for valve in self._valves.values():
             valve.rule = rule
 
-    def update(self, estimates: Sequence[ValveEstimate]) -> Mapping[str, TrustedFriction]:
-        """Take in one fit and return the trusted friction by valve."""
+    def update(
+        self,
+        estimates: Sequence[ValveEstimate],
+        kept: Container[str] = (),
+        firm: Container[str] = (),
+    ) -> Mapping[str, TrustedFriction]:
+        """Take in one fit and return the trusted friction by valve.
+
+        Valves that are ``kept`` stay as they are, ``firm`` ones may be narrowed.
+        """
         for estimate in estimates:
-            self._valves[estimate.name].update(estimate)
+            if estimate.name not in kept:
+                self._valves[estimate.name].update(estimate, estimate.name in firm)
         return self.trusted
+
+    def renew(self, valve: str, friction: TrustedFriction | None) -> None:
+        """Trust ``friction`` from now on, None for a healthy valve."""
+        self._valves[valve].renew(friction)
 
     @property
     def trusted(self) -> Mapping[str, TrustedFriction]:
         """The trusted friction of each valve that has one."""
         return {n: v.trusted for n, v in self._valves.items() if v.trusted is not None}
+
+
+def alike(one: Mapping[str, TrustedFriction], other: Mapping[str, TrustedFriction]) -> bool:
+    """Return whether a controller built on either would do the same, or nearly so."""
+    if one.keys() != other.keys():
+        return False
+    return all(
+        abs(a.static_friction - b.static_friction) <= UNIMPORTANT * b.static_friction
+        and abs(a.dynamic_friction - b.dynamic_friction) <= UNIMPORTANT * b.static_friction
+        and a.settled == b.settled
+        for a, b in ((one[name], other[name]) for name in one)
+    )
 
 
 def _combine(old: TrustedFriction, new: TrustedFriction) -> TrustedFriction | None:

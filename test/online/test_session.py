@@ -11,6 +11,8 @@ import yaml
 from stiction_ros.config_files import config_directories, find_config
 from stiction_ros.control import ControlMode
 from stiction_ros.errors import InputError
+from stiction_ros.loop import ValveChange
+from stiction_ros.online.friction_change import ChangeStatus
 from stiction_ros.online.session import Scenario, run_live
 
 SCENARIOS = sorted(config_directories()[0].glob("*.scenario.yaml"))
@@ -99,6 +101,30 @@ def test_ideal_valves_stay_ideal_whatever_changes(tmp_path: Path) -> None:
     record = run_live(scenario, samples=60, ideal_valves=True, identify=False).run.record
     assert record.stem is not None
     assert np.array_equal(record.stem, record.op)
+
+
+def test_a_serviced_valve_is_noticed_and_the_window_begins_anew(siso: Scenario) -> None:
+    scenario = quick(siso)
+    changes = (ValveChange(540.0, "V1", ()),)
+    controller = dataclasses.replace(scenario.controller, horizon=30)
+    scenario = dataclasses.replace(scenario, controller=controller, valve_changes=changes)
+    live = run_live(scenario, samples=1105, seed=1)
+    noticed = next(fit for fit in live.fits if fit.changes and fit.loop_model is not None)
+    (change,) = noticed.changes
+    assert change.status is ChangeStatus.SERVICED
+    assert noticed.trusted == {}
+    assert noticed.loop_model is not None
+    assert noticed.loop_model.valves[0].effects == ()
+    (entry,) = noticed.loop_model.provenance
+    assert (entry["change"], entry["last_samples"]) == ("serviced", change.samples)
+    assert noticed.end + 1 - change.samples >= 540
+    assert live.changes[-1].mode is ControlMode.UNAWARE
+    assert live.changes[-1].sample == noticed.end + scenario.controller.fit_latency
+    later = [fit for fit in live.fits if fit.end > noticed.end]
+    assert later
+    for fit in later:  # the window holds nothing from before, and no old friction comes back
+        assert fit.identification.samples == fit.end + 1 - (noticed.end + 1 - change.samples)
+        assert fit.trusted == {}
 
 
 def test_a_window_that_cannot_be_used_does_not_end_the_run(siso: Scenario) -> None:

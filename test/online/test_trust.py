@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.identification import ValveEstimate, VerdictKind
-from stiction_ros.online.trust import Trust, TrustedFriction, TrustRule, ValveTrust
+from stiction_ros.online.trust import Trust, TrustedFriction, TrustRule, ValveTrust, alike
 
 STICKY, HEALTHY, UNDECIDED = VerdictKind.STICKY, VerdictKind.HEALTHY, VerdictKind.UNDECIDED
 EXACT = TrustRule(confirmations=2, tolerance=0.0, contradictions=2)
@@ -158,3 +158,71 @@ def test_valves_are_judged_apart() -> None:
     for _ in range(2):
         trust.update([window(STICKY, name="V1"), window(HEALTHY, name="V2")])
     assert list(trust.trusted) == ["V1"]
+
+
+def test_a_firm_trust_is_narrowed_but_never_replaced() -> None:
+    trust = Trust(["V1"], EXACT)
+    for _ in range(2):
+        trust.update([window(STICKY)])
+    for _ in range(4):
+        trust.update([window(HEALTHY, (0.0, 0.2), (0.0, 0.2))], firm={"V1"})
+        trust.update([window(STICKY, (8.0, 9.0))], firm={"V1"})
+    assert trust.trusted["V1"].static_interval == (4.5, 5.5)
+    trust.update([window(STICKY, (4.9, 5.1))], firm={"V1"})
+    assert trust.trusted["V1"].static_interval == (4.9, 5.1)
+
+
+def test_a_valve_that_is_kept_stays_as_it_is() -> None:
+    trust = Trust(["V1"], EXACT)
+    for _ in range(2):
+        trust.update([window(STICKY)])
+    trust.update([window(STICKY, (4.9, 5.1))], kept={"V1"})
+    assert trust.trusted["V1"].static_interval == (4.5, 5.5)
+
+
+@pytest.mark.parametrize("new", [None, TrustedFriction(7.0, (6.9, 9.0), 2.0, (1.9, 2.1))])
+def test_what_a_change_has_left_is_trusted_at_once(new: TrustedFriction | None) -> None:
+    trust = Trust(["V1"], EXACT)
+    for _ in range(2):
+        trust.update([window(STICKY)])
+    trust.renew("V1", new)
+    assert trust.trusted.get("V1") == new
+    trust.update([window(STICKY)])  # one window does not bring the old one back
+    assert trust.trusted.get("V1") == new
+
+
+def test_a_friction_that_is_not_settled_is_offered_just_above_what_failed() -> None:
+    old = TrustedFriction(5.0, (4.9, 5.1), 2.0, (1.9, 2.1))
+    wide = old.narrowed((7.1, 9.3), 2.05, (1.95, 2.15), anew=True)
+    assert not wide.settled
+    assert wide.static_friction == pytest.approx(1.01 * 7.1)
+    assert wide.offered_interval == (7.1, pytest.approx(1.06 * 7.1))
+    assert (wide.dynamic_friction, wide.dynamic_interval) == (2.0, (1.9, 2.1))
+    near = wide.narrowed((6.0, 7.8), 3.0, (2.9, 3.1), anew=False)
+    assert near.settled
+    assert near.static_interval == near.offered_interval == (7.1, 7.8)
+    assert near.static_friction == pytest.approx(7.45)
+    assert (near.dynamic_friction, near.dynamic_interval) == (3.0, (2.9, 3.1))
+
+
+@given(intervals, intervals, st.booleans())
+def test_whatever_moves_tell_the_offered_friction_lies_in_its_interval(
+    static: tuple[float, float], dynamic: tuple[float, float], anew: bool
+) -> None:
+    old = TrustedFriction(5.0, (4.9, 5.1), 2.0, (1.9, 2.1))
+    new = old.narrowed(static, sum(dynamic) / 2.0, dynamic, anew=anew)
+    low, high = new.static_interval
+    assert low <= new.static_friction <= max(high, 1.01 * low)
+    assert new.dynamic_interval[0] <= new.dynamic_friction <= new.dynamic_interval[1]
+    assert new.offered_interval[0] == low
+    assert new.offered_interval[1] <= high
+
+
+def test_only_what_a_controller_would_notice_is_a_difference() -> None:
+    old = TrustedFriction(5.0, (4.9, 5.1), 2.0, (1.9, 2.1))
+    near = TrustedFriction(5.03, (4.95, 5.1), 2.01, (1.9, 2.1))
+    far = TrustedFriction(5.2, (5.1, 5.3), 2.0, (1.9, 2.1))
+    assert alike({"V1": old}, {"V1": near})
+    assert not alike({"V1": old}, {"V1": far})
+    assert not alike({"V1": old}, {})
+    assert alike({}, {})

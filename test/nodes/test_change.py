@@ -1,0 +1,115 @@
+"""From estimate to swap on two valves, and valves that change, in the graph and without it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from graph import Graph
+
+from stiction_ros.config_files import find_config
+from stiction_ros.loop import LoopModel, read_valve_changes
+from stiction_ros.nodes.messages import SECOND, to_ns
+from stiction_ros.online.session import LiveRun, Scenario, run_live
+
+QUICK = {"fit_first": 400, "fit_every": 100, "fit_latency": 5}
+TANK = {"fit_first": 310, "fit_every": 62, "fit_latency": 5}
+GROWN = "[{time: 540.0, valve: V1, effects: [{effect: stiction, law: he, f_s: 7.5, f_d: 2.0}]}]"
+SERVICED = "[{time: 540.0, valve: V1, effects: []}]"
+
+# scenario, schedule of the fits, window, changes, samples, modes after the first
+CASES = {
+    "tank": ("tank", TANK, 620, "", 390, ["embedding"]),
+    "serviced": ("siso", QUICK, 500, SERVICED, 920, ["embedding", "unaware"]),
+    "grown": ("siso", QUICK, 500, GROWN, 720, ["embedding", "embedding", "embedding"]),
+}
+
+
+def run_graph(name: str) -> Graph:
+    """Run plant, controller and estimator to the plant's last sample."""
+    scenario, schedule, window, changes, samples, _ = CASES[name]
+    document = yaml.safe_load(find_config(f"{scenario}.scenario.yaml").read_text())
+    values: dict[str, dict[str, Any]] = {
+        node: dict(document[node]["ros__parameters"])
+        for node in ("plant", "controller", "estimator")
+    }
+    values["plant"].update(samples=samples, seed=1, valve_changes=changes)
+    values["controller"].update(schedule, horizon=30)
+    values["estimator"].update(schedule, window=window)
+    if scenario == "siso":
+        values["estimator"].update(delay_low=5, delay_high=5)
+    graph = Graph()
+    graph.listen("recorder")
+    nodes = {node: graph.add(node, given) for node, given in values.items()}
+    for node in nodes.values():
+        node.start()
+        assert node.failure == ""
+    for part in range(60, samples, 60):
+        graph.spin_until(lambda: len(graph.seen["op"]) >= part, f"sample {part}")  # noqa: B023
+    graph.spin_until(lambda: nodes["plant"].finished, "the plant's last sample")
+    graph.spin_until(lambda: len(graph.seen["prediction"]) == samples, "every prediction")
+    for node in nodes.values():
+        node.finish()
+    graph.spin_some()
+    return graph
+
+
+def run_core(name: str) -> LiveRun:
+    """Run the same without ROS."""
+    scenario, schedule, window, changes, samples, _ = CASES[name]
+    found = Scenario.load(find_config(f"{scenario}.scenario.yaml"))
+    estimator = dataclasses.replace(found.estimator, window=window, **schedule)
+    if scenario == "siso":
+        estimator = dataclasses.replace(estimator, delay_low=5, delay_high=5)
+    return run_live(
+        dataclasses.replace(
+            found,
+            samples=samples,
+            seed=1,
+            estimator=estimator,
+            controller=dataclasses.replace(found.controller, horizon=30, **schedule),
+            valve_changes=read_valve_changes(changes, found.plant.valve_names),
+        )
+    )
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_the_graph_does_what_the_core_does_from_estimate_to_swap(name: str) -> None:
+    graph, twin = run_graph(name), run_core(name)
+    try:
+        for topic in ("op", "pv", "stem"):
+            told = np.array([list(m.position) for m in graph.seen[topic]])
+            assert np.array_equal(told, getattr(twin.run.record, topic))
+        modes = [change.mode.value for change in twin.changes]
+        assert modes == ["unaware", *CASES[name][-1]]
+        told_modes = [m.data for m in graph.seen["mode"]]
+        assert told_modes[0] == "unaware"
+        assert told_modes[-1] == modes[-1]
+        check(name, graph, twin)
+    finally:
+        graph.close()
+
+
+def check(name: str, graph: Graph, twin: LiveRun) -> None:
+    """Look at what the estimator said last."""
+    model = LoopModel.from_yaml(graph.seen["loop_model"][-1].data)
+    entry = {str(e["valve"]): e for e in model.provenance}["V1"]
+    swap = twin.changes[-1].sample
+    start = to_ns(graph.seen["pv"][0].header.stamp)
+    step = round(twin.run.record.sample_time * SECOND)
+    assert model.document["valid_from"] == start + swap * step
+    if name == "tank":
+        assert [len(valve.effects) for valve in model.valves] == [1, 0]
+        assert "change" not in entry
+    elif name == "serviced":
+        assert model.valves[0].effects == ()
+        assert entry["change"] == "serviced"
+        assert 10 <= entry["last_samples"] <= swap - 540
+    else:
+        (friction,) = model.valves[0].effects
+        assert friction.static_friction == pytest.approx(7.5, abs=0.3)  # type: ignore[attr-defined]
+        assert entry["change"] == "changed"
+        assert entry["f_s_interval"][0] <= 7.5 <= entry["f_s_interval"][1]
