@@ -332,7 +332,7 @@ class LiveController:
             self._proven = self._in_trust()
         self._raised = self._returning = None
         self._take(change, controller)
-        self._watch.begin()
+        self._watch.begin(last_samples(change.model))
 
     def prediction(self, result: StepResult, points: int) -> tuple[FloatArray, FloatArray]:
         """Return the plan of the last step, thinned for a message.

@@ -47,7 +47,8 @@ class OfferRule:
     - A friction that is more than ``FAR`` from the one in force must be better by
       ``offer_ratio``, over all these samples or lately: that it is no worse says nothing where
       the valve has hardly moved.
-    - A model that says since when it holds is judged by the samples since then alone.
+    - A model that says since when it holds must not be worse by ``offer_ratio`` over the samples
+      since then; that it is the better one is what its estimator has tested.
     - A model that was rolled back must be better lately by ``offer_ratio`` to come again.
     """
 
@@ -84,12 +85,12 @@ class Judge:
         if not self.rule.offer_samples:
             return ""
         samples = min(self.last_samples or self.rule.offer_samples, there)
-        for j, law in enumerate(new.frictions):
-            slips = 0 if law is None else _slips(law, past.op[-samples:, j])
-            if law is not None and slips < (1 if self.last_samples else SLIPS):
-                return f"by it valve {j + 1} slipped {slips} times in the last {samples} samples"
         if self.last_samples:
-            return _worse(self.in_force, offered, past, samples, 1.0)
+            return _worse(self.in_force, offered, past, samples, self.rule.offer_ratio)
+        for j, law in enumerate(new.frictions):
+            slips = SLIPS if law is None else _slips(law, past.op[-samples:, j])
+            if slips < SLIPS:
+                return f"by it valve {j + 1} slipped {slips} times in the last {samples} samples"
         if self.offered_before:
             if _worse(self.in_force, offered, past, needed, 1.0 / self.rule.offer_ratio):
                 return "it was rolled back before, and is not clearly better lately"

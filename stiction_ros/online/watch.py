@@ -60,11 +60,16 @@ class Watch:
         if self.active and failed:
             self._failures += 1
 
-    def begin(self) -> None:
-        """Start judging: what was seen so far becomes the reference."""
+    def begin(self, last: int = 0) -> None:
+        """Start judging: what was seen so far becomes the reference.
+
+        Where the valve itself is known to have changed, that is the ``last`` samples since: a
+        controller for a valve that sticks more is not to be held against the time before.
+        """
         if self.rule.watch_samples == 0:
             return
-        self._reference = np.mean(self._recent, axis=0) if self._recent else None
+        before = self._recent[-last:]
+        self._reference = np.mean(before, axis=0) if before else None
         self._recent, self._failures, self.active = [], 0, True
 
     def stop(self) -> None:

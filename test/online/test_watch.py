@@ -121,3 +121,12 @@ def test_samples_behind_one_without_a_measurement_are_left_out() -> None:
             watch.add(np.array([9.0]), np.array([0.0]), False)
         assert watch.verdict() == ""
     assert feed(watch, 1.0, 40) == ""
+
+
+def test_after_a_change_of_the_valve_only_the_samples_since_are_the_reference() -> None:
+    for last, worse in ((0, True), (20, False)):
+        watch = Watch(RULE)
+        feed(watch, 1.0, 60)
+        feed(watch, 3.0, 20)
+        watch.begin(last)
+        assert bool(feed(watch, 3.0, 20)) == worse
