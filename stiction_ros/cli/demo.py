@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import signal
 import sys
@@ -71,7 +72,7 @@ def _run_scenario(
     name = scenario.name
     nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
     processes = NodeProcesses(nodes, directory)
-    begin = time.monotonic()
+    load, begin = os.getloadavg()[0], time.monotonic()
     try:
         try:
             processes.start()
@@ -84,7 +85,7 @@ def _run_scenario(
         return False
     seconds = time.monotonic() - begin
     show(0.92, f"{name}: reporting")
-    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds)
+    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds, load=load)
     show(1.0)
     _print(report.summary, directory)
     return bool(report.summary["status"] == "ok")
@@ -119,7 +120,8 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
     console.print(table)
     if summary["pv_to_op_ms"]:
         times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
-        console.print(f"{name}: PV to OP in ms: {times}")
+        load = summary["load_before"]
+        console.print(f"{name}: PV to OP in ms: {times}; load {load:.2f} before the run")
     for topic, count in summary["messages"].items():
         # The recorder cannot hold its own last message.
         lost = (count["published"] or 0) - count["recorded"] - (topic == "/diagnostics")

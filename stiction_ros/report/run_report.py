@@ -38,6 +38,7 @@ def report_run(
     scenario: Scenario | None = None,
     name: str | None = None,
     seconds: float | None = None,
+    load: float | None = None,
     namespace: str | None = None,
 ) -> RunReport:
     """Read a bag of a live loop and write ``summary.json``, ``report.html`` and the figures.
@@ -48,16 +49,19 @@ def report_run(
         scenario: that was run, for the comparison with a loop without friction.
         name: of the loop in the report; the scenario's or the bag's when not given.
         seconds: wall time of the run, when measured better than by the bag.
+        load: of the machine before the run, processes that want a core, where known.
         namespace: of the loop's topics, for a bag that holds several loops.
 
     Raises:
         InputError: as :func:`stiction_ros.records.run_log.read_run`.
     """
     log = read_run(bag, namespace=namespace)
-    return write_run(tell(log, scenario=scenario, name=name), out, seconds)
+    return write_run(tell(log, scenario=scenario, name=name), out, seconds, load)
 
 
-def write_run(story: Story, out: str | Path, seconds: float | None = None) -> RunReport:
+def write_run(
+    story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
+) -> RunReport:
     """Write what :func:`report_run` writes of a run that has been scored."""
     out = Path(out)
     alone = out.suffix.lower() == ".html"
@@ -66,7 +70,7 @@ def write_run(story: Story, out: str | Path, seconds: float | None = None) -> Ru
     drawings = [(drawing, drawing.png()) for drawing in draw_run(story)]
     target = out if alone else folder / "report.html"
     target.write_text(run_page(story, drawings), encoding="utf-8")
-    figures = summary(story, seconds)
+    figures = summary(story, seconds, load)
     files = [target]
     if not alone:
         write_json(figures, folder / "summary.json")

@@ -11,13 +11,16 @@ from stiction_ros.report.scoring import Phase
 from stiction_ros.report.story import Story
 
 
-def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
+def summary(
+    story: Story, seconds: float | None = None, load: float | None = None
+) -> dict[str, Any]:
     """Return the mapping of ``summary.json``; numbers that do not exist are null.
 
     Args:
         story: of the run.
         seconds: wall time of the run; without it the time between the first and the last
             publication in the bag.
+        load: of the machine before the run, where known.
     """
     log, record = story.log, story.record
     seconds = log.wall_seconds if seconds is None else seconds
@@ -31,6 +34,7 @@ def summary(story: Story, seconds: float | None = None) -> dict[str, Any]:
         "samples": len(record),
         "sample_time": record.sample_time,
         "seconds": seconds,
+        "load_before": load,
         "samples_per_second": len(record) / seconds if seconds > 0 else None,
         "swap_time": story.swap_time,
         "delay": {o["name"]: dict(o["delay"]) for o in story.identified.get("outputs", [])},
