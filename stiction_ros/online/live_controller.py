@@ -94,7 +94,7 @@ class LiveController:
         self._given_up = False
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
-        self._proven = self._in_trust()
+        self._proven = self._controller, self._known
         self.doubts: list[tuple[int, str]] = []  # samples at which an offer was not taken, and why
         self.changes: list[ModeChange] = [ModeChange(0, self._controller.mode, "start", model.name)]
 
@@ -329,7 +329,7 @@ class LiveController:
 
     def _commit_offer(self, change: HandOver, controller: MpcController) -> None:
         if not self._watch.active:  # what is on trial itself is nothing to go back to
-            self._proven = self._in_trust()
+            self._proven = self._controller, self._known
         self._raised = self._returning = None
         self._take(change, controller)
         self._watch.begin(last_samples(change.model))
@@ -359,9 +359,6 @@ class LiveController:
     def _note(self, reason: str, sample: int) -> None:
         mode = self._controller.mode
         self.changes.append(ModeChange(sample, mode, reason, self._known.name))
-
-    def _in_trust(self) -> tuple[MpcController, LoopModel]:
-        return self._controller, self._known
 
     def _roll_back(self, reason: str) -> None:
         """Return to the controller that was in force before the trial, on what it knew."""
