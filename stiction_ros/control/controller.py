@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Sequence
 
@@ -68,7 +69,10 @@ class MpcController:
         unaware = UnawareMpc(design.model, design.unaware, design.limits)
         self._formulation = self._build_formulation(unaware, known)
         stand_in = None if self._formulation is unaware else unaware
-        self._strategies = strategies(self._formulation, stand_in, design.fallback)
+        self._new_strategies = functools.partial(
+            strategies, self._formulation, stand_in, design.fallback
+        )
+        self._strategies = self._new_strategies()
         self._check = SlipCheck(m) if design.slip_check else None
         self._dv: FloatArray = np.zeros(design.model.e.shape[1])
         self._started = False
@@ -117,6 +121,7 @@ class MpcController:
     def forget(self) -> None:
         """Forget the past; the next measurement starts from rest, frictions stay known."""
         self._started, self._decided = False, None
+        self._strategies = self._new_strategies()  # no plan of the past is followed on
         if self._check is not None:
             self._check.drop()
 
@@ -231,6 +236,8 @@ class MpcController:
             self.observer.state, target, self.stem, applied, self.valves.forms, trouble
         )
         proposal, strategy = self._choose(situation)
+        if proposal.status is StepStatus.FALLBACK:
+            reach = np.inf  # it has a rate of its own
         op = self._valid(np.clip(proposal.op, applied - reach, applied + reach), applied)
         self._decide(op, proposal.plan)
         seconds = time.perf_counter() - begin

@@ -76,8 +76,14 @@ class ControllerInputs(ManagedNode):
             except InputError as error:
                 self.get_logger().error(f"a loop model is refused: {error}")
                 continue
+            except Exception as error:  # whatever is sent, it must not end the loop
+                self.get_logger().error(f"a loop model is refused: {type(error).__name__}")
+                continue
             valid_from = int(model.document.get("valid_from", 0))
-            self.live.offer(model, self.port.due(valid_from))
+            due = self.port.due(valid_from)
+            if self.settings.pace == "realtime":  # a stamp of an earlier run may be far off
+                due = min(due, self.port.next + self.settings.fit_latency)
+            self.live.offer(model, due)
             self.models.add(str(valid_from))
 
     def _on_applied(self, message: JointState) -> None:
@@ -108,7 +114,8 @@ class ControllerInputs(ManagedNode):
         self.port.add_preview(preview)
 
     def _on_stiction(self, message: JointState) -> None:
-        self.fits[to_ns(message.header.stamp)] = message.header.frame_id
+        if self.settings.pace == "lockstep":  # who waits for nobody need not remember
+            self.fits[to_ns(message.header.stamp)] = message.header.frame_id
         self._go_in_lockstep()
 
     def _on_model(self, message: String) -> None:

@@ -47,7 +47,6 @@ class EstimatorNode(ManagedNode):
         self._refused: Counter[str] = Counter()
         self._heard = dict.fromkeys(("pv", "op"), time.monotonic())
         self._sample = 0
-        self._pending: deque[tuple[int, Future[Identification]]] = deque()
         self._token = ""
         self._fits = self._failed = 0
         self._said = "no fit yet"
@@ -64,6 +63,7 @@ class EstimatorNode(ManagedNode):
         self._valves: tuple[str, ...] = ()
         self._outputs: tuple[str, ...] = ()
         self._pairs = self.settings.pairing()
+        self._pending: deque[tuple[int, Future[Identification]]] = deque()
         self._strange: Counter[tuple[str, ...]] = Counter()
 
     def linked(self) -> None:
@@ -218,12 +218,16 @@ class EstimatorNode(ManagedNode):
         while self._pending and self._pending[0][1].done():
             end, future = self._pending.popleft()
             if future.cancelled() or self.live is None:
+                if self.live is not None:
+                    self.live.drop(end)
                 continue
             stamp = self._pairs.stamp_of(end)
             try:
-                found = future.result()
+                update = self.live.conclude(end, future.result())
+                self.monitoring.learn(update)
             except Exception as error:  # one fit that fails must not end the estimator
                 self._failed += 1
+                self.live.drop(end)
                 self._said = f"window not usable: {error}"
                 if not isinstance(error, InputError):
                     self._said = f"fit failed: {error!r}"
@@ -231,8 +235,6 @@ class EstimatorNode(ManagedNode):
                 self._publish(stamp, None)
                 continue
             self._fits += 1
-            update = self.live.conclude(end, found)
-            self.monitoring.learn(update)
             self._announce(stamp, update)
         for finding in () if self.live is None else self.monitoring.collect():
             self.get_logger().warning(f"window to sample {finding.end}: {finding.text}")

@@ -62,6 +62,8 @@ class HandOver:
 
     def put_off(self, at: int) -> None:
         """Leave it to sample ``at``; what was prepared is dropped."""
+        if self._work is not None:
+            self._work.cancel()
         self.at, self._work = at, None
 
     def take(self, past: Past) -> Ready:

@@ -8,6 +8,7 @@ from typing import Any
 
 from stiction_ros.control import FrictionSpread
 from stiction_ros.effects.behaviour import Behaviour
+from stiction_ros.errors import is_finite
 from stiction_ros.loop import LoopModel
 
 ALIKE = 0.02  # share by which two estimates of one friction may differ
@@ -75,7 +76,7 @@ def _spread(friction: Behaviour, entry: Mapping[str, Any]) -> FrictionSpread | N
         if not isinstance(interval, list | tuple) or len(interval) != 2:
             return None
         low, high = interval
-        if not (isinstance(low, int | float) and isinstance(high, int | float)):
+        if not all(isinstance(end, int | float) and is_finite(end) for end in (low, high)):
             return None
         if not low <= value <= high:
             return None

@@ -137,6 +137,7 @@ class LiveController:
         self._past.clear()
         self._first, self._approach = True, None
         self._controller.forget()
+        self._watch.disturb()
         for change in (self._retuned, self._offered, self._returning):
             if change is not None:
                 change.put_off(change.at)
@@ -203,14 +204,22 @@ class LiveController:
             InputError: settings that do not fit; the old ones stay in force.
         """
         design = settings.design(self.model)
-        controller = self._build(design, self._known, settings.mode, self._raised)
+        self._build(design, self._known, settings.mode, self._raised)  # may refuse
         waiting = self._offered
         if waiting is not None:
             self._offered = self._offer_of(waiting.model, waiting.at, settings, design)
         self.settings, self._design = settings, design
+        if self._returning is not None:
+            self._returning.put_off(self._returning.at)
         self._prepare_ahead()
         self._watch.rule = settings
-        self._retuned = HandOver(self._sample, "settings changed", self._known, lambda: controller)
+        self._retuned = self._settings_change()
+
+    def _settings_change(self) -> HandOver:
+        make = functools.partial(
+            self._build, self._design, self._known, self.settings.mode, self._raised
+        )
+        return HandOver(self._sample, "settings changed", self._known, make)
 
     def pass_over(self, pv: FloatArray, dv: FloatArray | None = None) -> None:
         """Take in a sample that is not answered: OP stays, the observer goes on.
@@ -221,6 +230,7 @@ class LiveController:
         upset = self._upset(dv)
         self._controller.pass_over(pv, upset, self._in_force, known=self._sure)
         self._latest = self._in_force, np.array(pv, dtype=float), upset
+        self._watch.disturb()
         self._sample += 1
 
     def step(
@@ -259,9 +269,12 @@ class LiveController:
 
     def _approach_if_far(self, result: StepResult, pv: FloatArray, sp: FloatArray) -> None:
         """Approach the set-points from PV where the first plan after a start or hold goes far."""
-        first, self._first = self._first, result.mode is ControlMode.HOLD
-        if self._first or not first or result.plan is None:
+        if result.mode is ControlMode.HOLD or not self._first:
+            self._first = result.mode is ControlMode.HOLD
             return
+        if result.plan is None or not np.isfinite(pv).all():
+            return
+        self._first = False
         if np.any(np.abs(result.plan.op - self._in_force) > FIRST_MOVE):
             self._approach = Approach(pv, sp, self.settings.approach_samples)
 
@@ -282,6 +295,8 @@ class LiveController:
         controller, sample = self._controller, self._sample - 1
         if controller.raised:
             self._raised = controller.frictions
+            if self._retuned is not None:
+                self._retuned = self._settings_change()
             self._note(controller.raised, sample)
         given_up = result.mode is ControlMode.HOLD and controller.mode is not ControlMode.HOLD
         if given_up and not self._given_up:
@@ -292,9 +307,12 @@ class LiveController:
         self._given_up = given_up
 
     def _commit_what_is_due(self) -> None:
+        """Commit one after the other: what comes later was not prepared for what comes before."""
         self._retuned = self._commit(self._retuned, self._commit_settings)
-        self._returning = self._commit(self._returning, self._take)
-        self._offered = self._commit(self._offered, self._commit_offer)
+        if self._retuned is None:
+            self._returning = self._commit(self._returning, self._commit_return)
+        if self._retuned is None and self._returning is None:
+            self._offered = self._commit(self._offered, self._commit_offer)
 
     def _commit(
         self, change: HandOver | None, take: Callable[[HandOver, MpcController], None]
@@ -310,8 +328,9 @@ class LiveController:
             return change
         try:
             ready = change.take(self._past)
-        except InputError as error:
-            self.doubts.append((self._sample, str(error)))
+        except Exception as error:  # whatever an offer holds, it must not end the loop
+            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}"
+            self.doubts.append((self._sample, f"it cannot be prepared: {said}"))
             return None
         if ready.controller is None:
             self.doubts.append((self._sample, ready.doubt))
@@ -326,11 +345,17 @@ class LiveController:
         self._take(change, controller)
         if self._controller.mode is not before:
             self._watch.stop()  # a mode that the user has chosen is not judged
+            self._returning = None
+
+    def _commit_return(self, change: HandOver, controller: MpcController) -> None:
+        self._take(change, controller)
+        if self._offered is not None:
+            self._offered.put_off(self._offered.at)  # it was judged beside what has gone
 
     def _commit_offer(self, change: HandOver, controller: MpcController) -> None:
         if not self._watch.active:  # what is on trial itself is nothing to go back to
             self._proven = self._controller, self._known
-        self._raised = self._returning = None
+        self._raised = None
         self._take(change, controller)
         self._watch.begin(last_samples(change.model))
 
@@ -365,6 +390,7 @@ class LiveController:
         before, known = self._proven
         frictions, spreads = before.frictions, before.spreads
         self._rolled_back.append(self._controller.frictions)
+        self._rolled_back.append(frictions_of(self._known, self.model.valve_names))
         self._raised = None
 
         def make() -> MpcController:

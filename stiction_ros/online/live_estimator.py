@@ -169,6 +169,10 @@ class LiveEstimator:
         self._pv.clear()
         self._anchor = self._seen = None
 
+    def drop(self, end: int) -> None:
+        """Forget the window that ends at sample ``end``, whose fit has failed."""
+        self._waiting.pop(end, None)
+
     def conclude(self, end: int, found: Identification) -> FitUpdate:
         """Apply the rule of trust to the fit of the window that ends at sample ``end``.
 

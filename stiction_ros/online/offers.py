@@ -17,6 +17,7 @@ from stiction_ros.settings import setting
 
 Maker = Callable[[], MpcController]
 FAR = 0.25  # share by which a friction must differ to be another one, not a better estimate
+FEWEST = 50  # samples by which a model that says since when it holds is judged at least
 GAIN = 0.6  # largest share of the misfit that a friction of a healthy valve may leave
 OTHER_SIZES = (0.25, 0.5, 2.0)  # that an offered friction is compared with
 SIZE_RATIO = 1.25  # by which another size must explain the past better to speak against it
@@ -47,8 +48,9 @@ class OfferRule:
     - A friction that is more than ``FAR`` from the one in force must be better by
       ``offer_ratio``, over all these samples or lately: that it is no worse says nothing where
       the valve has hardly moved.
-    - A model that says since when it holds must not be worse by ``offer_ratio`` over the samples
-      since then; that it is the better one is what its estimator has tested.
+    - A model that says since when it holds, of a valve that was known to stick, must not be
+      worse by ``offer_ratio`` over the samples since then; that it is the better one is what its
+      estimator has tested.
     - A model that was rolled back must be better lately by ``offer_ratio`` to come again.
     """
 
@@ -84,8 +86,13 @@ class Judge:
             return f"only {there} samples of the past are known and {needed} are needed"
         if not self.rule.offer_samples:
             return ""
-        samples = min(self.last_samples or self.rule.offer_samples, there)
-        if self.last_samples:
+        gained = any(
+            old is None and found is not None
+            for old, found in zip(now.frictions, new.frictions, strict=True)
+        )
+        samples = min(self.rule.offer_samples, there)
+        if self.last_samples and not gained and not self.offered_before:
+            samples = min(max(self.last_samples, FEWEST), there)
             return _worse(self.in_force, offered, past, samples, self.rule.offer_ratio)
         for j, law in enumerate(new.frictions):
             slips = SLIPS if law is None else _slips(law, past.op[-samples:, j])
@@ -95,10 +102,7 @@ class Judge:
             if _worse(self.in_force, offered, past, needed, 1.0 / self.rule.offer_ratio):
                 return "it was rolled back before, and is not clearly better lately"
             return ""
-        if any(
-            old is None and found is not None
-            for old, found in zip(now.frictions, new.frictions, strict=True)
-        ):
+        if gained:
             return self._unearned(new, past, samples)
         better = 1.0 / self.rule.offer_ratio
         asked = better if _far(now.frictions, new.frictions) else self.rule.offer_ratio

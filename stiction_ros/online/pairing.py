@@ -11,6 +11,7 @@ from stiction_ros.effects.behaviour import FloatArray
 
 UNPAIRED = 5000  # samples of PV kept while their OP is missing
 FAR = 100  # samples ahead: a stamp beyond is another clock, not a gap
+SILENT = 20  # PVs without op_applied after which op counts again
 NEW_RUN = 10  # rising stamps in succession, all too old or too far ahead, are a new run
 BRIDGED = 3  # samples in succession
 BRIDGED_SHARE = 0.01  # of the window
@@ -41,7 +42,8 @@ class PairedSample:
 class Pairing:
     """Pairs by stamp; samples come out in order, each once.
 
-    - A PV is paired with ``op_applied`` once one has been seen, else with ``op``. One whose OP
+    - A PV is paired with ``op_applied`` once one has been seen, else with ``op``; also when
+      ``op_applied`` has not come for ``SILENT`` PVs. One whose OP
       never came (a later one did) takes the OP before it, which was held.
     - A stamp that was there already, that is older or more than ``FAR`` samples ahead is left
       out. ``NEW_RUN`` of these in succession that rise are a new run; a single one does nothing.
@@ -64,6 +66,8 @@ class Pairing:
         self._op: dict[int, FloatArray] = {}
         self._past: deque[tuple[int, FloatArray]] = deque(maxlen=2 * FAR)  # used OPs, rising
         self._applied = False
+        self._sent: dict[int, FloatArray] = {}  # OPs that were sent while op_applied tells
+        self._untold = 0  # PVs since the last op_applied
         self._last: int | None = None
         self._strays: list[tuple[int, FloatArray]] = []
         self._begins = False
@@ -98,16 +102,26 @@ class Pairing:
                 return self._stray(stamp, pv, self._last)
         self._strays.clear()
         self._accept(stamp, pv)
+        self._untold += 1
+        if self._applied and self._untold > SILENT:
+            self._applied, self._op = False, {**self._op, **self._sent}
+            self._sent = {}
         return self._complete()
 
     def add_op(self, stamp: int, op: FloatArray) -> list[PairedSample]:
         """Take in an OP that was sent and return the samples that are complete now."""
-        return [] if self._applied else self._take_op(stamp, op)
+        if not self._applied:
+            return self._take_op(stamp, op)
+        self._sent[stamp] = op
+        if len(self._sent) > 2 * SILENT:
+            del self._sent[next(iter(self._sent))]
+        return []
 
     def add_applied(self, stamp: int, op: FloatArray) -> list[PairedSample]:
         """Take in an OP that the valves were given and return the samples complete now."""
+        self._untold = 0
         if not self._applied:
-            self._applied = True
+            self._applied, self._sent = True, {}
             self._op = {sent: value for sent, value in self._op.items() if sent < stamp}
         return self._take_op(stamp, op)
 

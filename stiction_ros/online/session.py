@@ -219,6 +219,7 @@ class _Loop:
         try:
             found = fit(record, estimator.settings.options())
         except InputError:
+            estimator.drop(self._sample)
             return  # a window that cannot be used changes nothing, as in the node
         update = estimator.conclude(self._sample, found)
         self.fits.append(update)

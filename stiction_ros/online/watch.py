@@ -9,6 +9,8 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.settings import setting
 
+FEWEST = 20  # samples of a reference, where there are so many
+
 
 @dataclasses.dataclass(frozen=True)
 class WatchRule:
@@ -47,7 +49,7 @@ class Watch:
         Neither do the samples behind it, as behind a move of the set-point.
         """
         if not (np.isfinite(pv).all() and np.isfinite(sp).all()):
-            self._since_move = 0
+            self.disturb()
             return
         if self._last_sp is not None and not np.array_equal(sp, self._last_sp):
             self._since_move = 0
@@ -68,9 +70,14 @@ class Watch:
         """
         if self.rule.watch_samples == 0:
             return
-        before = self._recent[-last:]
-        self._reference = np.mean(before, axis=0) if before else None
+        before = self._recent[-max(last, FEWEST) :] if last else self._recent
+        if not self.active:  # what is on trial itself is no reference
+            self._reference = np.mean(before, axis=0) if before else None
         self._recent, self._failures, self.active = [], 0, True
+
+    def disturb(self) -> None:
+        """Leave out the next samples, as behind a move of the set-point."""
+        self._since_move = 0
 
     def stop(self) -> None:
         """Stop judging."""

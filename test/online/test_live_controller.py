@@ -500,6 +500,91 @@ def test_a_roll_back_too_is_prepared_beside_the_loop() -> None:
     assert run.live.mode is ControlMode.UNAWARE
 
 
+def test_settings_that_change_while_an_offer_waits_do_not_undo_it() -> None:
+    background = Later()
+    run = Run(LiveController(SETTINGS, PROCESS, background))
+    run.go(60)
+    run.live.offer(KNOWN, 60)
+    run.live.retune(settings(horizon=30))
+    background.do()
+    for _ in range(6):
+        run.go(1)
+        background.do()
+    assert run.live.mode is ControlMode.EMBEDDING
+    assert run.live.observed.design.unaware.horizon == 30
+
+
+def test_no_offer_is_taken_while_a_roll_back_is_on_its_way() -> None:
+    background = Later()
+    run = Run(LiveController(watched(), PROCESS, background))
+    run.go(350)
+    run.live.offer(WORSE, 350)
+    background.do()
+    while not background.work:
+        run.go(1)
+        assert len(run.op) < 1000
+    run.live.offer(PROCESS.with_valve_effects({"V1": [HeStiction(6.0, 1.0)]}), 0)
+    run.go(3)
+    background.do()
+    run.go(1)
+    assert run.live.changes[-1].reason.startswith("rolled back")
+    assert run.live._proven[0].frictions == (None,)
+
+
+@pytest.mark.parametrize("error", [OverflowError("too large"), ValueError("no"), KeyError("x")])
+def test_an_offer_that_fails_in_any_way_does_not_end_the_loop(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(10)
+    monkeypatch.setattr("stiction_ros.online.live_controller.spreads_of", fail)
+    run.live.offer(KNOWN, 10)
+    run.go(5)
+    assert type(error).__name__ in run.live.doubts[0][1]
+    assert run.live.mode is ControlMode.UNAWARE
+
+
+def test_intervals_that_are_no_numbers_are_not_taken() -> None:
+    document = KNOWN.to_mapping()
+    document["provenance"] = [
+        {
+            "valve": "V1",
+            "effect": "stiction",
+            "f_s_interval": [0, 10**400],
+            "f_d_interval": [0, 1],
+        }
+    ]
+    run = Run(LiveController(SETTINGS, PROCESS))
+    run.go(10)
+    run.live.offer(LoopModel.from_mapping(document), 10)
+    run.go(5)
+    assert run.live.observed.spreads == (None,)
+
+
+def test_a_new_run_does_not_follow_the_plan_of_the_last_one() -> None:
+    live = LiveController(settings(approach_samples=20), PROCESS)
+    for _ in range(40):
+        live.step(np.array([50.0]), np.array([60.0]))
+    live.begin(np.array([20.0]))
+    blind = [float(live.step(np.array([np.nan]), np.array([60.0])).op[0]) for _ in range(3)]
+    assert blind == [20.0] * 3
+    seen = live.step(np.array([50.0]), np.array([60.0]))
+    assert abs(seen.op[0] - 20.0) <= 1.0
+    assert np.isfinite(live.step(np.array([50.0]), np.array([60.0])).op).all()
+    assert live.observed.mode is ControlMode.UNAWARE
+
+
+def test_the_way_to_the_fallback_has_a_rate_of_its_own() -> None:
+    rule = settings(hold_after=1, fallback_after=2, fallback_op=(20.0,), fallback_rate=(5.0,))
+    live = LiveController(rule, PROCESS)
+    live.step(np.array([50.0]), np.array([50.0]))
+    op = [float(live.step(np.array([np.nan]), np.array([50.0])).op[0]) for _ in range(12)]
+    assert np.diff(op)[3:7] == pytest.approx([-5.0] * 4)
+
+
 # ---- what is said ------------------------------------------------------------------------------
 
 

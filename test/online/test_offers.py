@@ -81,9 +81,21 @@ def test_a_model_that_says_since_when_it_holds_is_judged_by_these_samples() -> N
     history = joined(CYCLE, CALM)
     assert "no better" in Judge(OfferRule(offer_ratio=1.1), TRUE).doubt(NONE, history)
     assert Judge(RULE, TRUE, last_samples=250).doubt(NONE, history) == ""
-    assert "no better" in Judge(RULE, NONE, last_samples=250).doubt(TRUE, history)
+    grown = knowing(HeStiction(7.5, 2.0))
+    assert "no better" in Judge(RULE, TRUE, last_samples=900).doubt(grown, CYCLE)
 
 
 def test_the_friction_in_force_is_never_doubted() -> None:
     short = History(*(rows[:5] for rows in one_of(CYCLE)))
     assert Judge(RULE, TRUE).doubt(TRUE, short) == ""
+
+
+def test_a_friction_of_a_healthy_valve_must_earn_itself_whatever_it_says_of_since_when() -> None:
+    poison = knowing(HeStiction(20.0, 1.0))
+    assert Judge(RULE, NONE, last_samples=1).doubt(poison, CYCLE)
+    assert Judge(RULE, NONE, last_samples=10**30).doubt(poison, CYCLE)
+
+
+def test_what_was_rolled_back_is_not_judged_by_its_own_samples_alone() -> None:
+    judge = Judge(RULE, TRUE, offered_before=True, last_samples=250)
+    assert "rolled back before" in judge.doubt(NONE, joined(CYCLE, CALM))

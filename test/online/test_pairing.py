@@ -234,3 +234,16 @@ def test_no_junk_stops_what_comes_after_it(junk):
     found = stream(pairing, range(2 * 10**6, 2 * 10**6 + 25))
     good = [s for s in found if np.isfinite(s.pv).all() and not s.bridged]
     assert [float(s.pv[0]) for s in good[-10:]] == [2 * 10**6 + 15 + k for k in range(10)]
+
+
+def test_when_op_applied_falls_silent_op_counts_again():
+    pairing = Pairing(1.0)
+    pairing.add_applied(-SECOND, value(0))
+    found = []
+    for k in range(60):
+        found += pairing.add_pv(k * SECOND, value(k)) + pairing.add_op(k * SECOND, value(k))
+    assert [s.sample for s in found][-20:] == list(range(40, 60))
+    assert all(s.op == s.sample for s in found[-20:])
+    pairing.add_applied(60 * SECOND, value(7))
+    (last,) = pairing.add_pv(60 * SECOND, value(60))
+    assert last.op == 7.0

@@ -130,3 +130,17 @@ def test_after_a_change_of_the_valve_only_the_samples_since_are_the_reference() 
         feed(watch, 3.0, 20)
         watch.begin(last)
         assert bool(feed(watch, 3.0, 20)) == worse
+
+
+def test_what_is_taken_while_one_is_on_trial_is_held_against_the_time_before_both() -> None:
+    watch = swapped()
+    feed(watch, 5.0, 10)
+    watch.begin()
+    assert feed(watch, 5.0, 20)
+
+
+def test_samples_behind_a_disturbance_are_left_out() -> None:
+    watch = swapped()
+    for _ in range(20):
+        watch.disturb()
+        assert feed(watch, 9.0, RULE.watch_settle) == ""
