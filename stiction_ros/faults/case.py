@@ -181,8 +181,8 @@ class _Watched:
         """Return whether nothing more is to be expected: to wait longer would tell no more."""
         now = time.monotonic()
         loop, fault = self._loop, self._fault
-        if loop.pace in fault.ends and all(loop.nodes[name].code is not None for name in LOOP):
-            return True
+        if loop.pace in fault.ends:
+            return all(loop.nodes[name].code is not None for name in LOOP)
         if now - self._over < LOOK:
             return False
         seen = self.observation(now)
