@@ -109,7 +109,7 @@ class Candidate(ABC):
     """One change of the current model.
 
     Attributes:
-        place, effect: as DESIGN names them, such as ``valve:V1`` and ``stiction``.
+        place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``.
         axes: of the figures that are searched; may be empty.
         factors: number of figures that least squares finds.
         twins: places and effects that no record of OP and PV tells from this one.

@@ -25,7 +25,7 @@ class DataFinding:
     """An effect that the recorded values themselves show.
 
     Attributes:
-        place, effect: as DESIGN names them.
+        place, effect: as loop models name them.
         behaviour: with its figures.
         delta_bic: by how much shorter the values are told with it.
         record: index of the record.

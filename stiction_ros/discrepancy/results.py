@@ -23,7 +23,7 @@ class FoundEffect:
     """One effect that the simulation lacked.
 
     Attributes:
-        place, effect: as DESIGN names them.
+        place, effect: as loop models name them.
         parameters: in engineering units, times in seconds since the first sample.
         intervals: 95 % of each parameter that has one.
         delta_bic: BIC by which it beats the model without it.

@@ -35,7 +35,7 @@ class Testable:
     """Whether one effect of engineering size would be seen.
 
     Attributes:
-        place, effect: as DESIGN names them.
+        place, effect: as loop models name them.
         expected: BIC that it would gain on this record.
         testable: whether that beats the margin.
         experiment: what would make it testable.
