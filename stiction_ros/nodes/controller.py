@@ -120,7 +120,6 @@ class ControllerNode(ControllerInputs):
         """End what is done beside the loop; a node that was never configured has nothing."""
         if hasattr(self, "live"):
             self.live.close()
-            self.background.close()
 
     def linked(self) -> None:
         self._running_since = time.monotonic()

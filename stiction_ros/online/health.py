@@ -39,10 +39,6 @@ class Noticed:
         self._found[name] = _Noticed(level, text, self._clock() + self._shown)
         return new
 
-    def forget(self, name: str) -> None:
-        """End a condition at once."""
-        self._found.pop(name, None)
-
     @property
     def level(self) -> str:
         """The worst level in force: ok, warn or error."""

@@ -244,13 +244,14 @@ class LiveController:
         self._settle()
         upset = self._upset(dv)
         self._commit_what_is_due()
-        approaching = self._approach is not None and not self._approach.over
+        if self._approach is not None and self._approach.over:
+            self._approach = None
         result = self._controller.step(
             pv,
-            self._approach.aim(sp) if self._approach is not None and approaching else sp,
+            sp if self._approach is None else self._approach.aim(sp),
             upset,
             self._in_force,
-            None if approaching else preview,
+            preview if self._approach is None else None,
             known=self._sure,
             reach=FIRST_MOVE if self._first else np.inf,
         )
@@ -329,7 +330,7 @@ class LiveController:
         try:
             ready = change.take(self._past)
         except Exception as error:  # whatever an offer holds, it must not end the loop
-            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}"
+            said = str(error) if isinstance(error, InputError) else type(error).__name__
             self.doubts.append((self._sample, f"it cannot be prepared: {said}"))
             return None
         if ready.controller is None:

@@ -484,7 +484,8 @@ def test_an_offer_that_is_not_ready_in_time_is_taken_when_it_is() -> None:
     assert modes(run.live) == [(0, "unaware"), (67, "embedding")]
 
 
-def test_a_roll_back_too_is_prepared_beside_the_loop() -> None:
+def about_to_roll_back() -> tuple[Run, Later]:
+    """A loop whose watch has found the controller worse, the one before not yet prepared."""
     background = Later()
     run = Run(LiveController(watched(), PROCESS, background))
     run.go(350)
@@ -493,6 +494,11 @@ def test_a_roll_back_too_is_prepared_beside_the_loop() -> None:
     while not background.work:
         run.go(1)
         assert len(run.op) < 1000
+    return run, background
+
+
+def test_a_roll_back_too_is_prepared_beside_the_loop() -> None:
+    run, background = about_to_roll_back()
     run.go(3)
     assert run.live.mode is ControlMode.EMBEDDING
     background.do()
@@ -515,14 +521,7 @@ def test_settings_that_change_while_an_offer_waits_do_not_undo_it() -> None:
 
 
 def test_no_offer_is_taken_while_a_roll_back_is_on_its_way() -> None:
-    background = Later()
-    run = Run(LiveController(watched(), PROCESS, background))
-    run.go(350)
-    run.live.offer(WORSE, 350)
-    background.do()
-    while not background.work:
-        run.go(1)
-        assert len(run.op) < 1000
+    run, background = about_to_roll_back()
     run.live.offer(PROCESS.with_valve_effects({"V1": [HeStiction(6.0, 1.0)]}), 0)
     run.go(3)
     background.do()
