@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
+import dataclasses
+import functools
+import os
 import shutil
 import signal
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.node_processes import require_ros, ros_environment
-from stiction_ros.cli.progress import bar
+from stiction_ros.cli.seeds import run_each
 from stiction_ros.errors import InputError
 from stiction_ros.faults.catalogue import FAULTS, find, table
 from stiction_ros.faults.fault import Fault, Pace, Phase
 from stiction_ros.faults.judge import Outcome
 
+DOMAINS = 101  # of ROS whose ports lie below those that systems give away by themselves
 Case = tuple[Fault, Pace, Phase]
 
 
@@ -28,8 +31,8 @@ def add(commands: Any) -> None:
         "faults",
         help="put faults into a running graph and judge what becomes of it",
         description="Start the nodes of a loop as processes, put one fault into it, and hold "
-        "what is seen against what is expected: before and after the swap, in both paces, one "
-        "case after another. docs/faults.md tells all of them.",
+        "what is seen against what is expected: before and after the swap, in both paces. "
+        "docs/faults.md tells all of them.",
     )
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument(
@@ -47,6 +50,9 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--out", metavar="DIR", help="keep logs and bags of cases that fail here (out/faults)"
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="loops that run at a time (1)"
     )
     parser.add_argument("--json", metavar="F", help="write every outcome; - for stdout")
     parser.set_defaults(run=run)
@@ -68,6 +74,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("no case is left", fix="leave --pace and --phase out")
     if not options.speed > 0.0:
         raise InputError(f"{options.speed:g} is not positive", where="--speed")
+    if options.jobs < 1:
+        raise InputError(f"{options.jobs} is not positive", where="--jobs")
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)
     outcomes = run_cases(cases, options)
@@ -79,36 +87,41 @@ def run(options: argparse.Namespace) -> int:
 
 
 def run_cases(cases: Sequence[Case], options: argparse.Namespace) -> list[Outcome]:
-    """Run one case after another; logs and bags of those that fail are kept."""
+    """Run every case, ``--jobs`` at a time; logs and bags of those that fail are kept."""
+    first = int(ros_environment()["ROS_DOMAIN_ID"])
+    asked = [
+        _Asked(fault.name, pace, phase, first + place)
+        for place, (fault, pace, phase) in enumerate(cases)
+    ]
+    kept = Path(options.out or "out/faults")
+    work = functools.partial(_run, kept, options.seed, options.speed)
+    return run_each(work, asked, options.jobs, f"faults: {len(cases)} cases")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Asked:
+    """One case as a worker process can be given it; those that run at a time differ in domain."""
+
+    fault: str
+    pace: Pace
+    phase: Phase
+    domain: int
+
+    @property
+    def title(self) -> str:
+        return f"{self.fault}-{self.pace}-{self.phase}"
+
+
+def _run(kept: Path, seed: int, speed: float, asked: _Asked) -> Outcome:
     from stiction_ros.faults.case import Options, run_case
 
-    kept = Path(options.out or "out/faults")
-    outcomes = []
-    with _domain(), bar("faults") as show:
-        for number, (fault, pace, phase) in enumerate(cases):
-            title = f"{fault.name}-{pace}-{phase}"
-            show(number / len(cases), title)
-            with tempfile.TemporaryDirectory(prefix="stiction_fault_") as folder:
-                settings = Options(options.seed, options.speed)
-                outcome = run_case(fault, pace, phase, Path(folder), settings)
-                if not outcome.passed:
-                    _keep(Path(folder), kept / title)
-            outcomes.append(outcome)
-    return outcomes
-
-
-@contextlib.contextmanager
-def _domain() -> Iterator[None]:
-    """Give all cases the same environment: this machine only, a domain of its own."""
-    import os
-
-    before = os.environ.get("ROS_DOMAIN_ID")
-    os.environ["ROS_DOMAIN_ID"] = ros_environment()["ROS_DOMAIN_ID"]
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["ROS_DOMAIN_ID"]
+    os.environ["ROS_DOMAIN_ID"] = str(asked.domain % DOMAINS)
+    with tempfile.TemporaryDirectory(prefix="stiction_fault_") as folder:
+        settings = Options(seed, speed)
+        outcome = run_case(find(asked.fault), asked.pace, asked.phase, Path(folder), settings)
+        if not outcome.passed:
+            _keep(Path(folder), kept / asked.title)
+    return outcome
 
 
 def _keep(folder: Path, target: Path) -> None:
@@ -155,7 +168,7 @@ def _print(outcomes: Sequence[Outcome]) -> None:
             console.print(f"{one.fault}, {one.pace}, {one.phase}: {reason}", markup=False)
     passed = sum(one.passed for one in outcomes)
     seconds = sum(one.seconds for one in outcomes)
-    console.print(f"{passed} of {len(outcomes)} cases pass, {seconds / 60:.1f} minutes")
+    console.print(f"{passed} of {len(outcomes)} cases pass, {seconds / 60:.1f} minutes of loops")
 
 
 def _seconds(value: float | None) -> str:

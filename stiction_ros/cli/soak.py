@@ -30,7 +30,13 @@ def add(commands: Any) -> None:
         f"missed, or when a node's memory at the end is more than {GROWTH - 1:.0%} above that at "
         "a tenth of the run.",
     )
-    parser.add_argument("scenario", nargs="?", default="siso", metavar="SCENARIO")
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default="siso",
+        metavar="SCENARIO",
+        help="siso, tank, or a file (siso)",
+    )
     parser.add_argument("--hours", type=float, metavar="H", help="wall time")
     parser.add_argument("--samples", type=int, metavar="N", help="samples, in place of hours")
     parser.add_argument(

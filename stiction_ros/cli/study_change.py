@@ -59,7 +59,7 @@ def add(commands: Any) -> None:
         help="run a scenario whose sticky valve changes after the swap, without ROS",
         description="Run a scenario's live loop over many seeds by the core, without ROS; once the "
         "controller knows the friction, the valve changes: serviced (no friction is left), "
-        "little (f_S .2 %%, f_D .1 %%), grown (f_S half as large again), both (f_D as well), or "
+        "little (f_S .2 %, f_D .1 %), grown (f_S half as large again), both (f_D as well), or "
         "unchanged. Exit code 1 when a run did not do what is asked.",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
