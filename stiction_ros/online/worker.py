@@ -18,11 +18,14 @@ from stiction_ros.records import Record
 
 T = TypeVar("T")
 
+POLITE = 10  # by which a fit stands back behind what has to be in time, as nice does
+
 
 class FitWorker:
     """One process that runs one fit after the other, in order.
 
-    It leaves interrupts to its parent and dies with it. When it dies alone, as for want of
+    It stands back behind the loop, whose samples cannot wait for a fit on a machine that is
+    busy. It leaves interrupts to its parent and dies with it. When it dies alone, as for want of
     memory, the fits it had fail and the next one gets a new process.
     """
 
@@ -75,6 +78,7 @@ class FitWorker:
 def _settle() -> None:
     """Prepare the worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(POLITE)
     parent = multiprocessing.parent_process()
     if parent is not None and parent.pid is not None:
         die_with_parent(signal.SIGKILL, parent.pid)

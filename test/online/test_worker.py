@@ -34,3 +34,11 @@ def test_a_process_that_still_compiles_is_not_waited_for() -> None:
     begin = time.monotonic()
     worker.close()  # at once: the process has not even loaded its modules
     assert time.monotonic() - begin < 1.0
+
+
+def test_a_fit_stands_back_behind_the_loop() -> None:
+    worker = FitWorker()
+    try:
+        assert os.getpriority(os.PRIO_PROCESS, worker.pid) > os.getpriority(os.PRIO_PROCESS, 0)
+    finally:
+        worker.close()
