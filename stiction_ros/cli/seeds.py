@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import TypeVar
 
 from stiction_ros.cli.progress import bar
 
 T = TypeVar("T")
+K = TypeVar("K")
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
@@ -41,18 +42,30 @@ def run_seeds(work: Callable[[int], T], seeds: tuple[int, int], jobs: int, text:
         text: of the bar.
     """
     wanted = range(seeds[0], seeds[1] + 1)
+    return run_all(work, wanted, jobs, f"{text}: {len(wanted)} seeds")
+
+
+def run_all(work: Callable[[K], T], items: Sequence[K], jobs: int, text: str) -> list[T]:
+    """Return ``work(item)`` of every item, in their order, with a progress bar.
+
+    Args:
+        work: a function that a worker process can be given.
+        items: what a worker process can be given.
+        jobs: worker processes; one at least.
+        text: of the bar.
+    """
     done: dict[int, T] = {}
     context = multiprocessing.get_context("spawn")
     with (
-        bar(f"{text}: {len(wanted)} seeds") as show,
+        bar(text) as show,
         ProcessPoolExecutor(max(jobs, 1), mp_context=context) as pool,
     ):
-        futures = {pool.submit(work, seed): seed for seed in wanted}
+        futures = {pool.submit(work, item): place for place, item in enumerate(items)}
         try:
             for future in as_completed(futures):
                 done[futures[future]] = future.result()
-                show(len(done) / len(wanted))
+                show(len(done) / len(items))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return [done[seed] for seed in wanted]
+    return [done[place] for place in range(len(items))]
