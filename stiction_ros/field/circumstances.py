@@ -179,6 +179,8 @@ def draw_circumstances(random: np.random.Generator) -> Circumstances:
         },
     )
     sampling = _choice(random, {Sampling.USUAL: 68, Sampling.FAST: 18, Sampling.SLOW: 14})
+    if friction is Friction.FEW_SLIPS and random.random() < 0.7:
+        sampling = Sampling.FAST
     keeping = _choice(
         random,
         {
@@ -210,7 +212,7 @@ def draw_circumstances(random: np.random.Generator) -> Circumstances:
         manual=random.random() < 0.08,
         manual_marked=random.random() < 0.6,
         noise_colour=float(random.choice([0.0, 0.0, 2.0, 6.0])),
-        samples=_samples(random),
+        samples=_samples(random, friction),
     )
 
 
@@ -220,6 +222,8 @@ def _outside(random: np.random.Generator, friction: Friction, law: Law, plant: P
         if random.random() < QUIET:
             return Outside.NOTHING
         return _choice(random, {**waves, Outside.RINGING: 16, Outside.SET_POINT: 9})
+    if friction is Friction.FEW_SLIPS:
+        return Outside.NOTHING
     # A deadband moves by itself in loops that integrate twice; elsewhere something moves it.
     moved = law is Law.BACKLASH and plant is not Plant.LEVEL
     if moved or random.random() < SECOND_CAUSE:
@@ -237,9 +241,9 @@ def _scan_ratio(random: np.random.Generator, sampling: Sampling, keeping: Keepin
     return float(random.choice([1.0, 1.0, 1.0, 2.0, 5.0]))
 
 
-def _samples(random: np.random.Generator) -> int:
+def _samples(random: np.random.Generator, friction: Friction) -> int:
     draw = random.random()
-    if draw < 0.1:
+    if draw < 0.1 or friction is Friction.FEW_SLIPS:
         return int(random.integers(500, 700))
     if draw < 0.9:
         return int(random.integers(700, 2000))

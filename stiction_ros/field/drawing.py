@@ -141,7 +141,7 @@ def _valve(
         damping=random.uniform(0.5, 1.5),
         lag=random.uniform(0.1, 0.7) * scan,
         positioner=positioner,
-        stribeck=max(0.05 * static * (1.0 - share) * (1.0 + positioner) / natural, 1e-6),
+        stribeck=max(_log(random, 1e-4, 5e-4) * static * (1.0 + positioner) / natural, 1e-9),
     )
     return band, Valve(c.law, static, share * static, stem)
 
@@ -215,6 +215,8 @@ class _Acting:
         else:
             size = _log(random, 0.1, 0.6)
         slow = 1.0 if self.c.outside is Outside.RINGING else 3.0
+        if self.c.friction is Friction.FEW_SLIPS:
+            slow = 15.0
         drift = size * loads.coloured(
             random, self.count, slow * _log(random, 1.0, 10.0) * self.time
         )

@@ -113,9 +113,9 @@ def _correction(c: Circumstances, loop: FieldLoop) -> float:
     if c.friction is Friction.NONE and loop.truth.band_share > NEGLIGIBLE:
         return 0.5
     if c.friction is Friction.FEW_SLIPS and loop.judged_slips >= MANY:
-        return 1.4
+        return 1.1
     if c.friction is Friction.MUCH and loop.truth.band_share < MATTERS:
-        return 1.4
+        return 1.2
     return 1.0
 
 

@@ -132,7 +132,7 @@ def archived(
         mask[manual] = Quality.MANUAL
     rows = np.arange(len(op))
     gaps: tuple[Gap, ...] = ()
-    sample_time = steps * made.loop.clock.step
+    sample_time = float(f"{steps * made.loop.clock.step:.9g}")
     if c.hole is Hole.ROWS:
         op, pv, sp, mask = _with_missing_rows(random, op, pv, sp, mask)
     elif c.hole is Hole.BAD:

@@ -104,7 +104,7 @@ def flow(random: np.random.Generator) -> Process:
 
     References:
         C. A. Smith, A. B. Corripio: Principles and Practice of Automatic Process Control, 3rd
-        ed., Wiley 2006, section 5-2 (installed characteristic).
+        ed., Wiley 2006, chapter 5 (installed characteristic).
     """
     inertia, sensor = _log(random, 0.3, 3.0), _log(random, 0.3, 2.0)
     full = _log(random, 10.0, 500.0)
@@ -284,7 +284,7 @@ def exchanger(random: np.random.Generator) -> Process:
 
     References:
         K. M. Hangos, J. Bokor, G. Szederkényi: Analysis and Control of Nonlinear Process
-        Systems, Springer 2004, section 4.3 (heat exchanger cells).
+        Systems, Springer 2004, chapter 4 (heat exchanger cells).
     """
     residence = _log(random, 5.0, 40.0)  # s of the cold side
     per_cell = kernels.CELLS / residence
