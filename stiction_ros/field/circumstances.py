@@ -1,13 +1,13 @@
 """Under which circumstances a loop of the field is recorded; what occurs, and how often.
 
-Half of the loops have friction that matters. Bands are 1 to 10 % of travel, as surveys of
-plants and the cited valve tests find them, and are drawn evenly over their logarithm; a valve
-that does not matter has less than a twentieth of what OP moves. Jumps are 15 to 60 % of the
-breakaway for stems (static over Coulomb friction of 1.2 and more is published) and any share
-for He's law. OP works between 25 and 70 %. Noise is .02 to .25 of what the band makes of PV, and
-.03 to .5 % of the valve where there is none. A cause from outside swings as much as 2 to 10 % of
-the valve would. Lengths are 500 to 4000 samples, mostly 700 to 2000, as historians are asked for
-a shift or a day.
+Half of the loops have friction that matters. Bands are 1 to 10 % of travel, as valves of plants
+are reported with, and are drawn evenly over their logarithm; a valve that does not matter has
+less than a twentieth of what OP moves. Coulomb friction is 50 to 88 % of the static one (1.2
+times as much static friction is published for several valves), f_D any share of f_S. OP works
+between 25 and 70 %. Noise is .02 to .25 of what the band makes of PV, less where the controller
+would pass it on to the valve, and .03 to .5 % of the valve where there is no friction. A cause
+from outside swings as much as 2 to 10 % of the valve would. Lengths are 500 to 4000 samples,
+mostly 700 to 2000, as historians are asked for a shift or a day.
 """
 
 from __future__ import annotations

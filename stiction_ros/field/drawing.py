@@ -32,9 +32,11 @@ INTERVALS = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0, 60.0, 12
 PER_TIME = {Sampling.USUAL: (2.0, 6.0), Sampling.FAST: (8.0, 30.0), Sampling.SLOW: (0.5, 1.2)}
 """Samples in the time that a loop needs, by sampling."""
 
+LONGEST_STEP = 1.5  # of integration over the fastest time constant; up to 2.7 it is stable
 WARM = 25.0  # times of the loop before the record begins
 PERIODS = 6.0  # of an outer cycle, that a record holds at least
 PER_PERIOD = 8.0  # samples of an outer cycle, at least
+NOISE_IN_OP = 0.12  # of the band, that the controller passes on of the noise at most
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,15 +96,18 @@ def _wish(random: np.random.Generator, process: Process) -> Wish:
     if process.kind in ("temperature", "analyser") and random.random() < 0.4:
         derivative = random.uniform(0.2, 0.5)
     filtering = random.uniform(0.2, 1.0) if random.random() < 0.35 else 0.0
-    speed = random.uniform(3.0, 8.0) if process.integrating else random.uniform(1.0, 3.0)
-    return Wish(speed, random.uniform(0.15, 0.6), derivative, filtering)
+    if process.integrating:
+        return Wish(random.uniform(2.0, 4.0), random.uniform(0.1, 0.6), derivative, filtering)
+    return Wish(random.uniform(1.0, 3.0), random.uniform(0.15, 0.6), derivative, filtering)
 
 
 def _clock(
     random: np.random.Generator, c: Circumstances, process: Process, answer: Answer, wish: Wish
 ) -> Clock:
     """Return the steps of time: the sample time first, then the scan, then the integration."""
-    delay = max(late(answer, process, 0.0), 0.05 * process.slowest / 4.0)
+    delay = late(answer, process, 0.0)
+    if not process.integrating:
+        delay = max(delay, 0.01 * process.slowest)
     closed = closed_loop_time(answer, delay, wish)
     needed = min(answer.lag, 4.0 * (closed + delay)) + delay
     low, high = PER_TIME[c.sampling]
@@ -110,7 +115,7 @@ def _clock(
     sample = min(INTERVALS, key=lambda interval: abs(math.log(interval / wanted)))
     scan = sample / c.scan_ratio
     shorter = min(sample, scan)
-    step = shorter / math.ceil(shorter / process.fastest)
+    step = shorter / math.ceil(shorter / (LONGEST_STEP * process.fastest))
     return Clock(step, round(scan / step), round(sample / step))
 
 
@@ -126,8 +131,8 @@ def _valve(
         band = _log(random, 0.02, 0.2) * float(random.random() < 0.7)
     band *= shrink
     scan = clock.step * clock.scan
-    natural = scan / random.uniform(15.0, 40.0)
-    share = random.uniform(0.4, 0.85)
+    natural = scan / random.uniform(10.0, 25.0)
+    share = random.uniform(0.5, 0.88)
     if c.law is Law.HE:
         share = random.uniform(0.1, 0.9)
         static = band / (1.0 + share)
@@ -138,10 +143,10 @@ def _valve(
     positioner = float(random.choice([0.0, 0.0, 1.0, 3.0]))
     stem = Stem(
         natural=natural,
-        damping=random.uniform(0.5, 1.5),
+        damping=random.uniform(0.7, 2.0),
         lag=random.uniform(0.1, 0.7) * scan,
         positioner=positioner,
-        stribeck=max(_log(random, 1e-4, 5e-4) * static * (1.0 + positioner) / natural, 1e-9),
+        stribeck=max(_log(random, 7e-4, 1.2e-3) * static / natural, 1e-9),
     )
     return band, Valve(c.law, static, share * static, stem)
 
@@ -226,6 +231,9 @@ class _Acting:
     def _noise(self) -> FloatArray:
         random, clock = self.random, self.loop.clock
         level = random.uniform(0.02, 0.25) * self.band if self.band else _log(random, 0.03, 0.5)
+        if self.band:
+            passed_on = abs(self.loop.controller.gain) * self.pv_size
+            level *= min(1.0, NOISE_IN_OP / (0.25 * passed_on))
         scans = -(-self.count // clock.scan)
         values = loads.coloured(random, scans, self.c.noise_colour)
         return level * self.pv_size * np.repeat(values, clock.scan)[: self.count]

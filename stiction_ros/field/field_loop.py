@@ -12,7 +12,7 @@ from stiction_ros.field.drawing import Made, make
 from stiction_ros.field.historian import archived
 from stiction_ros.field.kernels import FloatArray
 from stiction_ros.field.simulation import Loop, Run, Signals, run
-from stiction_ros.field.truth import Cause, Truth, ValveKind, causes, slips
+from stiction_ros.field.truth import EVEN, Cause, Truth, ValveKind, causes, slips
 from stiction_ros.field.valves import Law, slow_triangle
 from stiction_ros.records.record import Record
 
@@ -27,6 +27,9 @@ MATTERS = 0.1
 
 NEGLIGIBLE = 0.05
 """Share of OP's range that a band has which does not matter, at most."""
+
+APART = 3.0
+"""Samples between two slips on average, at least: a record that is slower shows none of them."""
 
 LIMITED = 0.1
 """Share of a record in which OP may stand at a limit."""
@@ -88,21 +91,26 @@ def field_loop(seed: int) -> FieldLoop:
         if not np.isfinite(out.clean).all():
             continue
         loop = _recorded(random, circumstances, made, out, seed)
-        best = loop
+        best = made, loop
         if _as_wanted(circumstances, loop, out):
             break
         shrink *= _correction(circumstances, loop)
     assert best is not None, f"no loop of seed {seed} is finite"
-    return best
+    made, loop = best
+    truth = dataclasses.replace(loop.truth, causes=_causes(made))
+    return dataclasses.replace(loop, truth=truth)
 
 
 def _as_wanted(c: Circumstances, loop: FieldLoop, out: Run) -> bool:
     """Tell whether a loop has the friction that its circumstances want, and is in control."""
     limited = np.mean((out.op <= 0.0) | (out.op >= 100.0))
-    if limited > LIMITED:
+    overflows = loop.kind == "level" and (out.clean.min() <= 0.0 or out.clean.max() >= 100.0)
+    if limited > LIMITED or overflows:
         return False
     if c.friction is Friction.MUCH:
-        return loop.judged_slips >= MANY and loop.truth.band_share >= MATTERS
+        first, last = loop.judged_rows
+        often = MANY <= loop.judged_slips <= (last - first) / APART
+        return often and loop.truth.band_share >= MATTERS
     if c.friction is Friction.FEW_SLIPS:
         return 0 < loop.judged_slips < MANY
     return loop.truth.band_share <= NEGLIGIBLE
@@ -139,7 +147,8 @@ def _recorded(
     sticks = c.friction is not Friction.NONE
     valve = ValveKind.HEALTHY
     if sticks:
-        valve = ValveKind.BACKLASH if made.loop.valve.law is Law.BACKLASH else ValveKind.STICKY
+        even = shown.jump < EVEN * shown.band
+        valve = ValveKind.BACKLASH if even else ValveKind.STICKY
     he = made.loop.valve if made.loop.valve.law is Law.HE else None
     truth = Truth(
         valve=valve,
@@ -150,7 +159,7 @@ def _recorded(
         f_d=None if he is None else factor * he.sliding,
         slip_rows=tuple(rows),
         reversals=turned,
-        causes=_causes(made, sampled),
+        causes=frozenset(),
         band_share=shown.band / max(span, 1e-9),
     )
     stem = (factor * out.stem[sampled] + kept.offset)[kept.rows]
@@ -159,8 +168,9 @@ def _recorded(
     return FieldLoop(seed, kept.record, made.loop.process.kind, c.plant.value, c.names, truth, stem)
 
 
-def _causes(made: Made, sampled: slice) -> frozenset[Cause]:
+def _causes(made: Made) -> frozenset[Cause]:
     """Return what makes the loop cycle, by running it without one thing after the other."""
+    sampled = slice(made.warm, None, made.loop.clock.sample)
 
     def error(loop: Loop, signals: Signals) -> FloatArray:
         return (signals.set_point - run(loop, signals).clean)[sampled]

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.field.circumstances import UNITS, Circumstances, Friction, Hole, Keeping, Unit
 from stiction_ros.field.drawing import Made
-from stiction_ros.field.kernels import FloatArray
+from stiction_ros.field.kernels import FlagArray, FloatArray
 from stiction_ros.field.simulation import Run
 from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.record import Record
@@ -122,7 +122,7 @@ def archived(
     op, pv = (take(signal[made.warm :], steps) for signal in (out.op, out.pv))
     sp = sampled(made.signals.set_point[made.warm :], steps)
     manual = sampled(made.signals.manual[made.warm :].astype(np.float64), steps) > 0.0
-    op, pv = _reported(random, c, made, op, pv)
+    op, pv = _reported(random, c, made, op, pv, ~manual[: len(op)])
     factor, offset = UNITS[c.unit]
     if c.unit is Unit.CENTRED:
         offset = -float(op.mean())
@@ -160,11 +160,17 @@ def archived(
 
 
 def _reported(
-    random: np.random.Generator, c: Circumstances, made: Made, op: FloatArray, pv: FloatArray
+    random: np.random.Generator,
+    c: Circumstances,
+    made: Made,
+    op: FloatArray,
+    pv: FloatArray,
+    automatic: FlagArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return OP and PV after rounding, exception or compression."""
+    """Return OP and PV after rounding, exception or compression, set by what they do in control."""
     op_range, pv_range = (
-        max(float(np.subtract(*np.percentile(signal, [98.0, 2.0]))), 1e-6) for signal in (op, pv)
+        max(float(np.subtract(*np.percentile(signal[automatic], [98.0, 2.0]))), 1e-6)
+        for signal in (op, pv)
     )
     if c.keeping in (Keeping.OP_ROUNDED, Keeping.BOTH_ROUNDED):
         band = 2.0 * made.loop.valve.static

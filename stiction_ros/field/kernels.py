@@ -22,8 +22,8 @@ FLOW, PRESSURE, TANK, FOUR_TANKS, REACTOR, EXCHANGER, COLUMN = range(7)
 STEM_STATES = 4  # position, speed, bristle, pressure
 PLANT_STATES = 12
 CELLS = 4  # of either side of the heat exchanger
-SUBSTEPS = 10.0  # of the stem per natural time
-AT_REST = 1e-9  # %: of speed and pressure, below which a stem is left alone for the step
+SUBSTEPS = 8.0  # of the stem per natural time
+AT_REST = 1e-6  # %: of speed and pressure, below which a stem is left alone for the step
 
 
 @compiled

@@ -155,11 +155,11 @@ def _vessel(random: np.random.Generator, name: Plant) -> Process:
     area = _log(random, 0.5, 8.0)  # share of the tank, %, per unit of flow and second
     throughput = _log(random, 0.1, 1.0)
     trim = float(random.choice([1.0, 1.0, 30.0]))
-    stem, sensor = random.uniform(35.0, 65.0), _log(random, 0.5, 4.0)
+    residence = 50.0 * area / throughput
+    stem, sensor = random.uniform(35.0, 65.0), _log(random, 0.003, 0.03) * residence
     share = stem / 100.0 if trim == 1.0 else trim ** (stem / 100.0 - 1.0)
     gravity = 0.0 if name is Plant.LEVEL else 1.0
     numbers = [trim, throughput / share, throughput, area, gravity, 1.0, sensor]
-    residence = 50.0 * area / throughput
     return _process(
         name,
         kernels.TANK,

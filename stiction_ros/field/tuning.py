@@ -84,7 +84,8 @@ class Wish:
 
     Attributes:
         speed: closed-loop time over the effective dead time.
-        share: closed-loop time over the plant's lag, at least.
+        share: closed-loop time over the plant's lag, at least; over the time in which 1 % of
+            the valve makes one unit of an integrator's PV.
         derivative: T_d over the effective dead time; 0 is PI.
         filtering: PV filter over the effective dead time.
     """
@@ -102,9 +103,8 @@ def late(answer: Answer, process: Process, scan: float) -> float:
 
 def closed_loop_time(answer: Answer, delay: float, wish: Wish) -> float:
     """Return the time constant wished for the closed loop, s."""
-    if np.isinf(answer.lag):
-        return wish.speed * delay
-    return max(wish.speed * delay, wish.share * answer.lag)
+    lag = 1.0 / abs(answer.gain) if np.isinf(answer.lag) else answer.lag
+    return max(wish.speed * delay, wish.share * lag)
 
 
 def tuned(answer: Answer, delay: float, wish: Wish) -> Controller:

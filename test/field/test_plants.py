@@ -9,7 +9,15 @@ import pytest
 
 from stiction_ros.field.plants import KINDS, Plant, draw_process
 from stiction_ros.field.simulation import FRICTIONLESS, Clock, Controller, Loop, Signals, run
-from stiction_ros.field.tuning import Wish, calm, late, step_test, swing_left, tuned, ultimate_factor
+from stiction_ros.field.tuning import (
+    Wish,
+    calm,
+    late,
+    step_test,
+    swing_left,
+    tuned,
+    ultimate_factor,
+)
 
 
 @pytest.mark.parametrize("plant", list(Plant))
@@ -35,9 +43,7 @@ def test_a_tuned_loop_comes_to_rest_and_swings_at_the_ultimate_gain(plant: Plant
     step = scan / np.ceil(scan / process.fastest)
     delay = late(answer, process, scan)
     controller = tuned(answer, delay, Wish(3.0, 0.3))
-    loop = Loop(
-        process, FRICTIONLESS, controller, Clock(step, round(scan / step), 1), answer.state
-    )
+    loop = Loop(process, FRICTIONLESS, controller, Clock(step, round(scan / step), 1), answer.state)
     time = 6.0 * delay if process.integrating else 3.0 * delay + 0.3 * answer.lag
     loop = calm(loop, answer, time)
     assert swing_left(loop, answer, time, 1.0) <= 0.02
