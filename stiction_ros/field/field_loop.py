@@ -19,7 +19,7 @@ from stiction_ros.records.record import Record
 MANY = 6
 """Slips from which a record shows friction well."""
 
-ATTEMPTS = 8
+ATTEMPTS = 6
 """Loops drawn for a seed, until one is as its circumstances want it."""
 
 MATTERS = 0.1

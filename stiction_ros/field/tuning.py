@@ -17,7 +17,7 @@ LOAD_STEP = 0.02  # of the load
 HORIZON = 40.0  # times of the loop that a closed loop is watched for
 PUSH = 0.5  # %: load by which a closed loop is tried, counted in the valve
 LEFT = 0.02  # of its first swing, that a well damped loop leaves
-LEAST, MOST = 0.02, 1000.0  # factors of the gain that are tried
+LEAST, MOST = 0.05, 1000.0  # factors of the gain that are tried
 HALVINGS = 8  # of the interval in which the ultimate gain lies
 
 
@@ -132,17 +132,23 @@ def tuned(answer: Answer, delay: float, wish: Wish) -> Controller:
 
 
 def calm(loop: Loop, answer: Answer, time: float) -> Loop:
-    """Return the loop with its gain lowered until it is well damped without friction.
+    """Return the loop made slower until it is well damped without friction.
+
+    Its gain is lowered; of an integrating plant, which swings at low gains, so is its reset.
 
     Args:
         loop: as tuned.
         answer: of its plant.
         time: of the closed loop, s.
     """
-    factor = 1.0
-    while swing_left(loop, answer, time, factor) > LEFT and factor > LEAST:
+    slower, factor = loop, 1.0
+    while swing_left(slower, answer, time / factor, 1.0) > LEFT and factor > LEAST:
         factor *= 0.75
-    return dataclasses.replace(loop, controller=loop.controller.scaled(factor))
+        controller = loop.controller.scaled(factor)
+        if loop.process.integrating:
+            controller = dataclasses.replace(controller, integral=controller.integral / factor)
+        slower = dataclasses.replace(loop, controller=controller)
+    return slower
 
 
 def ultimate_factor(loop: Loop, answer: Answer, time: float) -> float:

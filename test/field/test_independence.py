@@ -53,7 +53,7 @@ def test_the_field_imports_nothing_that_is_judged() -> None:
 
 
 def test_nothing_that_it_imports_does_either_but_for_a_type() -> None:
-    waiting = [path for path in (PACKAGE / "field").glob("*.py")]
+    waiting = list((PACKAGE / "field").glob("*.py"))
     seen: set[Path] = set()
     while waiting:
         path = waiting.pop()

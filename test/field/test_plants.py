@@ -12,6 +12,7 @@ from stiction_ros.field.simulation import FRICTIONLESS, Clock, Controller, Loop,
 from stiction_ros.field.tuning import (
     Wish,
     calm,
+    closed_loop_time,
     late,
     step_test,
     swing_left,
@@ -42,9 +43,10 @@ def test_a_tuned_loop_comes_to_rest_and_swings_at_the_ultimate_gain(plant: Plant
         scan = process.fastest
     step = scan / np.ceil(scan / process.fastest)
     delay = late(answer, process, scan)
-    controller = tuned(answer, delay, Wish(3.0, 0.3))
+    wish = Wish(3.0, 0.3)
+    controller = tuned(answer, delay, wish)
     loop = Loop(process, FRICTIONLESS, controller, Clock(step, round(scan / step), 1), answer.state)
-    time = 6.0 * delay if process.integrating else 3.0 * delay + 0.3 * answer.lag
+    time = closed_loop_time(answer, delay, wish) + delay
     loop = calm(loop, answer, time)
     assert swing_left(loop, answer, time, 1.0) <= 0.02
     factor = ultimate_factor(loop, answer, time)

@@ -29,15 +29,16 @@ def test_the_triangle_shows_the_band_of_a_backlash_and_no_jump(half: float) -> N
 
 @pytest.mark.parametrize("law", [Law.KARNOPP, Law.LUGRE])
 @pytest.mark.parametrize("damping", [0.5, 1.5])
-@pytest.mark.parametrize("positioner", [0.0, 3.0])
+@pytest.mark.parametrize("positioner", [0.0, 1.0])
 def test_band_and_jump_of_a_stem_belong_together(
     law: Law, damping: float, positioner: float
 ) -> None:
     """Behind a slip the lag is smaller by the slip: on average f_S less half of it."""
-    stem = Stem(0.05, damping, 0.1, positioner, stribeck=0.05 * 1.0 * (1 + positioner) / 0.05)
+    stem = Stem(0.05, damping, 0.1, positioner, stribeck=0.06)
     shown = slow_triangle(Valve(law, 3.0, 2.0, stem))
-    assert 1.0 < shown.jump <= 2.2
-    assert shown.band == pytest.approx(2.0 * 3.0 - shown.jump, rel=0.06)
+    assert 0.8 < shown.jump <= 2.0
+    creeping = 0.02 if law is Law.KARNOPP else 0.1  # bristles bend before they slip
+    assert shown.band == pytest.approx(2.0 * 3.0 - shown.jump, rel=creeping)
 
 
 def test_a_stem_that_is_barely_damped_slips_farther() -> None:
@@ -59,7 +60,7 @@ def test_a_valve_without_friction_goes_where_it_is_told(law: Law) -> None:
 def test_a_stem_stays_while_the_command_is_near(law: Law) -> None:
     commands = 50.0 + np.array([0.0, 0.9, 1.8, 0.0, -1.8, 0.5])
     path = Valve(law, 2.0, 1.9).follow(commands, 2.0)
-    assert np.ptp(path) <= 0.05
+    assert np.ptp(path) <= 0.1
 
 
 @pytest.mark.parametrize(("static", "sliding"), [(1.0, 2.0), (-1.0, -2.0), (np.nan, 0.0)])
