@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -233,24 +234,23 @@ def _found(rows: Iterable[Judged]) -> int:
 
 
 def splits(rows: Sequence[Judged]) -> dict[str, list[Judged]]:
-    """Return the loops by group, valve, plant and circumstance, to see where it misses."""
+    """Return the loops by group, valve, plant and circumstance, to see where it misses.
+
+    Valves that slip less often stand in their own row alone.
+    """
     parts: dict[str, list[Judged]] = {group: [] for group in GROUPS}
     for row in rows:
         parts[row.group].append(row)
-        valve = row.valve if row.valve == ValveKind.HEALTHY.value else f"{row.valve}, {row.law}"
-        sides = (OTHERS, "friction")
-        side = sides[row.group != OTHERS]
-        if row.group == FEW_SLIPS:
-            continue
-        for name in (f"valve {valve}", *(f"{of} · {side}" for of in _places(row))):
+        for name in _places(row) if row.group != FEW_SLIPS else ():
             parts.setdefault(name, []).append(row)
     named = sorted(name for name in parts if name not in GROUPS)
     return {name: parts[name] for name in (*GROUPS, *named)}
 
 
 def _places(row: Judged) -> list[str]:
-    circumstances = row.circumstances or ("nothing unusual",)
-    return [f"plant {row.plant}", *(f"with {name}" for name in circumstances)]
+    valve = row.law if row.group == OTHERS else f"{row.valve} {row.law}"
+    told = row.circumstances or ("nothing unusual",)
+    return [f"valve {valve}", f"plant {row.plant}", *(f"with {name}" for name in told)]
 
 
 def table_row(name: str, rows: Sequence[Judged]) -> dict[str, Any]:
@@ -302,34 +302,63 @@ def document(rows: Sequence[Judged], machine: str) -> dict[str, Any]:
     return {
         "name": "field",
         "machine": machine,
-        "rows": [table_row(name, part) for name, part in splits(rows).items()],
+        "rows": [
+            table_row(f"{name} · {side}" if side else name, part)
+            for name, whole in splits(rows).items()
+            for side, part in _sides(name, whole)
+        ],
         "rates": [dataclasses.asdict(rate) | {"share": rate.share} for rate in shares(rows)],
         "loops": [dataclasses.asdict(row) | {"group": row.group} for row in rows],
     }
+
+
+def _sides(name: str, rows: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
+    """Return the rows with friction and those without; of a group all."""
+    if name in GROUPS:
+        return [("", list(rows))]
+    sticks = [row for row in rows if row.group != OTHERS]
+    others = [row for row in rows if row.group == OTHERS]
+    return [(side, part) for side, part in (("friction", sticks), (OTHERS, others)) if part]
 
 
 def show(rows: Sequence[Judged]) -> None:
     """Print the rates, the table and the loops that were missed."""
     console = Console()
     console.print(shares_table(shares(rows)))
-    table = Table("", "loops", *VERDICTS, "band held", "cause right", "wrong", "median ms")
-    for name, part in splits(rows).items():
-        line = table_row(name, part)
-        cause = [line["cause_right"], line["cause_wrong"]]
-        told = any(row.answer.cause is not None for row in part)
-        middle = "–" if line["subject_ms"] is None else f"{line['subject_ms']:.0f}"
-        table.add_row(
-            name,
-            str(len(part)),
-            *(str(line[verdict]) for verdict in VERDICTS),
-            f"{line['band_held']} of {line['band_told']}",
-            *(str(count) if told else "–" for count in cause),
-            middle,
-        )
-    console.print(table)
+    console.print(_counted(rows))
+    console.print("open: undecided or refused; band: intervals that hold it, where it is found")
     for title, missed in misses(rows).items():
         if missed:
             console.print(f"{title}: seeds {', '.join(map(str, missed))}")
+
+
+def _counted(rows: Sequence[Judged]) -> Table:
+    """Return a line for every valve, plant and circumstance, with friction and without."""
+    columns = ("friction", "found", "healthy", "open", "band", "others", "called", "open", "cause")
+    table = Table("", *columns, box=SIMPLE, padding=(0, 1, 0, 0))
+    for name, part in splits(rows).items():
+        sticks = [row for row in part if row.group != OTHERS]
+        others = [row for row in part if row.group == OTHERS]
+        held = [entry["band"] for row in sticks if row.found and (entry := row.covered())]
+        told = [row for row in part if row.answer.cause is not None]
+        cells = ["–"] * len(columns)
+        if sticks:
+            cells[:4] = _texts(len(sticks), _found(sticks), _healthy(sticks), _open(sticks))
+            cells[4] = f"{sum(held)}/{len(held)}"
+        if others:
+            cells[5:8] = _texts(len(others), _found(others), _open(others))
+        if told:
+            cells[8] = f"{sum(row.cause_right is True for row in told)}/{len(told)}"
+        table.add_row(name, *cells)
+    return table
+
+
+def _texts(*counts: int) -> list[str]:
+    return [str(count) for count in counts]
+
+
+def _open(rows: Iterable[Judged]) -> int:
+    return sum(row.open for row in rows)
 
 
 def misses(rows: Sequence[Judged]) -> dict[str, list[int]]:

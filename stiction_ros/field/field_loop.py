@@ -28,7 +28,7 @@ MATTERS = 0.1
 NEGLIGIBLE = 0.05
 """Share of OP's range that a band has which does not matter, at most."""
 
-APART = 3.0
+APART = 4.0
 """Samples between two slips on average, at least: a record that is slower shows none of them."""
 
 LIMITED = 0.1
