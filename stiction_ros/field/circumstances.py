@@ -163,7 +163,7 @@ def _choice(random: np.random.Generator, shares: dict[T, float]) -> T:
 
 def draw_circumstances(random: np.random.Generator) -> Circumstances:
     """Return circumstances that go together."""
-    friction = _choice(random, {Friction.MUCH: 45, Friction.FEW_SLIPS: 7, Friction.NONE: 48})
+    friction = _choice(random, {Friction.MUCH: 48, Friction.FEW_SLIPS: 6, Friction.NONE: 46})
     law = _choice(random, {Law.HE: 30, Law.KARNOPP: 28, Law.LUGRE: 22, Law.BACKLASH: 20})
     plant = _choice(
         random,

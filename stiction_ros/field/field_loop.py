@@ -12,7 +12,7 @@ from stiction_ros.field.drawing import Made, make
 from stiction_ros.field.historian import archived
 from stiction_ros.field.kernels import FloatArray
 from stiction_ros.field.simulation import Loop, Run, Signals, run
-from stiction_ros.field.truth import EVEN, Cause, Truth, ValveKind, causes, slips
+from stiction_ros.field.truth import EVEN, Cause, Swings, Truth, ValveKind, causes, slips
 from stiction_ros.field.valves import Law, slow_triangle
 from stiction_ros.records.record import Record
 
@@ -172,8 +172,9 @@ def _causes(made: Made) -> frozenset[Cause]:
     """Return what makes the loop cycle, by running it without one thing after the other."""
     sampled = slice(made.warm, None, made.loop.clock.sample)
 
-    def error(loop: Loop, signals: Signals) -> FloatArray:
-        return (signals.set_point - run(loop, signals).clean)[sampled]
+    def swings(loop: Loop, signals: Signals) -> Swings:
+        out = run(loop, signals)
+        return Swings((signals.set_point - out.clean)[sampled], out.op[sampled])
 
-    whole = error(made.loop, made.steady)
-    return causes(whole, {cause: error(*rest) for cause, rest in made.without.items()})
+    whole = swings(made.loop, made.steady)
+    return causes(whole, {cause: swings(*rest) for cause, rest in made.without.items()})

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import enum
 import itertools
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +17,7 @@ EVEN = 0.1  # share of the band below which a jump counts as none
 MOVES = 1e-3  # share of the band by which a stem moves at least in a scan
 SLIP = 0.25  # share of the jump that a slip has at least
 TURN = 0.05  # share of the band by which a stem turns back at least
-SHARE = 0.6  # of an error's swing that is left without a thing that did not cause it
+SHARE = 0.6  # of a swing that is left, at least, without a thing that did not cause it
 CROSSINGS = 6  # zero crossings of the autocorrelation that a regular cycle has at least
 REGULAR = 1.0  # regularity above which a cycle is one
 
@@ -164,16 +166,27 @@ def swing(values: FloatArray, period: float) -> float:
     return float(np.std(values[begin : begin + len(slow)] - slow))
 
 
-def causes(whole: FloatArray, without: dict[Cause, FloatArray]) -> frozenset[Cause]:
-    """Return what makes the error of a loop swing.
+class Swings(NamedTuple):
+    """What is looked at for the cause: error of the loop and OP, shape (N,) each."""
+
+    error: FloatArray
+    op: FloatArray
+
+
+def causes(whole: Swings, without: Mapping[Cause, Swings]) -> frozenset[Cause]:
+    """Return what makes a loop swing: what its error, or its OP, does not swing without.
 
     Args:
-        whole: error of the loop, shape (N,).
-        without: error of the same loop without one thing each, that could be the cause.
+        whole: of the loop.
+        without: of the same loop without one thing each, that could be the cause.
     """
-    regular, period = regularity(whole)
-    size = max(swing(whole, period), 1e-300)
-    found = {cause for cause, rest in without.items() if swing(rest, period) < SHARE * size}
+    regular, period = regularity(whole.error)
+
+    def left(rest: Swings) -> float:
+        pairs = zip(whole, rest, strict=True)
+        return min(swing(b, period) / max(swing(a, period), 1e-300) for a, b in pairs)
+
+    found = {cause for cause, rest in without.items() if left(rest) < SHARE}
     if regular > REGULAR:
         return frozenset(found or set(without) or {Cause.NONE})
     return frozenset(found | {Cause.NONE})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiction_ros.field.truth import Cause, causes, regularity, slips, swing
+from stiction_ros.field.truth import Cause, Swings, causes, regularity, slips, swing
 from stiction_ros.field.valves import Ramped
 
 
@@ -51,9 +51,13 @@ def test_what_is_slower_than_two_periods_does_not_count() -> None:
 def test_the_cause_is_what_the_swing_goes_away_with() -> None:
     wave = np.sin(np.arange(900) / 7.0)
     noise = 0.1 * np.random.default_rng(0).standard_normal(900)
-    without = {Cause.VALVE: noise, Cause.DISTURBANCE: wave}
-    assert causes(wave + noise, without) == {Cause.VALVE}
+    swinging, quiet = Swings(wave + noise, wave + noise), Swings(noise, noise)
+    without = {Cause.VALVE: quiet, Cause.DISTURBANCE: swinging}
+    assert causes(swinging, without) == {Cause.VALVE}
     # Two that each keep it going alone are both right.
-    assert causes(wave, {Cause.VALVE: wave, Cause.TUNING: wave}) == {Cause.VALVE, Cause.TUNING}
-    assert causes(noise, {Cause.DISTURBANCE: noise}) == {Cause.NONE}
-    assert causes(noise, {}) == {Cause.NONE}
+    both = {Cause.VALVE: swinging, Cause.TUNING: swinging}
+    assert causes(swinging, both) == {Cause.VALVE, Cause.TUNING}
+    assert causes(quiet, {Cause.DISTURBANCE: quiet}) == {Cause.NONE}
+    assert causes(quiet, {}) == {Cause.NONE}
+    # A valve that makes OP wander, and PV not, is the cause without a cycle.
+    assert causes(Swings(noise, wave), {Cause.VALVE: quiet}) == {Cause.VALVE, Cause.NONE}
