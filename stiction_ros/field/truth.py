@@ -19,6 +19,7 @@ SLIP = 0.25  # share of the jump that a slip has at least
 TURN = 0.05  # share of the band by which a stem turns back at least
 SHARE = 0.6  # of a swing that is left, at least, without a thing that did not cause it
 CROSSINGS = 6  # zero crossings of the autocorrelation that a regular cycle has at least
+WANDERING = 0.05  # of the record, that stands for the period of what has none
 REGULAR = 1.0  # regularity above which a cycle is one
 
 
@@ -181,6 +182,8 @@ def causes(whole: Swings, without: Mapping[Cause, Swings]) -> frozenset[Cause]:
         without: of the same loop without one thing each, that could be the cause.
     """
     regular, period = regularity(whole.error)
+    if regular <= REGULAR:
+        period = WANDERING * len(whole.error)
 
     def left(rest: Swings) -> float:
         pairs = zip(whole, rest, strict=True)
