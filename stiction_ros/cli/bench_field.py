@@ -27,9 +27,9 @@ FIRST, LAST = 10_000, 10_099
 FOUND = ("sticky", "backlash")
 """Verdicts that find friction."""
 
-MANY_SLIPS = f"friction, {MANY} slips or more"
-FEW_SLIPS = "friction, fewer slips"
-OTHERS = "no friction that matters"
+MANY_SLIPS = f"{MANY} slips or more"
+FEW_SLIPS = "fewer slips"
+OTHERS = "no friction"
 GROUPS = (MANY_SLIPS, FEW_SLIPS, OTHERS)
 
 REFUSED = "refused"
@@ -326,7 +326,10 @@ def show(rows: Sequence[Judged]) -> None:
     console = Console()
     console.print(shares_table(shares(rows)))
     console.print(_counted(rows))
-    console.print("open: undecided or refused; band: intervals that hold it, where it is found")
+    console.print(
+        "loops: with friction that matters; others: without; open: undecided or refused; "
+        "band: intervals that hold it, where friction is found"
+    )
     for title, missed in misses(rows).items():
         if missed:
             console.print(f"{title}: seeds {', '.join(map(str, missed))}")
@@ -334,8 +337,11 @@ def show(rows: Sequence[Judged]) -> None:
 
 def _counted(rows: Sequence[Judged]) -> Table:
     """Return a line for every valve, plant and circumstance, with friction and without."""
-    columns = ("friction", "found", "healthy", "open", "band", "others", "called", "open", "cause")
-    table = Table("", *columns, box=SIMPLE, padding=(0, 1, 0, 0))
+    columns = ("loops", "found", "healthy", "open", "band", "others", "called", "open", "cause")
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0), show_edge=False)
+    table.add_column("", no_wrap=True)
+    for name in columns:
+        table.add_column(name, justify="right")
     for name, part in splits(rows).items():
         sticks = [row for row in part if row.group != OTHERS]
         others = [row for row in part if row.group == OTHERS]

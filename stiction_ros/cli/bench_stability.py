@@ -6,7 +6,7 @@ import argparse
 import csv
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +58,7 @@ class Variant:
         op, pv: factor and offset.
         time: factor on the sample time.
         delay: range of delays; None is the default.
-        rows: share and number of rows cut at begin and end: (begin, end) of a half as shares,
-            or counts above 1.
+        cut: what is left out at begin and end: rows above 1, below it a share of all.
     """
 
     name: str
@@ -346,7 +345,6 @@ def show(rows: Sequence[Held]) -> None:
     """Print every record and the totals."""
     console = Console()
     table = Table("record", "label", "verdict", "of all variants", "turns", "unit", "f_S", "band")
-    words: Callable[[bool], str] = lambda wrong: "yes" if wrong else ""  # noqa: E731
     for row in rows:
         line = table_row(row)
         label = {True: "sticky", False: "not", None: "–"}[row.source.label]
@@ -357,8 +355,8 @@ def show(rows: Sequence[Held]) -> None:
             label,
             line["verdict"],
             told,
-            words(row.turned),
-            words(row.units_count),
+            "yes" if row.turned else "",
+            "yes" if row.units_count else "",
             *apart,
         )
     console.print(table)

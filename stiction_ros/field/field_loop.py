@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 
 import numpy as np
 
@@ -83,7 +84,7 @@ def field_loop(seed: int) -> FieldLoop:
     if seed < 0:
         raise InputError(f"{seed} is negative", where="seed", fix="use 0 or more")
     circumstances = draw_circumstances(np.random.default_rng([seed, 0]))
-    shrink, best = 1.0, None
+    shrink, best, best_fit = 1.0, None, Fit.NOT
     for attempt in range(1, ATTEMPTS + 1):
         random = np.random.default_rng([seed, attempt])
         made = make(random, circumstances, shrink)
@@ -91,8 +92,10 @@ def field_loop(seed: int) -> FieldLoop:
         if not np.isfinite(out.clean).all():
             continue
         loop = _recorded(random, circumstances, made, out, seed)
-        best = made, loop
-        if _as_wanted(circumstances, loop, out):
+        fit = _fit(circumstances, loop, out)
+        if best is None or fit > best_fit:
+            best, best_fit = (made, loop), fit
+        if fit is Fit.AS_WANTED:
             break
         shrink *= _correction(circumstances, loop)
     assert best is not None, f"no loop of seed {seed} is finite"
@@ -101,19 +104,28 @@ def field_loop(seed: int) -> FieldLoop:
     return dataclasses.replace(loop, truth=truth)
 
 
-def _as_wanted(c: Circumstances, loop: FieldLoop, out: Run) -> bool:
-    """Tell whether a loop has the friction that its circumstances want, and is in control."""
+class Fit(enum.IntEnum):
+    """How far a drawn loop is as wanted."""
+
+    NOT = 0
+    CLEAR = 1
+    """Not as wanted, and yet clearly with friction that matters or without."""
+    AS_WANTED = 2
+
+
+def _fit(c: Circumstances, loop: FieldLoop, out: Run) -> Fit:
+    """Tell how far a loop has the friction that its circumstances want, and is in control."""
     limited = np.mean((out.op <= 0.0) | (out.op >= 100.0))
     overflows = loop.kind == "level" and (out.clean.min() <= 0.0 or out.clean.max() >= 100.0)
     if limited > LIMITED or overflows:
-        return False
-    if c.friction is Friction.MUCH:
-        first, last = loop.judged_rows
-        often = MANY <= loop.judged_slips <= (last - first) / APART
-        return often and loop.truth.band_share >= MATTERS
-    if c.friction is Friction.FEW_SLIPS:
-        return 0 < loop.judged_slips < MANY
-    return loop.truth.band_share <= NEGLIGIBLE
+        return Fit.NOT
+    if c.friction is Friction.NONE:
+        return Fit.AS_WANTED if loop.truth.band_share <= NEGLIGIBLE else Fit.NOT
+    first, last = loop.judged_rows
+    if loop.truth.band_share < MATTERS or loop.judged_slips > (last - first) / APART:
+        return Fit.NOT
+    many, wanted = loop.judged_slips >= MANY, c.friction is Friction.MUCH
+    return Fit.AS_WANTED if many is wanted and loop.judged_slips > 0 else Fit.CLEAR
 
 
 def _correction(c: Circumstances, loop: FieldLoop) -> float:
