@@ -248,7 +248,8 @@ def splits(rows: Sequence[Judged]) -> dict[str, list[Judged]]:
 
 
 def _places(row: Judged) -> list[str]:
-    valve = row.law if row.group == OTHERS else f"{row.valve} {row.law}"
+    named = row.group == OTHERS or row.law == row.valve
+    valve = row.law if named else f"{row.valve} {row.law}"
     told = row.circumstances or ("nothing unusual",)
     return [f"valve {valve}", f"plant {row.plant}", *(f"with {name}" for name in told)]
 
