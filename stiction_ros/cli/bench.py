@@ -14,10 +14,12 @@ from rich.table import Table
 
 from stiction_ros.cli import (
     bench_control,
+    bench_field,
     bench_gap,
     bench_graph,
     bench_identification,
     bench_record,
+    bench_stability,
 )
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
@@ -28,6 +30,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "control": ("seed", "quick"),
     "identification": ("repeat", "seed", "longest", "quick"),
     "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
+    "field": ("seeds", "jobs"),
+    "stability": ("seeds", "data", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
@@ -38,10 +42,15 @@ def add(commands: Any) -> None:
         "bench",
         help="measure speed, side by side",
         description="Measure speed against a baseline in the same run (graph, identification, "
-        "control, record), or count how often the discrepancy workflow is right (gap).",
+        "control, record), or count how often the discrepancy workflow is right (gap), how often "
+        "identification is (field), and whether its answers hold still (stability).",
     )
     parser.add_argument(
-        "name", nargs="?", default="graph", choices=(*BENCHMARKS, "gap"), help="default: graph"
+        "name",
+        nargs="?",
+        default="graph",
+        choices=(*BENCHMARKS, "gap", *COUNTS),
+        help="default: graph",
     )
     group = parser.add_argument_group("identification; --seed and --quick also for control")
     group.add_argument(
@@ -61,6 +70,8 @@ def add(commands: Any) -> None:
         help="fewer delays, one start, coarser grids, records up to 10000 samples",
     )
     bench_gap.add_options(parser)
+    bench_field.add_options(parser)
+    bench_stability.add_options(parser)
     parser.add_argument("--json", metavar="F", help="write the rows as JSON; - for stdout")
     parser.set_defaults(run=run)
 
@@ -77,6 +88,8 @@ def run(options: argparse.Namespace) -> int:
             )
     if options.name == "gap":
         return bench_gap.run(options)
+    if options.name in COUNTS:
+        return COUNTS[options.name](options, machine())
     with bar(f"bench {options.name}") as show:
         rows = BENCHMARKS[options.name](options, show)
     if options.json is not None:
@@ -154,4 +167,9 @@ BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "identification": _identification,
     "record": _record,
     "control": _control,
+}
+
+COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
+    "field": bench_field.run,
+    "stability": bench_stability.run,
 }
