@@ -192,7 +192,8 @@ class ManagedNode(LifecycleNode):
         # Readers warn of incompatible QoS; what a publisher hears of it costs time at every spin.
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self.create_publisher(kind, topic, qos, event_callbacks=quiet)
-        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos)
+        patient = qos is SIGNAL_QOS and getattr(self.settings, "pace", "") == "lockstep"
+        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos, patient)
         return self.outlets[topic]
 
     def inlet(

@@ -6,29 +6,45 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
+PATIENCE = 6.0  # s for a reader to receive; one that was killed is forgotten before
 GRACE = 0.5  # s for which a partner may be missing before it has gone
 WATCHER = "recorder"  # reads every topic and commands nothing
 
 
 class Outlet:
-    """A publisher that counts, and knows which nodes must hear its first message."""
+    """A publisher that counts, and knows which nodes must hear its first message.
 
-    def __init__(self, publisher: Publisher, readers: tuple[str, ...], qos: QoSProfile) -> None:
+    A writer keeps its last messages alone, so that a reader whose process gets no time for a
+    while loses what is older. In lockstep nothing may be lost: a ``patient`` outlet waits, now
+    and then, until all that it has said was received.
+    """
+
+    def __init__(
+        self,
+        publisher: Publisher,
+        readers: tuple[str, ...],
+        qos: QoSProfile,
+        patient: bool = False,
+    ) -> None:
         self.publisher = publisher
         self.readers = readers
         self.qos = qos
+        self.patient = patient
         self.count = 0
 
     def publish(self, message: Any) -> None:
         """Publish and count."""
         self.count += 1
         self.publisher.publish(message)
+        if self.patient and self.count % (self.qos.depth // 2) == 0:
+            self.publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
 
 class Inlet:

@@ -20,6 +20,7 @@ RIVAL = 20.0  # log likelihood by which one explanation beats another
 CREDIBLE = 12.0  # log likelihood below the best that an interval still holds,
 MISFIT = 0.1  # and share of that of the best: no process is linear
 INFORMATION = 15.0  # least squared length of a signature, in σ
+LIKELY = 8.0  # log likelihood that little friction needs over the trusted one, gains left open
 EPISODES = 3  # least number of separate groups of moves that show a serviced valve
 NEAR = 0.1  # share of f_S within which a friction is the same as before
 NEAR_DYNAMIC = 0.06  # the same for f_D, as a share of f_S
@@ -66,7 +67,7 @@ class ChangeRule:
         10, "stem moves that must agree before a valve counts as serviced; 0: never looked", low=0
     )
     change_margin: float = setting(
-        2.0, "standard errors by which a change must be nearer than none", low=0.5, high=20.0
+        1.5, "standard errors by which a change must be nearer than none", low=0.5, high=20.0
     )
 
 
@@ -142,7 +143,7 @@ def look_for_change(
             return change
     if share is not None and _agrees(rule, share) and serviced.gain > SUSPICION:
         low, rest = _rivals(evidence, valve, trusted, serviced.first)
-        if rest - max(low, serviced.gain) <= RIVAL:
+        if low >= LIKELY and rest - max(low, serviced.gain) <= RIVAL:
             return _from(evidence, serviced.first, ChangeStatus.SERVICED, name, None, share)
     explained = evidence.mean_square <= EXPLAINED
     return FrictionChange(
