@@ -21,7 +21,7 @@ from stiction_ros import __version__
 from stiction_ros.errors import InputError
 from stiction_ros.nodes import parameters
 from stiction_ros.nodes.messages import status, to_stamp
-from stiction_ros.nodes.peers import Inlet, Outlet, Peers
+from stiction_ros.nodes.peers import Inlet, Outlet, Patience, Peers
 from stiction_ros.online.health import LEVELS, Noticed
 
 SIGNAL_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
@@ -63,6 +63,7 @@ class ManagedNode(LifecycleNode):
         self.running = False
         self.stamp = 0
         self.outlets: dict[str, Outlet] = {}
+        self._patience = Patience()
         self.inlets: dict[str, Inlet] = {}
         self.noticed = Noticed(time.monotonic)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -192,8 +193,9 @@ class ManagedNode(LifecycleNode):
         # Readers warn of incompatible QoS; what a publisher hears of it costs time at every spin.
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self.create_publisher(kind, topic, qos, event_callbacks=quiet)
-        patient = qos is SIGNAL_QOS and getattr(self.settings, "pace", "") == "lockstep"
-        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos, patient)
+        waits = qos is SIGNAL_QOS and getattr(self.settings, "pace", "") == "lockstep"
+        patience = self._patience if waits else None
+        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos, patience)
         return self.outlets[topic]
 
     def inlet(

@@ -13,38 +13,52 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
-PATIENCE = 6.0  # s for a reader to receive; one that was killed is forgotten before
+PATIENCE = 0.5  # s for readers to receive
 GRACE = 0.5  # s for which a partner may be missing before it has gone
 WATCHER = "recorder"  # reads every topic and commands nothing
 
 
-class Outlet:
-    """A publisher that counts, and knows which nodes must hear its first message.
+class Patience:
+    """How long the outlets of a node wait for their readers.
 
     A writer keeps its last messages alone, so that a reader whose process gets no time for a
-    while loses what is older. In lockstep nothing may be lost: a ``patient`` outlet waits, now
-    and then, until all that it has said was received.
+    while loses what is older. In lockstep nothing need be lost: now and then a writer waits until
+    all that it has said was received. A reader that lets it wait in vain, as one that was killed
+    does, is not waited for again before it has received.
     """
+
+    def __init__(self) -> None:
+        """Start with patience."""
+        self._in_vain = False
+
+    def wait(self, publisher: Publisher) -> None:
+        """Wait until the readers of ``publisher`` have received all that it has said."""
+        seconds = 0.0 if self._in_vain else PATIENCE
+        self._in_vain = not publisher.wait_for_all_acked(Duration(seconds=seconds))
+
+
+class Outlet:
+    """A publisher that counts, and knows which nodes must hear its first message."""
 
     def __init__(
         self,
         publisher: Publisher,
         readers: tuple[str, ...],
         qos: QoSProfile,
-        patient: bool = False,
+        patience: Patience | None = None,
     ) -> None:
         self.publisher = publisher
         self.readers = readers
         self.qos = qos
-        self.patient = patient
+        self.patience = patience
         self.count = 0
 
     def publish(self, message: Any) -> None:
         """Publish and count."""
         self.count += 1
         self.publisher.publish(message)
-        if self.patient and self.count % (self.qos.depth // 2) == 0:
-            self.publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+        if self.patience is not None and self.count % (self.qos.depth // 2) == 0:
+            self.patience.wait(self.publisher)
 
 
 class Inlet:

@@ -1,0 +1,58 @@
+r"""What is known of a process before the record: its impulse response is smooth and dies away.
+
+.. math:: h \sim N(0, \sigma^2 K), \qquad K_{ij} = c\, \lambda^{\max(i, j)}, \quad 0 < \lambda < 1
+
+the *tuned/correlated* kernel of Chen, Ohlsson and Ljung (Automatica 48, 2012). Neither an order
+nor a delay has to be chosen: taps that the record does not need stay near zero. With the
+differences :math:`g_i = h_i - h_{i+1}`, :math:`g_M = h_M`, the prior is a product of independent
+normal distributions, so the inverse of K is tridiagonal and its determinant a product.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+DECAYS = (0.6, 0.75, 0.85, 0.92, 0.96, 0.98)  # per tap: a time constant of 2 to 50 taps
+SIZES = (1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of σ²; per standard deviation of the stem
+
+
+@dataclasses.dataclass(frozen=True)
+class ResponsePrior:
+    """One member of the family.
+
+    Attributes:
+        decay: index of λ in :data:`DECAYS`.
+        size: index of c in :data:`SIZES`.
+    """
+
+    decay: int = 3
+    size: int = 2
+
+    def variances(self, taps: int) -> FloatArray:
+        """Return the variances of the differences g over σ², shape (taps,)."""
+        decay, size = DECAYS[self.decay], SIZES[self.size]
+        powers = size * decay ** np.arange(1, taps + 1)
+        return np.append(powers[:-1] * (1.0 - decay), powers[-1])
+
+    def precision(self, taps: int) -> FloatArray:
+        """Return the inverse of K, shape (taps, taps)."""
+        weights = 1.0 / self.variances(taps)
+        found = np.diag(weights + np.append(0.0, weights[:-1]))
+        found -= np.diag(weights[:-1], 1) + np.diag(weights[:-1], -1)
+        return found
+
+    def log_determinant(self, taps: int) -> float:
+        """Return log det K."""
+        return float(np.log(self.variances(taps)).sum())
+
+    def neighbours(self) -> list[ResponsePrior]:
+        """Return the members next to this one, itself included."""
+        return [
+            ResponsePrior(decay, size)
+            for decay in range(max(self.decay - 1, 0), min(self.decay + 2, len(DECAYS)))
+            for size in range(max(self.size - 1, 0), min(self.size + 2, len(SIZES)))
+        ]

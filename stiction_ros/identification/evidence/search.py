@@ -1,0 +1,201 @@
+"""The frictions that explain a record best: seeds, polish, and what was met on the way.
+
+One function judges, the loss of :mod:`.output_fit`. A seed is only where it is looked at first;
+nothing is accepted that is worse than what is known, and everything that was fitted is kept.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.evidence.output_fit import (
+    Criterion,
+    OutputFit,
+    fit_output,
+    follow,
+    white,
+)
+from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.friction_grid import coarse_grid, cross_grid, finer_grid
+
+SEEDS = 6  # frictions taken from one look at the whole triangle
+APART = 0.03  # of the limit, by which they differ
+MEMORIES = (0.0, 0.95)  # noise under which the triangle is looked at, beside that of the best
+HEADS = 3  # candidates that are polished
+STEP = 0.03  # of the limit: first step of the polish
+FINEST = 1e-4
+SHRINK = 2.5
+LINES = 100  # steps along J and S over the limit
+MOVES = 6  # of the stem, fewest of a candidate
+GAIN = 0.5  # of the loss: a sweep over the valves that gains less is the last
+SWEEPS = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """Frictions of all valves, and every output under them.
+
+    Attributes:
+        friction: rows (f_S, f_D), %, shape (m, 2).
+        stems: scaled, shape (m, n).
+        fits: one per output.
+    """
+
+    friction: FloatArray
+    stems: FloatArray
+    fits: tuple[OutputFit, ...]
+
+    @property
+    def loss(self) -> float:
+        """Sum over the outputs."""
+        return float(sum(fit.loss for fit in self.fits))
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """What a search met.
+
+    Attributes:
+        best: the candidate of least loss.
+        ideal: the best fit without any friction.
+        met: every candidate, best first.
+    """
+
+    best: Candidate
+    ideal: Candidate
+    met: tuple[Candidate, ...]
+
+
+class _Valve:
+    """The search over one valve's friction beside given other valves."""
+
+    def __init__(self, problem: Problem, base: Candidate, valve: int) -> None:
+        self.problem, self.base, self.valve = problem, base, valve
+        self.limit = float(problem.limit[valve])
+        self.met: list[Candidate] = []
+        self._keys: set[tuple[float, float]] = set()
+
+    def losses(self, grid: FloatArray, fits: Sequence[OutputFit]) -> FloatArray:
+        """Return the loss of rows (f_S, f_D) under the noise and prior of ``fits``."""
+        stems = self.problem.stems(self.valve, grid, 0.0)
+        others = np.delete(self.base.stems, self.valve, axis=0)
+        total = np.zeros(len(grid))
+        for i, fit in enumerate(fits):
+            criterion = Criterion.of(self.problem, i, others, fit.noise, fit.prior)
+            total += criterion.losses(stems)
+        moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
+        return np.where(moves < MOVES, np.inf, total)
+
+    def stems(self, friction: FloatArray) -> FloatArray:
+        stems = self.base.stems.copy()
+        stems[self.valve] = self.problem.stems(self.valve, friction[None, :], 0.0)[0]
+        return stems
+
+    def add(self, friction: FloatArray, fits: Sequence[OutputFit], *, whole: bool) -> None:
+        """Fit a friction from neighbouring fits; ``whole`` until nothing changes."""
+        key = (round(float(friction[0]), 9), round(float(friction[1]), 9))
+        if key in self._keys and not whole:
+            return
+        self._keys.add(key)
+        stems = self.stems(friction)
+        if whole:
+            found = tuple(fit_output(self.problem, i, stems, (f,)) for i, f in enumerate(fits))
+        else:
+            found = tuple(follow(self.problem, i, stems, f) for i, f in enumerate(fits))
+        all_friction = self.base.friction.copy()
+        all_friction[self.valve] = friction
+        self.met.append(Candidate(all_friction, stems, found))
+
+    def look(self, fits: Sequence[OutputFit]) -> None:
+        """Take the best of the whole triangle under the noise of ``fits``."""
+        grid = coarse_grid(self.limit)
+        losses = self.losses(grid, fits)
+        for i in apart(grid, losses, SEEDS, APART * self.limit):
+            self.add(grid[i], fits, whole=False)
+
+    def heads(self, count: int, distance: float) -> list[Candidate]:
+        met = sorted(self.met, key=lambda one: one.loss)
+        places = np.array([one.friction[self.valve] for one in met]).reshape(-1, 2)
+        return [met[i] for i in apart(places, np.arange(len(met)), count, distance)]
+
+    def settle(self) -> None:
+        """Fit the heads until nothing changes, once more from the noise of the best."""
+        for head in self.heads(HEADS, APART * self.limit):
+            self.add(head.friction[self.valve], head.fits, whole=True)
+
+    def polish(self) -> None:
+        """Look closer and closer round the heads, and along the lines through them."""
+        step = STEP * self.limit
+        for head in self.heads(HEADS, step):
+            self._take(self._lines(head), head, 2, step)
+        while step > FINEST * self.limit:
+            for head in self.heads(HEADS if step > 0.1 * STEP * self.limit else 1, step):
+                centre = head.friction[self.valve][None, :]
+                self._take(finer_grid(centre, step / 3.0, self.limit), head, 2, step / 3.0)
+            step /= SHRINK
+
+    def _take(self, grid: FloatArray, head: Candidate, count: int, distance: float) -> None:
+        for i in apart(grid, self.losses(grid, head.fits), count, distance):
+            self.add(grid[i], head.fits, whole=False)
+
+    def _lines(self, head: Candidate) -> FloatArray:
+        static, dynamic = head.friction[self.valve]
+        jump, band = np.array([static - dynamic]), np.array([static + dynamic])
+        return cross_grid(jump, band, self.limit, LINES)
+
+
+def apart(places: FloatArray, losses: FloatArray, count: int, distance: float) -> list[int]:
+    """Return the indices of the best of ``places``, shape (G, 2), that are apart, best first."""
+    chosen: list[int] = []
+    for i in np.argsort(losses, kind="stable"):
+        if not np.isfinite(losses[i]) or len(chosen) == count:
+            break
+        if all(np.abs(places[i] - places[j]).max() > distance for j in chosen):
+            chosen.append(int(i))
+    return chosen
+
+
+def ideal(problem: Problem, starts: Iterable[Sequence[OutputFit]] = ()) -> Candidate:
+    """Return the best fit without friction, from white noise and from ``starts``."""
+    stems = problem.ideal_stems()
+    begun: list[list[OutputFit | None]] = [[None] for _ in problem.pv]
+    for fits in starts:
+        for row, fit in zip(begun, fits, strict=True):
+            row.append(fit)
+    fits = tuple(fit_output(problem, i, stems, row) for i, row in enumerate(begun))
+    return Candidate(np.zeros((len(stems), 2)), stems, fits)
+
+
+def search_valve(problem: Problem, base: Candidate, valve: int) -> list[Candidate]:
+    """Return all candidates met in a search over the friction of one valve, best first."""
+    looked = _Valve(problem, base, valve)
+    looked.look(base.fits)
+    for memory in MEMORIES:
+        looked.look([white(problem, i, base.stems, memory) for i in range(len(base.fits))])
+    if looked.met:
+        looked.settle()
+        looked.look(looked.heads(1, 0.0)[0].fits)
+        looked.polish()
+        looked.settle()
+    return sorted([base, *looked.met], key=lambda one: one.loss)
+
+
+def search(problem: Problem) -> Found:
+    """Search the frictions of all valves, one after the other, until nothing changes."""
+    without = ideal(problem)
+    met, best = [without], without
+    for _ in range(SWEEPS if len(problem.op) > 1 else 1):
+        before = best.loss
+        for valve in range(len(problem.op)):
+            found = search_valve(problem, best, valve)
+            met += found
+            best = found[0]
+        if best.loss > before - GAIN:
+            break
+    without = ideal(problem, [one.fits for one in sorted(met, key=lambda one: one.loss)[:HEADS]])
+    met = sorted([without, *met], key=lambda one: one.loss)
+    return Found(met[0], without, tuple(met))
