@@ -11,7 +11,7 @@ LEAST = 1e-12  # share of the output's energy that is always left
 
 
 @compiled_fused
-def whitened(noise: FloatArray, signal: FloatArray, before: FloatArray) -> FloatArray:
+def whitened(noise: FloatArray, signal: FloatArray, before: float) -> FloatArray:
     """Return D(q) of a signal that was ``before`` before its first sample, shape (N,)."""
     out = np.empty(len(signal))
     for k in range(len(signal)):
@@ -23,7 +23,7 @@ def whitened(noise: FloatArray, signal: FloatArray, before: FloatArray) -> Float
 
 
 @compiled_fused
-def lagged(signal: FloatArray, before: FloatArray, first: int, taps: int) -> FloatArray:
+def lagged(signal: FloatArray, before: float, first: int, taps: int) -> FloatArray:
     """Return rows of a signal and its past, one to ``taps`` samples back, shape (taps, N − first).
 
     Args:

@@ -1,0 +1,105 @@
+"""Which frictions a record does not reject."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.stats import chi2
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.evidence.output_fit import Criterion
+from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.search import MOVES, Found
+from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
+
+Interval = tuple[float, float]
+
+FREEDOM = 3  # f_S, f_D, and one for the choice among many
+MISFIT = 0.1
+"""Share of the evidence for friction itself on which no friction is rejected: no valve obeys a
+law to the letter, and what the law misses weighs as much as what it explains grows."""
+STEPS = (0.3, 0.1, 0.03, 0.01, 0.003)  # of f_S + f_D: grids round the best
+
+
+@dataclasses.dataclass(frozen=True)
+class Accepted:
+    """Frictions of one valve, %.
+
+    Attributes:
+        static, dynamic, band: hulls of f_S, f_D and f_S + f_D of what is not rejected.
+        none: whether a valve without friction is not rejected.
+        deadband_loss: by how much the best f_D = f_S is worse than the best.
+        profile: rows (f_S, least loss above the best), best over f_D.
+    """
+
+    static: Interval
+    dynamic: Interval
+    band: Interval
+    none: bool
+    deadband_loss: float
+    profile: tuple[tuple[float, float], ...]
+
+
+def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> Accepted:
+    """Hold frictions near the best, and all that the search met, against the best.
+
+    Args:
+        problem: the record.
+        found: by the search.
+        valve: index.
+        confidence: level of the intervals.
+    """
+    best = found.best
+    gain = found.ideal.loss - best.loss
+    slack = float(chi2.ppf(confidence, FREEDOM)) + MISFIT * max(gain, 0.0)
+    rows, losses = _looked_at(problem, found, valve)
+    inside = losses <= best.loss + slack
+    static, dynamic = rows[inside].T
+    band = static + dynamic
+    flat = rows[:, 1] >= rows[:, 0] * (1.0 - 1e-9)
+    return Accepted(
+        static=(float(static.min()), float(static.max())),
+        dynamic=(float(dynamic.min()), float(dynamic.max())),
+        band=(float(band.min()), float(band.max())),
+        none=gain <= slack,
+        deadband_loss=float(losses[flat].min(initial=np.inf) - best.loss),
+        profile=_profile(rows[:, 0], losses - best.loss),
+    )
+
+
+def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, FloatArray]:
+    """Return frictions, shape (G, 2), and their losses, those of exact fits first."""
+    best, limit = found.best, float(problem.limit[valve])
+    met = [one for one in found.met if one.friction[valve, 0] > 0.0] or [best]
+    rows = [np.array([one.friction[valve] for one in met])]
+    losses = [np.array([one.loss for one in met])]
+    centre = best.friction[valve]
+    grids = [coarse_grid(limit)]
+    if centre[0] > 0.0:
+        size = float(centre.sum())
+        grids += [finer_grid(centre[None, :], step * size / 3.0, limit) for step in STEPS]
+    grid = np.vstack(grids)
+    grid = np.vstack([grid, np.column_stack([grid[:, 0], grid[:, 0]])])  # deadbands
+    stems = problem.stems(valve, grid, 0.0)
+    total = np.zeros(len(grid))
+    for i, fit in enumerate(best.fits):
+        others = np.delete(best.stems, valve, axis=0)
+        total += Criterion.of(problem, i, others, fit.noise, fit.prior).losses(stems)
+    moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
+    rows.append(grid)
+    losses.append(np.where(moves < MOVES, np.inf, total))
+    return np.vstack(rows), np.concatenate(losses)
+
+
+def _profile(static: FloatArray, losses: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Return the lower envelope of the loss over f_S."""
+    order = np.argsort(static, kind="stable")
+    static, losses = static[order], losses[order]
+    edges = np.flatnonzero(np.diff(static, prepend=-1.0) > 1e-9)
+    least = np.minimum.reduceat(losses, edges)
+    return tuple(
+        (float(f), float(loss))
+        for f, loss in zip(static[edges], least, strict=True)
+        if np.isfinite(loss)
+    )
