@@ -30,6 +30,9 @@ CYCLES = 14
 FEWEST, MOST = 240, 6000
 """Samples of a run."""
 
+KNOWN = 1e-10
+"""Variance of coefficients over their square that is rounding and no uncertainty."""
+
 DOUBTED = 0.7
 """Share of the friction that is tried as its least where the interval begins at none."""
 
@@ -274,7 +277,7 @@ def tried_tunings(law: RecoveredController) -> FloatArray:
     values, vectors = np.linalg.eigh(law.covariance)
     found = [law.coefficients]
     for value, vector in zip(values, vectors.T, strict=True):
-        if value <= 1e-12 * max(float(values.max()), 1e-300):
+        if value <= KNOWN * float(law.coefficients @ law.coefficients):
             continue
         for sign in (-1.0, 1.0):
             one = law.coefficients + sign * np.sqrt(value) * vector

@@ -54,14 +54,15 @@ def known(
     wanted = np.full(samples, 20.0) if sp is None else sp
     valve = HeStiction(*kind.friction)
     y, pv, op, stem = np.zeros(samples), np.zeros(samples), np.zeros(samples), np.zeros(samples)
-    position, command, before = 0.0, 0.0, 0.0
+    start = -0.9 * kind.friction[0]  # no rest to stay in
+    position, command, before = start, 0.0, 0.0
     error = np.zeros(samples)
     for k in range(samples):
         for i in range(2):
             if k > i:
                 y[k] -= A[i] * y[k - 1 - i]
-            if k - 1 - i - DELAY >= 0:
-                y[k] += B[i] * stem[k - 1 - i - DELAY]
+            late = k - 1 - i - DELAY
+            y[k] += B[i] * (stem[late] if late >= 0 else start)
         pv[k] = 20.0 + y[k] + outside[k] + noise[k]
         error[k] = wanted[k] - pv[k]
         seen = error[k - kind.lag] if k >= kind.lag else 0.0

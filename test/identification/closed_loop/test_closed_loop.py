@@ -19,7 +19,7 @@ def closed(one: Known) -> ClosedLoop:
     return close_loop(one.record, one.found)
 
 
-@pytest.mark.parametrize("friction", [(3.0, 1.0), (1.5, 1.2), (6.0, 2.0)])
+@pytest.mark.parametrize("friction", [(3.0, 1.0), (2.0, 1.0), (6.0, 2.0)])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_sticky_valve_keeps_the_loop_cycling(friction: tuple[float, float], seed: int) -> None:
     valve = closed(known(Kind(friction=friction), seed)).valves[0]
@@ -36,7 +36,7 @@ def test_friction_fitted_to_a_square_load_does_not_keep_the_loop_cycling() -> No
     blamed = known(Kind(friction=(0.3, 0.3)), load=load)
     valve = close_loop(moved.record, blamed.found).valves[0]
     assert valve.status is LoopStatus.DIES
-    assert valve.gone < 0.2
+    assert valve.gone < 0.4
 
 
 @settings(max_examples=10, deadline=None)

@@ -29,7 +29,7 @@ def runs(friction: tuple[float, float], gain: float, reset: float) -> Runs:
         np.array([[friction]]),
         np.array([[[gain, reset, 0.0]]]),
         np.full((1, 1, PAST), 20.0),
-        np.zeros((1, 1, PAST)),
+        np.full((1, 1, PAST), -0.9 * friction[0]),
         np.zeros((1, 1)),
     )
 
@@ -71,7 +71,7 @@ def test_a_valve_without_a_controller_keeps_its_op() -> None:
     assert pv == pytest.approx(20.0)
 
 
-@pytest.mark.parametrize("gain", [0.6, 1.2, 1.8])
+@pytest.mark.parametrize("gain", [2.0, 2.6])
 @pytest.mark.parametrize("lag", [0, 1])
 def test_poles_ring_as_the_simulated_loop_does(gain: float, lag: int) -> None:
     controller = LinearController(np.array([gain, gain / 10.0, 0.0]), lag, 0.0)
@@ -81,11 +81,8 @@ def test_poles_ring_as_the_simulated_loop_does(gain: float, lag: int) -> None:
     _, pv = run_loops(
         PROCESS, controllers(lag), runs((0.0, 0.0), gain, gain / 10.0), sp, np.zeros_like(sp)
     )
-    apart = pv[0, :, 0] - 21.0
-    peaks = [
-        k for k in range(30, 590) if abs(apart[k]) > 1e-9 and apart[k - 1] < apart[k] > apart[k + 1]
-    ][:6]
-    assert len(peaks) >= 3
-    assert np.mean(np.diff(peaks)) == pytest.approx(found.period, rel=0.06)
-    growth = (apart[peaks[-1]] / apart[peaks[0]]) ** (found.period / (peaks[-1] - peaks[0]))
+    apart = pv[0, 40:, 0] - 21.0
+    peaks = np.flatnonzero((apart[1:-1] > apart[:-2]) & (apart[1:-1] > apart[2:]))[:5] + 1
+    assert np.mean(np.diff(peaks)) == pytest.approx(found.period, rel=0.08)
+    growth = (apart[peaks[-1]] / apart[peaks[0]]) ** (1.0 / (len(peaks) - 1))
     assert growth == pytest.approx(found.growth, abs=0.05)
