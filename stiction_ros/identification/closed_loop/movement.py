@@ -18,6 +18,9 @@ SAME_PERIOD = 1.6
 SLOW = 3.0
 """Periods over which the slow mean is taken."""
 
+LATE = 0.6
+"""Share of a run, at its end, that is looked at."""
+
 FAST = 8.0
 """Parts of a period over which noise is averaged out."""
 
@@ -79,14 +82,14 @@ def compare(runs: FloatArray, recorded: float, period: float) -> Movement:
         recorded: size of the recorded movement, units of OP.
         period: recorded one, samples.
     """
-    first, late = runs.shape[1] // 3, 2 * runs.shape[1] // 3
+    late = int((1.0 - LATE) * runs.shape[1])
     ratios, periods = [], []
     for run in runs:
         if not np.isfinite(run).all():
             ratios.append(np.inf)
             periods.append(0.0)
             continue
-        moved = moving(run[first:], period)[late - first :]
+        moved = run[late:] - run[late:].mean()
         ratios.append(size(moved) / recorded)
         periods.append(own_period(moved) / period)
     ratio, own = np.array(ratios), np.array(periods)

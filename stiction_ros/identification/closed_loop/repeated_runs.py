@@ -25,10 +25,19 @@ KICKS = (-2.0, 2.0)
 """Standard deviations of PV by which the other runs begin away from rest."""
 
 CYCLES = 14
-"""Periods that a run goes on; the last third is looked at."""
+"""Periods that a run goes on."""
 
 FEWEST, MOST = 240, 6000
 """Samples of a run."""
+
+NOISES = 3
+"""Noises drawn for each friction when a record is repeated."""
+
+LINES = 3
+"""Harmonics of a cycle that are taken out of what the model leaves."""
+
+SEED = 20
+"""Of the noises: the same record gives the same answer."""
 
 KNOWN = 1e-10
 """Variance of coefficients over their square that is rounding and no uncertainty."""
@@ -161,6 +170,41 @@ class Repeated:
         sizes = [amplitude(run, [(0, len(run))], period) or 0.0 for run in op]
         return 1.0 - sizes[1] / sizes[0] if sizes[0] > 0.0 else 0.0
 
+    def repeated(self, valve: int, period: float) -> tuple[FloatArray, FloatArray]:
+        """Return OP and PV − SP of one valve's loop as the record might have gone again.
+
+        From the recorded start with the recorded set-point, and with noise of the spectrum of
+        what the model leaves, its line at the period and twice and three times as fast taken
+        out. First with the frictions tried, then as often without.
+
+        Args:
+            valve: index.
+            period: of the cycle, samples.
+
+        Returns:
+            Both of shape (2 R, n).
+        """
+        first, last = self._end(self.loop.longest)
+        noises = [
+            without_lines(self.load[first:last, i], period) for i in range(self._p)
+        ]
+        random = np.random.default_rng(SEED)
+        tried = self.frictions[valve]
+        number = NOISES * len(tried)
+        frictions = np.repeat(self.frictions[None, :, 0], 2 * number, axis=0)
+        frictions[number:, valve] = 0.0
+        load = np.empty((2 * number, last - first, self._p))
+        for n in range(NOISES):
+            again = np.column_stack([surrogate(noise, random) for noise in noises])
+            for k, pair in enumerate(tried):
+                row = n * len(tried) + k
+                frictions[row, valve] = pair
+                load[row] = load[number + row] = again
+        op, pv = self._both(first, last, frictions, load)
+        output = self.pairs[valve][0]
+        sp = self._set_points(slice(first + self.past, last))[:, output]
+        return op[:, :, valve], pv[:, :, output] - sp
+
     @property
     def _p(self) -> int:
         return self.loop.pv.shape[1]
@@ -181,7 +225,13 @@ class Repeated:
         return sp
 
     def _again(self, first: int, last: int, frictions: FloatArray, load: FloatArray) -> FloatArray:
-        """Return OP, shape (R, n, m), from the recorded state after ``past`` samples on.
+        """Return OP of :meth:`_both`."""
+        return self._both(first, last, frictions, load)[0]
+
+    def _both(
+        self, first: int, last: int, frictions: FloatArray, load: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return OP, (R, n, m), and PV, (R, n, p), from the recorded state after ``past`` samples.
 
         Args:
             first, last: rows.
@@ -198,7 +248,7 @@ class Repeated:
             np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
         )
         sp = np.repeat(self._set_points(slice(first, last))[None], number, axis=0)
-        return run_loops(self.process, self.controllers, runs, sp, np.ascontiguousarray(load))[0]
+        return run_loops(self.process, self.controllers, runs, sp, np.ascontiguousarray(load))
 
     def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
         """Return OP of one valve, shape (R, n), without a load and with resting set-points."""
@@ -258,6 +308,30 @@ class _Start:
     stem: FloatArray
     op: FloatArray
     sp: FloatArray
+
+
+def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Return noise of the spectrum of ``values``, shape (N,), its phases drawn anew.
+
+    References:
+        J. Theiler, S. Eubank, A. Longtin, B. Galdrikian, J. D. Farmer: Testing for nonlinearity
+        in time series: the method of surrogate data. Physica D 58, 1992, 77-94.
+    """
+    spectrum = np.fft.rfft(values)
+    turns = np.exp(2j * np.pi * random.random(len(spectrum)))
+    turns[0] = 1.0
+    return np.asarray(np.fft.irfft(spectrum * turns, len(values)))
+
+
+def without_lines(values: FloatArray, period: float) -> FloatArray:
+    """Return ``values``, shape (N,), without sine and cosine at the period and its harmonics."""
+    angle = 2 * np.pi / period * np.arange(len(values))
+    columns = [np.ones(len(values))]
+    for k in range(1, LINES + 1):
+        columns += [np.cos(k * angle), np.sin(k * angle)]
+    basis = np.column_stack(columns)
+    mean = float(values.mean())
+    return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0] + mean)
 
 
 def tried_frictions(valve: ValveEstimate) -> FloatArray:
