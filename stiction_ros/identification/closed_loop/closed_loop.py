@@ -10,12 +10,21 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import math
 
 from stiction_ros.identification.closed_loop.damping import LinearController, Ringing, ringing
+from stiction_ros.identification.closed_loop.loop_run import Process
 from stiction_ros.identification.closed_loop.movement import STILL, Movement, compare
 from stiction_ros.identification.closed_loop.oscillation import (
     Oscillation,
+    amplitude,
     oscillation,
+)
+from stiction_ros.identification.closed_loop.outside_line import (
+    NO_LINE,
+    OutsideLine,
+    Predicted,
+    outside_line,
 )
 from stiction_ros.identification.closed_loop.recovered_controller import (
     ControllerStatus,
@@ -23,9 +32,14 @@ from stiction_ros.identification.closed_loop.recovered_controller import (
     RecoveredController,
     recover,
 )
-from stiction_ros.identification.closed_loop.repeated_runs import Repeated, period_of, span_of
+from stiction_ros.identification.closed_loop.repeated_runs import (
+    MOST,
+    Repeated,
+    period_of,
+    span_of,
+)
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, scaled, scaled_process
-from stiction_ros.identification.results import FitStatus, Identification
+from stiction_ros.identification.results import FitStatus, Identification, ValveEstimate
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 
@@ -71,38 +85,55 @@ class ValveLoop:
         driven: share of OP's movement, 0 to 1, that the loop without friction makes of the
             recorded set-point alone.
         band_share: f_S + f_D over the width of OP's movement about its slow mean.
-        gone: share of the cycle of OP that goes away without the friction when what the model
-            leaves is kept as a load.
+        moved_with, moved_without: movement of OP over the recorded one when the record is
+            repeated with its set-point and noise, with the friction and without.
+        gone: share of that movement that goes away with the friction.
+        before: a line from outside in OP, beside what comes from PV.
+        outside: a line from outside in PV, beside what comes from the stem.
     """
 
     valve: str
     output: str
     status: LoopStatus
     reason: str
-    controller: RecoveredController | None
+    controller: RecoveredController | None = None
+    oscillation: Oscillation | None = None
+    with_friction: Movement = STILL
+    without_friction: Movement = STILL
+    ringing: tuple[Ringing, ...] = ()
+    driven: float = 0.0
+    band_share: float = 0.0
+    moved_with: float = 0.0
+    moved_without: float = 0.0
+    gone: float = 0.0
+    before: OutsideLine = NO_LINE
+    outside: OutsideLine = NO_LINE
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputLoop:
+    """One output in its loop.
+
+    Attributes:
+        name: its tag.
+        oscillation: of PV − SP, engineering units; None where there is no room for one.
+        after: a line from outside in PV at this period, beside what comes from the stems.
+        set_point_line: line of the recorded set-point at this period over that of PV; None
+            where no set-point was recorded.
+    """
+
+    name: str
     oscillation: Oscillation | None
-    with_friction: Movement
-    without_friction: Movement
-    ringing: tuple[Ringing, ...]
-    driven: float
-    band_share: float
-    gone: float
+    after: OutsideLine = NO_LINE
+    set_point_line: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
 class ClosedLoop:
-    """All valves of a record in their loops, and how its outputs oscillate.
-
-    Attributes:
-        valves: in the order of the record.
-        oscillations: of PV − SP of each output; None where there is none to speak of.
-        loads: of what the model leaves of each PV, the same.
-        periods: of OP or PV of each output, samples.
-    """
+    """All valves and outputs of a record in their loops, in the order of the record."""
 
     valves: tuple[ValveLoop, ...]
-    oscillations: tuple[Oscillation | None, ...]
-    loads: tuple[Oscillation | None, ...]
+    outputs: tuple[OutputLoop, ...]
 
 
 def close_loop(record: Record, found: Identification) -> ClosedLoop:
@@ -118,22 +149,48 @@ def close_loop(record: Record, found: Identification) -> ClosedLoop:
     loop = scaled(record, found.stem) if found.status is FitStatus.OK else None
     if loop is None:
         reason = found.reason or "OP or PV does not move"
-        valves = tuple(_untestable(tag, reason) for tag in record.valves)
-        nothing = (None,) * len(record.outputs)
-        return ClosedLoop(valves, nothing, nothing)
+        return ClosedLoop(
+            tuple(ValveLoop(tag, "", LoopStatus.UNTESTABLE, reason) for tag in record.valves),
+            tuple(OutputLoop(tag, None) for tag in record.outputs),
+        )
     process = scaled_process(found.outputs, record.valves, loop)
-    swings = [oscillation(loop.op[:, j], loop.stretches) for j in range(loop.op.shape[1])]
-    errors = [output_oscillation(loop, i) for i in range(loop.pv.shape[1])]
+    swings = [oscillation(loop.op[:, j], loop.stretches) for j in range(len(record.valves))]
     periods = [period_of(swing, loop, UNSEEN_CYCLES) for swing in swings]
-    pairs = paired(loop, periods)
-    repeated = Repeated.of(loop, process, found.valves, pairs, periods)
-    valves = tuple(_valve(record, found, repeated, j, swings[j]) for j in range(len(record.valves)))
-    loads = [oscillation(repeated.load[:, i], loop.stretches) for i in range(loop.pv.shape[1])]
-    return ClosedLoop(
-        valves,
-        tuple(in_units(one, loop.pv_scale[i]) for i, one in enumerate(errors)),
-        tuple(in_units(one, loop.pv_scale[i]) for i, one in enumerate(loads)),
-    )
+    outputs = [_output(loop, process, tag, i) for i, tag in enumerate(record.outputs)]
+    repeated = Repeated.of(loop, process, found.valves, paired(loop, periods), periods)
+    valves = [
+        _valve(repeated, estimate, outputs, in_units(swing, loop.op_scale[j]), j)
+        for j, (estimate, swing) in enumerate(zip(found.valves, swings, strict=True))
+    ]
+    in_pv = [
+        dataclasses.replace(one, oscillation=in_units(one.oscillation, loop.pv_scale[i]))
+        for i, one in enumerate(outputs)
+    ]
+    return ClosedLoop(tuple(valves), tuple(in_pv))
+
+
+def _output(loop: ScaledLoop, process: Process, tag: str, i: int) -> OutputLoop:
+    """Return how an output oscillates, scaled, and whether a clock outside drives it."""
+    swing = output_oscillation(loop, i)
+    if swing is None:
+        return OutputLoop(tag, None)
+    rows = _last_rows(loop)
+    stems = [loop.stem[rows, j] for j in range(loop.op.shape[1])]
+    delays = [int(delay) + 1 for delay in process.delay[i]]
+    after = outside_line(Predicted(loop.pv[rows, i], stems, delays), swing.period)
+    if loop.sp is None:
+        return OutputLoop(tag, swing, after)
+    whole = [(0, rows.stop - rows.start)]
+    lines = [
+        amplitude(values[rows, i], whole, swing.period) or 0.0 for values in (loop.sp, loop.pv)
+    ]
+    return OutputLoop(tag, swing, after, lines[0] / max(lines[1], 1e-300))
+
+
+def _last_rows(loop: ScaledLoop) -> slice:
+    """Return the end of the longest stretch, as many samples as a run has at most."""
+    first, last = loop.longest
+    return slice(max(first, last - MOST), last)
 
 
 def output_oscillation(loop: ScaledLoop, i: int) -> Oscillation | None:
@@ -183,43 +240,50 @@ def in_units(swing: Oscillation | None, scale: float) -> Oscillation | None:
 
 
 def _valve(
-    record: Record, found: Identification, repeated: Repeated, j: int, swing: Oscillation | None
+    repeated: Repeated,
+    estimate: ValveEstimate,
+    outputs: list[OutputLoop],
+    swing: Oscillation | None,
+    j: int,
 ) -> ValveLoop:
-    loop, (i, law) = repeated.loop, repeated.pairs[j]
-    scale = float(loop.op_scale[j])
-    told = in_units(swing, scale)
-    estimate = found.valves[j]
+    loop, (i, law), period = repeated.loop, repeated.pairs[j], repeated.periods[j]
+    scale, tag = float(loop.op_scale[j]), estimate.name
     band = (estimate.static_friction + estimate.dynamic_friction) / scale
-    share = band / max(span_of(loop, j, repeated.periods[j]), 1e-12)
+    share = band / max(span_of(loop, j, period), 1e-12)
     if i < 0:
-        blank = _untestable(record.valves[j], law.reason)
-        return dataclasses.replace(blank, oscillation=told, band_share=share)
+        return ValveLoop(
+            tag, "", LoopStatus.UNTESTABLE, law.reason, oscillation=swing, band_share=share
+        )
     recorded = repeated.recorded(j)
-    period = repeated.periods[j]
     free = compare(repeated.without_friction(j), recorded, period)
-    rings = ringing(
-        repeated.process, i, j, LinearController(law.coefficients, law.lag, law.smoothing)
-    )
-    driven, gone = repeated.driven(j), 0.0
+    linear = LinearController(law.coefficients, law.lag, law.smoothing)
+    cycle = outputs[i].oscillation
+    at = period if cycle is None else cycle.period
+    moved = repeated.moved(j, at)
     if estimate.static_friction > 0.0:
         stuck = compare(repeated.with_friction(j), recorded, period)
-        gone = repeated.gone(j)
         status, reason = _status(stuck), ""
     else:
         stuck, status, reason = STILL, LoopStatus.UNTESTABLE, "no friction was identified"
+    rows = _last_rows(loop)
+    error = law.set_point[rows] - loop.pv[rows, i]
     return ValveLoop(
-        record.valves[j],
-        record.outputs[i],
+        tag,
+        outputs[i].name,
         status,
         reason,
         _in_units(law, scale, float(loop.pv_scale[i]), float(loop.pv_mean[i])),
-        told,
+        swing,
         stuck,
         free,
-        rings,
-        driven,
+        ringing(repeated.process, i, j, linear),
+        repeated.driven(j),
         share,
-        gone,
+        moved[0],
+        moved[1],
+        max(0.0, 1.0 - moved[1] / moved[0]) if 0.0 < moved[0] < math.inf else 0.0,
+        outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
+        outputs[i].after,
     )
 
 
@@ -239,10 +303,4 @@ def _in_units(
         coefficients=law.coefficients * ratio,
         covariance=law.covariance * ratio**2,
         set_point=law.set_point * pv_scale + pv_mean,
-    )
-
-
-def _untestable(tag: str, reason: str) -> ValveLoop:
-    return ValveLoop(
-        tag, "", LoopStatus.UNTESTABLE, reason, None, None, STILL, STILL, (), 0.0, 0.0, 0.0
     )

@@ -7,10 +7,13 @@
   periods that fits after half a period for settling; sine, cosine and a constant are fitted to
   them, and the squared amplitudes are averaged with the number of samples as weight. A stretch
   too short for one period says nothing.
-- *Regularity*: mean of the intervals between zero crossings over three of their standard
-  deviations (N. F. Thornhill, B. Huang, H. Zhang, J. Process Control 13 (2003) 91-100), of the
-  signal behind a filter as narrow as one and a half periods allow. White noise reaches about
-  .9 with it, a sine in as much noise 4 and more.
+- *Regularity*: mean of the intervals between zero crossings of the autocorrelation over three
+  of their standard deviations. Noise averages out in the autocorrelation; a cycle that keeps its
+  time leaves even intervals.
+
+References:
+    N. F. Thornhill, B. Huang, H. Zhang: Detection of multiple oscillations in control loops.
+    J. Process Control 13, 2003, 91-100.
 """
 
 from __future__ import annotations
@@ -36,8 +39,14 @@ SHORTEST = 6.0
 FINE = 16
 """Frequencies per line width: a step turns the phase by 1/16 of a cycle over a stretch."""
 
-FILTER = 1.5
-"""Length of the filter before zero crossings, periods: white noise then stays irregular."""
+FASTEST = 3.0
+"""Samples of a period that a regular autocorrelation may show."""
+
+CROSSINGS = 6, 13
+"""Zero crossings of the autocorrelation needed, and looked at: later ones are noise."""
+
+NEAR = 1.4
+"""Factor within which the line of a regular oscillation lies from its period."""
 
 REGULAR = 1.0
 """Regularity from which on an oscillation is regular."""
@@ -94,28 +103,29 @@ def oscillation(values: FloatArray, stretches: Stretches) -> Oscillation | None:
     level = values.copy()
     for first, last in stretches:
         level[first:last] -= slow_mean(values[first:last], slowest)
-    cycle = dominant_cycle(level[:, None], stretches, slowest)
+    first, last = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
+    regular, period = regularity(level[first:last])
+    periods = (SHORTEST, slowest)
+    if regular > REGULAR and FASTEST < period < slowest:
+        periods = (max(period / NEAR, FASTEST), min(period * NEAR, slowest))
+    cycle = dominant_cycle(level[:, None], stretches, periods)
     if cycle is None:
         return None
     size = amplitude(level, stretches, cycle.period)
     return Oscillation(
-        cycle.period,
-        cycle.share,
-        cycle.count,
-        regularity(level, stretches, cycle.period),
-        0.0 if size is None else size,
+        cycle.period, cycle.share, cycle.count, regular, 0.0 if size is None else size
     )
 
 
 def dominant_cycle(
-    error: FloatArray, stretches: Stretches, slowest: float | None = None
+    error: FloatArray, stretches: Stretches, periods: tuple[float, float] | None = None
 ) -> Cycle | None:
     """Return the oscillation that explains the errors inside the stretches best.
 
     Args:
         error: PV − SP, shape (N, p).
         stretches: the holds.
-        slowest: longest period looked for, samples; None for the longest hold.
+        periods: shortest and longest looked for, samples; None for all up to the longest hold.
 
     Returns:
         None when no hold has room for one period, or nothing moves at all.
@@ -127,8 +137,9 @@ def dominant_cycle(
     if longest < 2 * SHORTEST or not np.any(total > 0):
         return None
     count = sum(b - a for a, b in settled)
-    least = FINE if slowest is None else max(FINE, int(np.ceil(FINE * longest / slowest)))
-    bins = np.arange(least, int(np.ceil(FINE * longest / SHORTEST)))
+    shortest, slowest = periods or (SHORTEST, float(longest))
+    least = max(FINE, int(np.ceil(FINE * longest / slowest)))
+    bins = np.arange(least, int(np.ceil(FINE * longest / shortest)))
     if not len(bins):
         return None
     frequencies = bins / (FINE * longest)
@@ -155,37 +166,26 @@ def amplitude(error: FloatArray, stretches: Stretches, period: float) -> float |
     return float(np.sqrt(squares / weight)) if weight else None
 
 
-def regularity(values: FloatArray, stretches: Stretches, period: float) -> float:
-    """Return the mean interval between zero crossings over three standard deviations.
-
-    Args:
-        values: shape (N,).
-        stretches: those too short for two periods are left out.
-        period: about which the signal is looked at, samples.
+def regularity(values: FloatArray) -> tuple[float, float]:
+    """Return regularity and period, samples, by the autocorrelation of ``values``, shape (N,).
 
     Returns:
-        0 where there are fewer crossings than four cycles have.
+        Zeros where the first half of the lags has fewer than six zero crossings.
     """
-    reach = round(FILTER * period / 2)
-    place = np.arange(-reach, reach + 1)
-    window = np.cos(np.pi * place / (2 * reach + 2)) ** 2
-    taps = window * np.cos(2 * np.pi * place / period)
-    taps -= window * taps.sum() / window.sum()
-    edge = int(period / 2)
-    intervals = []
-    for first, last in stretches:
-        if last - first < 2 * max(period, len(taps)):
-            continue
-        part = values[first:last] - values[first:last].mean()
-        passed = np.convolve(part, taps, mode="same")[edge : last - first - edge]
-        rows = np.flatnonzero(passed[1:] * passed[:-1] < 0.0)
-        crossings = rows + passed[rows] / (passed[rows] - passed[rows + 1])
-        intervals.append(np.diff(crossings))
-    found = np.concatenate(intervals) if intervals else np.empty(0)
-    if len(found) < 2 * NEEDED_CYCLES - 3:  # half a cycle is lost at each end, and one interval
-        return 0.0
-    spread = max(float(found.std()), 1e-3 * float(found.mean()))
-    return float(found.mean()) / (3.0 * spread)
+    count = len(values)
+    row = np.arange(count) - 0.5 * (count - 1)
+    level = values - values.mean()
+    level = level - row * float(row @ level) / max(float(row @ row), 1e-300)
+    length = 1 << (2 * count - 1).bit_length()
+    power = np.abs(np.fft.rfft(level, length)) ** 2
+    correlation = np.fft.irfft(power, length)[: count // 2]
+    crossings = np.flatnonzero(np.diff(np.signbit(correlation)))[: CROSSINGS[1]]
+    if len(crossings) < CROSSINGS[0]:
+        return 0.0, 0.0
+    before, after = correlation[crossings], correlation[crossings + 1]
+    intervals = np.diff(crossings + before / (before - after))
+    mean = float(intervals.mean())
+    return mean / (3.0 * max(float(intervals.std(ddof=1)), 1e-3 * mean)), 2.0 * mean
 
 
 def slow_mean(values: FloatArray, width: float) -> FloatArray:

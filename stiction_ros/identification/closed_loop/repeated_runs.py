@@ -12,7 +12,6 @@ from stiction_ros.identification.closed_loop.loop_run import Controllers, Proces
 from stiction_ros.identification.closed_loop.movement import moving, size
 from stiction_ros.identification.closed_loop.oscillation import (
     Oscillation,
-    amplitude,
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
@@ -154,56 +153,39 @@ class Repeated:
         apart = recorded - moving(op[0, :, valve], period)
         return max(0.0, 1.0 - float(apart @ apart) / max(float(recorded @ recorded), 1e-300))
 
-    def gone(self, valve: int) -> float:
-        """Return the share of the cycle of OP that goes away without the friction.
+    def moved(self, valve: int, period: float) -> tuple[float, float]:
+        """Return the movement of OP over the recorded one, with friction and without.
 
-        Both runs keep the recorded set-point, and what the model leaves of PV as a load.
-        """
-        first, last = self._end(self.loop.longest)
-        frictions = np.repeat(self.frictions[None, :, 0], 2, axis=0)
-        frictions[1, valve] = 0.0
-        load = np.repeat(self.load[None, first:last], 2, axis=0)
-        op = self._again(first, last, frictions, load)[:, :, valve]
-        if not np.isfinite(op).all():
-            return 0.0
-        period = self.periods[valve]
-        sizes = [amplitude(run, [(0, len(run))], period) or 0.0 for run in op]
-        return 1.0 - sizes[1] / sizes[0] if sizes[0] > 0.0 else 0.0
-
-    def repeated(self, valve: int, period: float) -> tuple[FloatArray, FloatArray]:
-        """Return OP and PV − SP of one valve's loop as the record might have gone again.
-
-        From the recorded start with the recorded set-point, and with noise of the spectrum of
-        what the model leaves, its line at the period and twice and three times as fast taken
-        out. First with the frictions tried, then as often without.
+        The record is repeated from its start with its set-point, and with noise of the
+        spectrum of what the model leaves, without the line at the period. Medians of the
+        frictions and noises tried; infinite where most runs grow without end.
 
         Args:
             valve: index.
             period: of the cycle, samples.
-
-        Returns:
-            Both of shape (2 R, n).
         """
         first, last = self._end(self.loop.longest)
-        noises = [
-            without_lines(self.load[first:last, i], period) for i in range(self._p)
-        ]
+        noises = [without_lines(self.load[first:last, i], period) for i in range(self._p)]
         random = np.random.default_rng(SEED)
         tried = self.frictions[valve]
+        tried = tried if tried.any() else tried[:1]
         number = NOISES * len(tried)
-        frictions = np.repeat(self.frictions[None, :, 0], 2 * number, axis=0)
+        frictions = np.repeat(self.frictions[None, :, 0], number + NOISES, axis=0)
         frictions[number:, valve] = 0.0
-        load = np.empty((2 * number, last - first, self._p))
+        load = np.empty((number + NOISES, last - first, self._p))
         for n in range(NOISES):
-            again = np.column_stack([surrogate(noise, random) for noise in noises])
+            load[number + n] = np.column_stack([surrogate(noise, random) for noise in noises])
             for k, pair in enumerate(tried):
-                row = n * len(tried) + k
-                frictions[row, valve] = pair
-                load[row] = load[number + row] = again
-        op, pv = self._both(first, last, frictions, load)
-        output = self.pairs[valve][0]
-        sp = self._set_points(slice(first + self.past, last))[:, output]
-        return op[:, :, valve], pv[:, :, output] - sp
+                frictions[n * len(tried) + k, valve] = pair
+                load[n * len(tried) + k] = load[number + n]
+        op = self._again(first, last, frictions, load)[:, :, valve]
+        recorded = size(moving(self.loop.op[first + self.past : last, valve], period))
+        sizes = [size(moving(run, period)) if np.isfinite(run).all() else np.inf for run in op]
+        with_friction, without = np.sort(sizes[:number]), np.sort(sizes[number:])
+        return (
+            float(with_friction[number // 2]) / recorded,
+            float(without[NOISES // 2]) / recorded,
+        )
 
     @property
     def _p(self) -> int:
@@ -225,13 +207,7 @@ class Repeated:
         return sp
 
     def _again(self, first: int, last: int, frictions: FloatArray, load: FloatArray) -> FloatArray:
-        """Return OP of :meth:`_both`."""
-        return self._both(first, last, frictions, load)[0]
-
-    def _both(
-        self, first: int, last: int, frictions: FloatArray, load: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return OP, (R, n, m), and PV, (R, n, p), from the recorded state after ``past`` samples.
+        """Return OP, shape (R, n, m), from the recorded state after ``past`` samples on.
 
         Args:
             first, last: rows.
@@ -248,7 +224,7 @@ class Repeated:
             np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
         )
         sp = np.repeat(self._set_points(slice(first, last))[None], number, axis=0)
-        return run_loops(self.process, self.controllers, runs, sp, np.ascontiguousarray(load))
+        return run_loops(self.process, self.controllers, runs, sp, np.ascontiguousarray(load))[0]
 
     def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
         """Return OP of one valve, shape (R, n), without a load and with resting set-points."""

@@ -1,0 +1,151 @@
+"""Which cause explains an oscillation: one decision from all that closing the loop shows."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
+from stiction_ros.identification.closed_loop.closed_loop import (
+    ClosedLoop,
+    LoopStatus,
+    OutputLoop,
+    ValveLoop,
+    close_loop,
+)
+from stiction_ros.identification.closed_loop.oscillation import REGULAR
+from stiction_ros.identification.results import Identification, ValveEstimate
+from stiction_ros.records.record import Record
+
+BELIEVED = 20.0
+"""BIC by which friction must beat the friction-free model to be a cause."""
+
+MATERIAL = 0.15
+"""Share of OP's movement that must go away with the friction for the valve to be the cause."""
+
+LINE = 6.0
+"""BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
+
+DRIVEN = 0.5
+"""Share of the cycle, of PV and of OP, that the set-point must make to be the cause."""
+
+OPEN = 0.9
+"""R² of the controller below which an unrecorded set-point may move OP."""
+
+RINGING = 0.65
+"""Share of an oscillation left after a period: a quarter is the usual tuning, .65 rings long."""
+
+SAME_PERIOD = 1.3
+"""Factor within which the loop rings at the period of the oscillation."""
+
+
+def explained(record: Record, found: Identification) -> Identification:
+    """Return the identification with causes, and with what the closed loop says of each valve."""
+    closed = close_loop(record, found)
+    valves = tuple(
+        dataclasses.replace(
+            valve, band_share=loop.band_share, evidence={**valve.evidence, **figures(loop)}
+        )
+        for valve, loop in zip(found.valves, closed.valves, strict=True)
+    )
+    outputs = tuple(
+        dataclasses.replace(model, cause=cause(record, found, closed, i))
+        for i, model in enumerate(found.outputs)
+    )
+    return dataclasses.replace(found, valves=valves, outputs=outputs)
+
+
+def figures(loop: ValveLoop) -> dict[str, float]:
+    """Return the figures of one closed loop, by name; none where it could not be closed.
+
+    ``loop_ratio`` and ``loop_ratio_free``: movement of OP over the recorded one when the loop
+    is closed without noise, with the friction and without. ``loop_alike``: share of those
+    runs that move as recorded. ``moved_with``, ``moved_without``: the same when the record is
+    repeated with its noise. ``loop_gone``: share of that movement that goes away.
+    ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve.
+    """
+    if loop.controller is None:
+        return {}
+    told = {
+        "controller_fit": loop.controller.r_squared,
+        "loop_ratio_free": loop.without_friction.ratio,
+        "moved_without": loop.moved_without,
+        "outside_line": loop.outside.gain,
+    }
+    if loop.status is not LoopStatus.UNTESTABLE:
+        told |= {
+            "loop_ratio": loop.with_friction.ratio,
+            "loop_alike": loop.with_friction.alike,
+            "moved_with": loop.moved_with,
+            "loop_gone": loop.gone,
+        }
+    return told
+
+
+def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:
+    """Return why output ``i`` oscillates."""
+    output = closed.outputs[i]
+    swing = output.oscillation
+    if swing is None:
+        return Cause(CauseKind.NONE, None, 0.0, 0.0, "There is no room for four cycles.")
+    acting = [
+        (estimate, loop)
+        for estimate, loop in zip(found.valves, closed.valves, strict=True)
+        if found.outputs[i].b[estimate.name] and _is_cause(estimate, loop, output)
+    ]
+    kind, sentence = _kind(output, closed, acting)
+    return Cause(
+        kind, swing.period * record.sample_time, swing.regularity, swing.amplitude, sentence
+    )
+
+
+def _is_cause(valve: ValveEstimate, loop: ValveLoop, output: OutputLoop) -> bool:
+    """Tell whether the friction of a valve makes its loop move."""
+    return (
+        valve.static_friction > 0.0
+        and valve.evidence.get("delta_bic", 0.0) > BELIEVED
+        and loop.gone > MATERIAL
+        and output.after.gain < LINE
+    )
+
+
+def _kind(
+    output: OutputLoop, closed: ClosedLoop, acting: list[tuple[ValveEstimate, ValveLoop]]
+) -> tuple[CauseKind, str]:
+    swing = output.oscillation
+    assert swing is not None
+    loop = next((one for one in closed.valves if one.output == output.name), None)
+    regular = swing.regularity > REGULAR
+    if regular and _set_point(output, loop):
+        return CauseKind.SET_POINT, "The set-point moves the loop at this period."
+    if acting:
+        valve, with_it = max(acting, key=lambda one: one[1].gone)
+        gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
+        return CauseKind.VALVE, f"Without the friction of {valve.name}, {gone} of it goes away."
+    if not regular:
+        return CauseKind.NONE, "There is no regular oscillation."
+    if output.after.gain > LINE:
+        return (
+            CauseKind.DISTURBANCE,
+            "A wave that keeps its period to the sample enters behind the valve.",
+        )
+    if loop is not None and _rings(loop, swing.period):
+        return CauseKind.TUNING, "Controller and process ring at this period without friction."
+    return CauseKind.UNKNOWN, "Nothing that was identified explains this oscillation."
+
+
+def _set_point(output: OutputLoop, loop: ValveLoop | None) -> bool:
+    """Tell whether the set-point makes the cycle, a recorded one or one that is not."""
+    if loop is None or loop.controller is None:
+        return False
+    if output.set_point_line is not None:
+        return output.set_point_line > DRIVEN and loop.driven > DRIVEN
+    return loop.before.gain > LINE and loop.controller.r_squared < OPEN
+
+
+def _rings(loop: ValveLoop, period: float) -> bool:
+    near = [
+        one.growth
+        for one in loop.ringing
+        if period / SAME_PERIOD < one.period < period * SAME_PERIOD
+    ]
+    return max(near, default=0.0) > RINGING
