@@ -118,6 +118,8 @@ class OutputLoop:
         name: its tag.
         oscillation: of PV − SP, engineering units; None where there is no room for one.
         after: a line from outside in PV at this period, beside what comes from the stems.
+        alone: the same beside what comes from valves that follow OP.
+        set_point: how the recorded set-point oscillates; None where it does not, or there is none.
         set_point_line: line of the recorded set-point at this period over that of PV; None
             where no set-point was recorded.
     """
@@ -125,7 +127,15 @@ class OutputLoop:
     name: str
     oscillation: Oscillation | None
     after: OutsideLine = NO_LINE
+    alone: OutsideLine = NO_LINE
+    set_point: Oscillation | None = None
     set_point_line: float | None = None
+
+    @property
+    def rivalry(self) -> float:
+        """BIC gain by the line alone over the gain by friction; infinite where that is none."""
+        friction = self.alone.plain - self.after.plain
+        return self.alone.gain / friction if friction > 0.0 else math.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,16 +185,19 @@ def _output(loop: ScaledLoop, process: Process, tag: str, i: int) -> OutputLoop:
     if swing is None:
         return OutputLoop(tag, None)
     rows = _last_rows(loop)
-    stems = [loop.stem[rows, j] for j in range(loop.op.shape[1])]
     delays = [int(delay) + 1 for delay in process.delay[i]]
-    after = outside_line(Predicted(loop.pv[rows, i], stems, delays), swing.period)
+    after, alone = (
+        outside_line(Predicted(loop.pv[rows, i], list(inputs[rows].T), delays), swing.period)
+        for inputs in (loop.stem, loop.op)
+    )
     if loop.sp is None:
-        return OutputLoop(tag, swing, after)
+        return OutputLoop(tag, swing, after, alone)
     whole = [(0, rows.stop - rows.start)]
     lines = [
         amplitude(values[rows, i], whole, swing.period) or 0.0 for values in (loop.sp, loop.pv)
     ]
-    return OutputLoop(tag, swing, after, lines[0] / max(lines[1], 1e-300))
+    driver = oscillation(loop.sp[:, i], loop.stretches)
+    return OutputLoop(tag, swing, after, alone, driver, lines[0] / max(lines[1], 1e-300))
 
 
 def _last_rows(loop: ScaledLoop) -> slice:

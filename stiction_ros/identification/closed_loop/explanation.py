@@ -16,20 +16,34 @@ from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.identification.results import Identification, ValveEstimate
 from stiction_ros.records.record import Record
 
-BELIEVED = 20.0
-"""BIC by which friction must beat the friction-free model to be a cause."""
+BELIEVED = 10.0
+"""BIC by which friction must beat the friction-free model to be a cause: very strong evidence."""
 
-MATERIAL = 0.15
+MATERIAL = 0.2
 """Share of OP's movement that must go away with the friction for the valve to be the cause."""
 
 LINE = 6.0
 """BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
+
+RIVAL = 0.3
+"""BIC gain of a line alone over that of the friction from which on the friction may be fitted to a
+wave from outside. Of valves that make their loop cycle it is below 0: no clock follows slips."""
+
+PLAIN_LINE = 60.0
+"""BIC gain from which on a line shows an oscillation that is too short or too faint to be regular
+by its autocorrelation."""
+
+FAINT = 0.05
+"""Share of the variance below which a line that nothing explains is no oscillation."""
 
 DRIVEN = 0.5
 """Share of the cycle, of PV and of OP, that the set-point must make to be the cause."""
 
 OPEN = 0.9
 """R² of the controller below which an unrecorded set-point may move OP."""
+
+HALF_OPEN = 0.95
+"""The same where the line shows more clearly in OP than in PV."""
 
 RINGING = 0.65
 """Share of an oscillation left after a period: a quarter is the usual tuning, .65 rings long."""
@@ -93,9 +107,9 @@ def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> 
         if found.outputs[i].b[estimate.name] and _is_cause(estimate, loop, output)
     ]
     kind, sentence = _kind(output, closed, acting)
-    return Cause(
-        kind, swing.period * record.sample_time, swing.regularity, swing.amplitude, sentence
-    )
+    driver = output.set_point if kind is CauseKind.SET_POINT else None
+    period = (driver or swing).period * record.sample_time
+    return Cause(kind, period, swing.regularity, swing.amplitude, sentence)
 
 
 def _is_cause(valve: ValveEstimate, loop: ValveLoop, output: OutputLoop) -> bool:
@@ -104,7 +118,7 @@ def _is_cause(valve: ValveEstimate, loop: ValveLoop, output: OutputLoop) -> bool
         valve.static_friction > 0.0
         and valve.evidence.get("delta_bic", 0.0) > BELIEVED
         and loop.gone > MATERIAL
-        and output.after.gain < LINE
+        and output.rivalry < RIVAL
     )
 
 
@@ -121,15 +135,17 @@ def _kind(
         valve, with_it = max(acting, key=lambda one: one[1].gone)
         gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
         return CauseKind.VALVE, f"Without the friction of {valve.name}, {gone} of it goes away."
-    if not regular:
-        return CauseKind.NONE, "There is no regular oscillation."
-    if output.after.gain > LINE:
+    if max(output.after.gain, output.alone.gain) > (LINE if regular else PLAIN_LINE):
         return (
             CauseKind.DISTURBANCE,
             "A wave that keeps its period to the sample enters behind the valve.",
         )
+    if not regular:
+        return CauseKind.NONE, "There is no regular oscillation."
     if loop is not None and _rings(loop, swing.period):
         return CauseKind.TUNING, "Controller and process ring at this period without friction."
+    if swing.share < FAINT:
+        return CauseKind.NONE, "The oscillation is too faint to be told from noise."
     return CauseKind.UNKNOWN, "Nothing that was identified explains this oscillation."
 
 
@@ -139,7 +155,8 @@ def _set_point(output: OutputLoop, loop: ValveLoop | None) -> bool:
         return False
     if output.set_point_line is not None:
         return output.set_point_line > DRIVEN and loop.driven > DRIVEN
-    return loop.before.gain > LINE and loop.controller.r_squared < OPEN
+    ahead = loop.before.gain > output.after.gain and loop.controller.r_squared < HALF_OPEN
+    return loop.before.gain > LINE and (ahead or loop.controller.r_squared < OPEN)
 
 
 def _rings(loop: ValveLoop, period: float) -> bool:

@@ -231,7 +231,7 @@ def _explained(
         n: length of the transform, at least that of every stretch.
     """
     taken = np.zeros((len(bins), error.shape[1]))
-    turn = 2 * np.pi / n * bins
+    turn: FloatArray = np.asarray(2 * np.pi / n * bins, dtype=np.float64)
     for first, last in stretches:
         count = last - first
         one, two = _geometric(turn, count), _geometric(2 * turn, count)

@@ -47,13 +47,15 @@ class OutsideLine:
     Attributes:
         gain: BIC without minus BIC with the line; above 0 the line is there.
         period: the best one, samples.
+        plain: BIC without.
     """
 
     gain: float
     period: float
+    plain: float
 
 
-NO_LINE = OutsideLine(0.0, 0.0)
+NO_LINE = OutsideLine(0.0, 0.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +101,9 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
         gains = len(rows) * np.log(max(energy, floor) / rest) - price[: len(rest)]
         if len(gains):
             best = max(best, (float(gains.max()), 1.0 / frequency))
-    return OutsideLine(*best)
+    count, columns_used = plain.shape
+    before = count * np.log(max(energy, floor) / count) + columns_used * np.log(count)
+    return OutsideLine(*best, float(before))
 
 
 def _waves(angle: FloatArray, harmonics: int) -> FloatArray:

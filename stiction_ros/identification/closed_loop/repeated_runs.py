@@ -14,7 +14,7 @@ from stiction_ros.identification.closed_loop.oscillation import (
     Oscillation,
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
+from stiction_ros.identification.closed_loop.scaled_loop import DIGITS, ScaledLoop, free_run
 from stiction_ros.identification.results import ValveEstimate
 
 STARTS = (0.2, 0.5, 0.8)
@@ -84,7 +84,7 @@ class Repeated:
         return cls(
             loop,
             process,
-            frictions / loop.op_scale[:, None, None],
+            np.round(frictions / loop.op_scale[:, None, None], DIGITS),
             pairs,
             tuple(periods),
             simulated,
@@ -96,7 +96,7 @@ class Repeated:
         """H, samples before the first of a run."""
         a, b, delay, _ = self.process
         late = max(law.lag for _, law in self.pairs)
-        return max(a.shape[1], b.shape[2] + int(delay.max()), 3 + late)
+        return int(max(a.shape[1], b.shape[2] + int(delay.max()), 3 + late))
 
     @property
     def controllers(self) -> Controllers:
@@ -189,7 +189,7 @@ class Repeated:
 
     @property
     def _p(self) -> int:
-        return self.loop.pv.shape[1]
+        return int(self.loop.pv.shape[1])
 
     def _end(self, stretch: tuple[int, int]) -> tuple[int, int]:
         """Return the last ``MOST`` samples of a stretch."""

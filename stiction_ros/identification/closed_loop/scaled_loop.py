@@ -15,6 +15,10 @@ from stiction_ros.identification.closed_loop.loop_run import Process
 from stiction_ros.identification.results import OutputModel
 from stiction_ros.records.record import Record
 
+DIGITS = 9
+"""Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bit of
+a unit would make another run of it."""
+
 LONGEST = 20_000
 """Samples of a record that are looked at: thousands of cycles say no more than hundreds."""
 
@@ -68,10 +72,10 @@ def scaled(record: Record, stem: FloatArray) -> ScaledLoop | None:
     if min(op_scale.min(), pv_scale.min()) <= 0.0:
         return None
     return ScaledLoop(
-        (part.op - op_mean) / op_scale,
-        (stem[first:] - op_mean) / op_scale,
-        (part.pv - pv_mean) / pv_scale,
-        None if part.sp is None else (part.sp - pv_mean) / pv_scale,
+        np.round((part.op - op_mean) / op_scale, DIGITS),
+        np.round((stem[first:] - op_mean) / op_scale, DIGITS),
+        np.round((part.pv - pv_mean) / pv_scale, DIGITS),
+        None if part.sp is None else np.round((part.sp - pv_mean) / pv_scale, DIGITS),
         stretches,
         op_mean,
         op_scale,
@@ -98,7 +102,7 @@ def scaled_process(
             bias[i] += b[i, j].sum() * loop.op_mean[j]
         b[i] *= loop.op_scale[:, None] / loop.pv_scale[i]
         bias[i] /= loop.pv_scale[i]
-    return Process(a, b, delay, bias)
+    return Process(a, np.round(b, DIGITS + 3), delay, np.round(bias, DIGITS))
 
 
 def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray:
