@@ -48,8 +48,6 @@ def identify(
 ) -> Identification:
     """Identify friction and linear dynamics of every valve and output of a record.
 
-    Then every loop is closed again with what was found, which says why an output oscillates.
-
     Args:
         record: what was measured.
         options: ``options.method`` names the search; None for the defaults.
@@ -70,9 +68,7 @@ def identify(
         found = _attempt(record, options, progress)
     if isinstance(found, InputError):
         raise found
-    from stiction_ros.identification.closed_loop.explanation import explained  # loads slowly
-
-    return explained(record, found)
+    return found
 
 
 def _refuse_swapped(record: Record, evidence: Evidence | None) -> None:

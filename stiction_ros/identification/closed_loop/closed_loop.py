@@ -12,6 +12,8 @@ import dataclasses
 import enum
 import math
 
+import numpy as np
+
 from stiction_ros.identification.closed_loop.damping import LinearController, Ringing, ringing
 from stiction_ros.identification.closed_loop.loop_run import Process
 from stiction_ros.identification.closed_loop.movement import STILL, Movement, compare
@@ -24,6 +26,7 @@ from stiction_ros.identification.closed_loop.outside_line import (
     NO_LINE,
     OutsideLine,
     Predicted,
+    beside,
     outside_line,
 )
 from stiction_ros.identification.closed_loop.recovered_controller import (
@@ -82,6 +85,8 @@ class ValveLoop:
         oscillation: of OP, %; None where there is none to speak of.
         with_friction, without_friction: movement of OP over the recorded one.
         ringing: of the loop without friction, the least damped first.
+        ringing_beside: the same for the process beside a wave at the period of the cycle, see
+            :func:`.outside_line.beside`.
         driven: share of OP's movement, 0 to 1, that the loop without friction makes of the
             recorded set-point alone.
         band_share: f_S + f_D over the width of OP's movement about its slow mean.
@@ -101,6 +106,7 @@ class ValveLoop:
     with_friction: Movement = STILL
     without_friction: Movement = STILL
     ringing: tuple[Ringing, ...] = ()
+    ringing_beside: tuple[Ringing, ...] = ()
     driven: float = 0.0
     band_share: float = 0.0
     moved_with: float = 0.0
@@ -271,7 +277,7 @@ def _valve(
     free = compare(repeated.without_friction(j), recorded, period)
     linear = LinearController(law.coefficients, law.lag, law.smoothing)
     cycle = outputs[i].oscillation
-    at = period if cycle is None else cycle.period
+    at = outputs[i].alone.period or (period if cycle is None else cycle.period)
     moved = repeated.moved(j, at)
     if estimate.static_friction > 0.0:
         stuck = compare(repeated.with_friction(j), recorded, period)
@@ -290,6 +296,7 @@ def _valve(
         stuck,
         free,
         ringing(repeated.process, i, j, linear),
+        ringing(_beside(loop, repeated.process, i, at), 0, j, linear),
         repeated.driven(j),
         share,
         moved[0],
@@ -298,6 +305,16 @@ def _valve(
         outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
         outputs[i].after,
     )
+
+
+def _beside(loop: ScaledLoop, process: Process, i: int, period: float) -> Process:
+    """Return the process of one output from valves that follow OP, beside a wave."""
+    rows = _last_rows(loop)
+    delays = process.delay[i]
+    a, b = beside(
+        Predicted(loop.pv[rows, i], list(loop.op[rows].T), [int(d) + 1 for d in delays]), period
+    )
+    return Process(a[None], b[None], delays[None], np.zeros(1))
 
 
 def _status(stuck: Movement) -> LoopStatus:

@@ -12,9 +12,13 @@ from stiction_ros.identification.closed_loop.closed_loop import (
     ValveLoop,
     close_loop,
 )
+from stiction_ros.identification.closed_loop.damping import Ringing
 from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.identification.results import Identification, ValveEstimate
 from stiction_ros.records.record import Record
+
+ENDLESS = 1e6
+"""Stands in the figures for a movement that grows without end."""
 
 BELIEVED = 10.0
 """BIC by which friction must beat the friction-free model to be a cause: very strong evidence."""
@@ -39,14 +43,20 @@ FAINT = 0.05
 DRIVEN = 0.5
 """Share of the cycle, of PV and of OP, that the set-point must make to be the cause."""
 
+ALL_DRIVEN = 0.9
+"""Share of OP's movement that moves of the set-point without a line must make to be the cause."""
+
 OPEN = 0.9
 """R² of the controller below which an unrecorded set-point may move OP."""
 
 HALF_OPEN = 0.95
 """The same where the line shows more clearly in OP than in PV."""
 
-RINGING = 0.65
-"""Share of an oscillation left after a period: a quarter is the usual tuning, .65 rings long."""
+RINGING = 0.5
+"""Share of an oscillation left after a period: a quarter is usual tuning, half of it rings long."""
+
+STILL_RINGING = 0.8
+"""The same of the process beside a wave, from which on the loop makes the wave itself."""
 
 SAME_PERIOD = 1.3
 """Factor within which the loop rings at the period of the oscillation."""
@@ -92,7 +102,7 @@ def figures(loop: ValveLoop) -> dict[str, float]:
             "moved_with": loop.moved_with,
             "loop_gone": loop.gone,
         }
-    return told
+    return {name: min(value, ENDLESS) for name, value in told.items()}
 
 
 def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:
@@ -135,15 +145,21 @@ def _kind(
         valve, with_it = max(acting, key=lambda one: one[1].gone)
         gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
         return CauseKind.VALVE, f"Without the friction of {valve.name}, {gone} of it goes away."
-    if max(output.after.gain, output.alone.gain) > (LINE if regular else PLAIN_LINE):
+    rings = regular and loop is not None and _growth(loop.ringing, swing.period) > RINGING
+    line = max(output.after.gain, output.alone.gain) > (LINE if regular else PLAIN_LINE)
+    itself = loop is not None and _growth(loop.ringing_beside, swing.period) > STILL_RINGING
+    clear = regular and swing.share > FAINT
+    if clear and not line and loop is not None and loop.driven > ALL_DRIVEN:
+        return CauseKind.SET_POINT, "Moves of the set-point make all of it."
+    if rings and (itself or not line):
+        return CauseKind.TUNING, "Controller and process ring at this period without friction."
+    if line:
         return (
             CauseKind.DISTURBANCE,
             "A wave that keeps its period to the sample enters behind the valve.",
         )
     if not regular:
         return CauseKind.NONE, "There is no regular oscillation."
-    if loop is not None and _rings(loop, swing.period):
-        return CauseKind.TUNING, "Controller and process ring at this period without friction."
     if swing.share < FAINT:
         return CauseKind.NONE, "The oscillation is too faint to be told from noise."
     return CauseKind.UNKNOWN, "Nothing that was identified explains this oscillation."
@@ -159,10 +175,9 @@ def _set_point(output: OutputLoop, loop: ValveLoop | None) -> bool:
     return loop.before.gain > LINE and (ahead or loop.controller.r_squared < OPEN)
 
 
-def _rings(loop: ValveLoop, period: float) -> bool:
-    near = [
-        one.growth
-        for one in loop.ringing
-        if period / SAME_PERIOD < one.period < period * SAME_PERIOD
-    ]
-    return max(near, default=0.0) > RINGING
+def _growth(ringing: tuple[Ringing, ...], period: float) -> float:
+    """Return how much of an oscillation at about ``period`` samples is left after a period."""
+    near = (
+        one.growth for one in ringing if period / SAME_PERIOD < one.period < period * SAME_PERIOD
+    )
+    return max(near, default=0.0)

@@ -36,6 +36,9 @@ NEAR = 1.0
 STEPS = 17
 """Periods tried over this range: one eighth of a line width apart."""
 
+BESIDE = 3
+"""Order of the process that is fitted beside a line."""
+
 LEAST_ROWS = 40
 """Rows that a fit needs."""
 
@@ -104,6 +107,29 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
     count, columns_used = plain.shape
     before = count * np.log(max(energy, floor) / count) + columns_used * np.log(count)
     return OutsideLine(*best, float(before))
+
+
+def beside(signal: Predicted, period: float) -> tuple[FloatArray, FloatArray]:
+    """Return the process that moves ``signal`` beside a wave of ``period`` samples.
+
+    A wave from outside makes any process that is fitted to it ring at its period, as OP answers
+    PV; with the wave in the equation the process is what the other movements say.
+
+    Returns:
+        a_1 … a_3 and b_0 … b_2 of each input after its delay, signs as in equation (8a), shape
+        (3,) and (inputs, 3).
+    """
+    rows = np.arange(BESIDE + max(signal.delays), len(signal.y))
+    harmonics = max(1, min(HARMONICS, int(period / LEAST_PER_HARMONIC)))
+    columns = [signal.y[rows - lag] for lag in range(1, BESIDE + 1)]
+    for x, delay in zip(signal.inputs, signal.delays, strict=True):
+        columns += [x[rows - delay - lag] for lag in range(BESIDE)]
+    columns.append(np.ones(len(rows)))
+    wave = _waves(2 * np.pi / period * rows, harmonics)
+    table = np.column_stack([*columns, wave])
+    scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
+    theta = np.linalg.lstsq(table / scale, signal.y[rows], rcond=1e-10)[0] / scale
+    return -theta[:BESIDE], theta[BESIDE : BESIDE * (1 + len(signal.inputs))].reshape(-1, BESIDE)
 
 
 def _waves(angle: FloatArray, harmonics: int) -> FloatArray:
