@@ -87,8 +87,8 @@ def identify(
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(final, valves, table, told, one_step)
-    told = explained(record, conclude(record, data, findings, 0.0))
-    return dataclasses.replace(told, seconds=time.perf_counter() - begun)
+    answer = explained(record, conclude(record, data, findings, 0.0))
+    return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
 
 def judged_valves(

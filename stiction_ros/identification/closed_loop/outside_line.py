@@ -125,7 +125,7 @@ def beside(signal: Predicted, period: float) -> tuple[FloatArray, FloatArray]:
     for x, delay in zip(signal.inputs, signal.delays, strict=True):
         columns += [x[rows - delay - lag] for lag in range(BESIDE)]
     columns.append(np.ones(len(rows)))
-    wave = _waves(2 * np.pi / period * rows, harmonics)
+    wave = _waves(np.asarray(2 * np.pi / period * rows, dtype=np.float64), harmonics)
     table = np.column_stack([*columns, wave])
     scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
     theta = np.linalg.lstsq(table / scale, signal.y[rows], rcond=1e-10)[0] / scale
