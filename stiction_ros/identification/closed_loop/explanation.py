@@ -23,7 +23,7 @@ ENDLESS = 1e6
 BELIEVED = 10.0
 """BIC by which friction must beat the friction-free model to be a cause: very strong evidence."""
 
-MATERIAL = 0.2
+MATERIAL = 0.15
 """Share of OP's movement that must go away with the friction for the valve to be the cause."""
 
 LINE = 6.0
@@ -36,6 +36,10 @@ wave from outside. Of valves that make their loop cycle it is below 0: no clock 
 PLAIN_LINE = 60.0
 """BIC gain from which on a line shows an oscillation that is too short or too faint to be regular
 by its autocorrelation."""
+
+PLAIN_SHARE = 0.5
+"""Share of the variance from which on a line is an oscillation though it has too few cycles for a
+regularity."""
 
 FAINT = 0.05
 """Share of the variance below which a line that nothing explains is no oscillation."""
@@ -55,7 +59,7 @@ HALF_OPEN = 0.95
 RINGING = 0.5
 """Share of an oscillation left after a period: a quarter is usual tuning, half of it rings long."""
 
-STILL_RINGING = 0.8
+STILL_RINGING = 0.85
 """The same of the process beside a wave, from which on the loop makes the wave itself."""
 
 SAME_PERIOD = 1.3
@@ -158,6 +162,8 @@ def _kind(
             CauseKind.DISTURBANCE,
             "A wave that keeps its period to the sample enters behind the valve.",
         )
+    if swing.regularity == 0.0 and swing.share > PLAIN_SHARE:
+        return CauseKind.UNKNOWN, "The record has too few cycles to tell."
     if not regular:
         return CauseKind.NONE, "There is no regular oscillation."
     if swing.share < FAINT:

@@ -39,6 +39,9 @@ STEPS = 17
 BESIDE = 3
 """Order of the process that is fitted beside a line."""
 
+DEPENDENT = 1e-7
+"""Size of a direction, of scaled columns, below which it is rounding."""
+
 LEAST_ROWS = 40
 """Rows that a fit needs."""
 
@@ -83,11 +86,10 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
     rows = np.arange(first, count)
     if len(rows) < LEAST_ROWS + (1 + len(signal.inputs)) * ORDER or harmonics < 1:
         return NO_LINE
-    columns = [np.ones(len(rows))]
-    columns += [signal.y[rows - lag] for lag in range(1, ORDER + 1)]
+    columns = [signal.y[rows - lag] for lag in range(1, ORDER + 1)]
     for x, delay in zip(signal.inputs, signal.delays, strict=True):
         columns += [x[rows - delay - lag] for lag in range(ORDER)]
-    plain = _basis(np.column_stack(columns))
+    plain = _independent(np.column_stack(columns))
     left = signal.y[rows] - plain @ (plain.T @ signal.y[rows])
     energy = float(left @ left)
     floor = 1e-12 * float(signal.y[rows] @ signal.y[rows])  # what rounding leaves
@@ -140,6 +142,16 @@ def _waves(angle: FloatArray, harmonics: int) -> FloatArray:
 
 def _basis(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns, in their order."""
-    scale = np.linalg.norm(columns, axis=0)
-    q, _ = np.linalg.qr(columns / np.maximum(scale, 1e-300))
-    return np.asarray(q)
+    return np.asarray(np.linalg.qr(columns)[0])
+
+
+def _independent(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of a constant and the columns, shape (N, q).
+
+    Directions that are rounding are left out: OP of an exact controller follows from PV.
+    """
+    about = columns - columns.mean(axis=0)
+    scale = np.maximum(np.linalg.norm(about, axis=0), 1e-300)
+    left, sizes, _ = np.linalg.svd(about / scale, full_matrices=False)
+    constant = np.full((len(columns), 1), 1.0 / np.sqrt(len(columns)))
+    return np.concatenate([constant, left[:, sizes > DEPENDENT]], axis=1)
