@@ -71,7 +71,9 @@ def explained(record: Record, found: Identification) -> Identification:
     closed = close_loop(record, found)
     valves = tuple(
         dataclasses.replace(
-            valve, band_share=loop.band_share, evidence={**valve.evidence, **figures(loop)}
+            valve,
+            band_share=loop.band_share,
+            evidence={**valve.evidence, **figures(loop, closed)},
         )
         for valve, loop in zip(found.valves, closed.valves, strict=True)
     )
@@ -82,14 +84,15 @@ def explained(record: Record, found: Identification) -> Identification:
     return dataclasses.replace(found, valves=valves, outputs=outputs)
 
 
-def figures(loop: ValveLoop) -> dict[str, float]:
+def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
     """Return the figures of one closed loop, by name; none where it could not be closed.
 
     ``loop_ratio`` and ``loop_ratio_free``: movement of OP over the recorded one when the loop
     is closed without noise, with the friction and without. ``loop_alike``: share of those
     runs that move as recorded. ``moved_with``, ``moved_without``: the same when the record is
     repeated with its noise. ``loop_gone``: share of that movement that goes away.
-    ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve.
+    ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve;
+    ``line_rivalry``: that of a line alone over that of the friction.
     """
     if loop.controller is None:
         return {}
@@ -100,13 +103,15 @@ def figures(loop: ValveLoop) -> dict[str, float]:
         "outside_line": loop.outside.gain,
     }
     if loop.status is not LoopStatus.UNTESTABLE:
+        output = next(one for one in closed.outputs if one.name == loop.output)
         told |= {
+            "line_rivalry": output.rivalry,
             "loop_ratio": loop.with_friction.ratio,
             "loop_alike": loop.with_friction.alike,
             "moved_with": loop.moved_with,
             "loop_gone": loop.gone,
         }
-    return {name: min(value, ENDLESS) for name, value in told.items()}
+    return {name: max(-ENDLESS, min(value, ENDLESS)) for name, value in told.items()}
 
 
 def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:
@@ -148,7 +153,10 @@ def _kind(
     if acting:
         valve, with_it = max(acting, key=lambda one: one[1].gone)
         gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
-        return CauseKind.VALVE, f"Without the friction of {valve.name}, {gone} of it goes away."
+        return (
+            CauseKind.VALVE,
+            f"Without the friction of {valve.name}, {gone} of OP's movement goes away.",
+        )
     rings = regular and loop is not None and _growth(loop.ringing, swing.period) > RINGING
     line = max(output.after.gain, output.alone.gain) > (LINE if regular else PLAIN_LINE)
     itself = loop is not None and _growth(loop.ringing_beside, swing.period) > STILL_RINGING
