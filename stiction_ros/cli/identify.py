@@ -15,6 +15,7 @@ from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
 from stiction_ros.identification import METHODS, Identification, IdentificationOptions, identify
+from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
 from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.csv_file import CsvColumns
 from stiction_ros.records.open_record import open_parts
@@ -159,7 +160,7 @@ def method_options(options: argparse.Namespace) -> dict[str, Any]:
 def _print(document: Mapping[str, Any], found: Identification) -> None:
     console = Console()
     table = Table(title=f"{document['record']}: {found.samples} samples", title_justify="left")
-    for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval", "moves"):
+    for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval", "moves", "band"):
         table.add_column(name)
     for valve in found.valves:
         table.add_row(
@@ -170,6 +171,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
             f"{valve.dynamic_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
             str(valve.moves),
+            f"{100 * valve.band_share:.0f} % of OP" if valve.band_share > 0.0 else "",
         )
     console.print(table)
     for output in found.outputs:
@@ -178,8 +180,20 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
             f"{output.name}: delay {delays} samples, fit {output.fit_one_step:.1f} % one step, "
             f"{output.fit_free_run:.1f} % free run, noise {output.noise_std:.3g}"
         )
+        if output.cause is not None:
+            console.print(f"{output.name}: {_cause(output.cause)}")
     for note in found.notes:
         console.print(f"note: {note}")
+
+
+def _cause(cause: Cause) -> str:
+    """Return why an output oscillates, in words."""
+    if cause.kind is CauseKind.NONE or cause.period is None:
+        return f"cause {cause.kind}. {cause.sentence}"
+    return (
+        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.1f}, "
+        f"amplitude {cause.amplitude:.3g}. {cause.sentence}"
+    )
 
 
 def _pair(text: str) -> tuple[str, str]:

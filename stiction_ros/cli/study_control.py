@@ -101,7 +101,7 @@ def run_seed(names: tuple[str, ...], seed: int) -> dict[str, Runs]:
 
 def scores(name: str, runs: list[Runs]) -> CaseScores:
     """Return the scores of the case ``name`` over ``runs``, one entry per seed."""
-    from stiction_ros.report.scoring import amplitude, dominant_cycle
+    from stiction_ros.identification.closed_loop.oscillation import amplitude, dominant_cycle
 
     cycles = []
     for embedding, _, unaware in runs:

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from stiction_ros.identification.certificate import certificates
+from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.intervals import friction_intervals
 from stiction_ros.identification.long_records import carried_over, liveliest_part
@@ -53,6 +54,8 @@ def identify(
 ) -> Identification:
     """Identify friction and linear dynamics of every valve and output of a record.
 
+    Then every loop is closed again with what was found, which says why an output oscillates.
+
     Args:
         record: what was measured.
         options: None for the defaults.
@@ -84,7 +87,8 @@ def identify(
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(final, valves, table, told, one_step)
-    return conclude(record, data, findings, time.perf_counter() - begun)
+    answer = explained(record, conclude(record, data, findings, 0.0))
+    return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
 
 def judged_valves(

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.cause import Cause
 from stiction_ros.identification.search_log import SearchLog
 
 
@@ -46,6 +47,7 @@ class ValveEstimate:
         evidence: named figures behind the verdict, see :mod:`.verdict`.
         profile: rows (f_S, least −2 log likelihood above the best) over the patterns that were
             tried, f_S in %.
+        band_share: f_S + f_D over the width of OP's movement about its slow mean.
     """
 
     name: str
@@ -60,12 +62,14 @@ class ValveEstimate:
     moves: int
     evidence: Mapping[str, float]
     profile: tuple[tuple[float, float], ...] = ()
+    band_share: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
         return {
             "name": self.name,
             "verdict": self.verdict.value,
+            "band_share": self.band_share,
             "law": self.law,
             "f_s": self.static_friction,
             "f_s_interval": list(self.static_interval),
@@ -93,6 +97,7 @@ class OutputModel:
         noise_std: standard deviation of the innovations, engineering units.
         fit_one_step: NRMSE fit of the one-step prediction with the noise model, %.
         fit_free_run: NRMSE fit of the free run, 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %.
+        cause: of its oscillation; None where the loop was not closed again.
     """
 
     name: str
@@ -103,6 +108,7 @@ class OutputModel:
     noise_std: float
     fit_one_step: float
     fit_free_run: float
+    cause: Cause | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
@@ -115,6 +121,7 @@ class OutputModel:
             "noise_std": self.noise_std,
             "fit_one_step": self.fit_one_step,
             "fit_free_run": self.fit_free_run,
+            "cause": None if self.cause is None else self.cause.to_json(),
         }
 
 

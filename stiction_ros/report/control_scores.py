@@ -10,8 +10,13 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.examples.control_study import COLUMNS, ColumnRun, Trial
+from stiction_ros.identification.closed_loop.oscillation import (
+    LEAST_LINE,
+    amplitude,
+    dominant_cycle,
+)
 from stiction_ros.loop.set_points import holds
-from stiction_ros.report.scoring import LEAST_LINE, amplitude, dominant_cycle, offset
+from stiction_ros.report.scoring import offset
 
 
 @dataclasses.dataclass(frozen=True)

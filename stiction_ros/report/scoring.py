@@ -3,13 +3,8 @@
 Everything is computed from the error e = PV − SP inside the *holds*: the stretches of samples
 between two moves of any set-point.
 
-- *Dominant period* T: the one period at which sine, cosine and a constant, fitted to every
-  hold and output on their own, explain most of the phase `before` (log likelihood for white
-  noise). The first quarter of each hold is left out, as it still settles.
-- *Amplitude* of an output: √2 × RMS of the spectral line at T. Each hold gives its last
-  whole number of periods that fits after half a period for settling; sine, cosine and a
-  constant are fitted to them, and the squared amplitudes are averaged with the number of
-  samples as weight. A hold too short for one period says nothing.
+- *Dominant period* T of the phase `before` and *amplitude* of an output, √2 × RMS of the
+  spectral line at T: see :mod:`stiction_ros.identification.closed_loop.oscillation`.
 - *Offset*: mean over the holds of |mean e| over their last 50 samples. Holds of fewer than
   100 samples have not settled by then and do not count, unless all are shorter.
 - *IAE per hour*: ∫|e|dt over all samples of the phase, per hour, minus the share of white
@@ -26,16 +21,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.oscillation import (
+    LEAST_LINE,
+    NEEDED_CYCLES,
+    Cycle,
+    amplitude,
+    dominant_cycle,
+)
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records import Record
 from stiction_ros.records.quality import Quality
 
 OFFSET_SAMPLES = 50
-NEEDED_CYCLES = 4
 NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1
-LEAST_LINE = 0.25  # share of the variance inside the holds that a cycle explains at least
 MOST_MISSING = 0.5  # share of the samples of a phase that may be missing in the record
-_SHORTEST = 6.0  # samples; below that a cycle cannot be told from noise
 
 
 class PhaseStatus(enum.StrEnum):
@@ -77,23 +76,6 @@ class Phase:
 
 
 @dataclasses.dataclass(frozen=True)
-class Cycle:
-    """The oscillation of a loop.
-
-    Attributes:
-        period: dominant period, samples.
-        share: of the variance inside the holds that it explains, of the clearest output.
-        count: whole cycles that this output went through inside the holds.
-        output: index of that output.
-    """
-
-    period: float
-    share: float
-    count: int
-    output: int
-
-
-@dataclasses.dataclass(frozen=True)
 class Phases:
     """The rounds of the schedule before and after the swap, scored alike.
 
@@ -121,52 +103,6 @@ def round_length(sp: FloatArray) -> int | None:
         if 2 * length <= len(sp) and np.array_equal(sp[length:], sp[:-length]):
             return int(length)
     return None
-
-
-def dominant_cycle(error: FloatArray, stretches: Sequence[tuple[int, int]]) -> Cycle | None:
-    """Return the oscillation that explains the errors inside the holds best.
-
-    Args:
-        error: PV − SP, shape (N, p).
-        stretches: the holds.
-
-    Returns:
-        None when no hold has room for one period, or nothing moves at all.
-    """
-    settled = [(a + (b - a) // 4, b) for a, b in stretches]
-    longest = max(b - a for a, b in settled)
-    settled = [(a, b) for a, b in settled if b - a >= longest / 3]
-    total = np.array([sum(_energy(error[a:b, j]) for a, b in settled) for j in _columns(error)])
-    if longest < 2 * _SHORTEST or not np.any(total > 0):
-        return None
-    count = sum(b - a for a, b in settled)
-    # A step of 1/(16 L) in frequency turns the phase by 1/16 of a cycle over a hold.
-    frequencies = np.arange(1.0 / longest, 1.0 / _SHORTEST, 0.0625 / longest)
-    shares = np.array([_explained(error, settled, 1 / f) for f in frequencies]) / np.maximum(
-        total, 1e-300
-    )
-    gains = -0.5 * count * np.log(np.maximum(1.0 - shares, 1e-12)).sum(axis=1)
-    best = int(np.argmax(gains))
-    period = float(1 / frequencies[best])
-    output = int(np.argmax(shares[best]))
-    swings = _count_swings(error[:, output], stretches, settled, period)
-    return Cycle(period, float(shares[best, output]), swings, output)
-
-
-def amplitude(
-    error: FloatArray, stretches: Sequence[tuple[int, int]], period: float
-) -> float | None:
-    """Return √2 × RMS of the spectral line of ``error``, shape (N,), at ``period`` samples."""
-    squares = weight = 0.0
-    for first, last in stretches:
-        room = last - first - period / 2
-        count = round(np.floor(room / period + 1e-9) * period)
-        if count < period / 2 or count < 4:
-            continue
-        fitted = _line(error[last - count : last], period)
-        squares += count * float(fitted[1] ** 2 + fitted[2] ** 2)
-        weight += count
-    return float(np.sqrt(squares / weight)) if weight else None
 
 
 def offset(error: FloatArray, stretches: Sequence[tuple[int, int]]) -> float:
@@ -305,67 +241,3 @@ def _no_cycle(cycle: Cycle | None) -> str:
             f"the swap, at least {NEEDED_CYCLES} are needed"
         )
     return ""
-
-
-def _columns(error: FloatArray) -> range:
-    return range(error.shape[1])
-
-
-def _energy(values: FloatArray) -> float:
-    return float(((values - values.mean()) ** 2).sum())
-
-
-def _basis(count: int, period: float) -> FloatArray:
-    angle = 2 * np.pi / period * np.arange(count)
-    return np.column_stack([np.ones(count), np.cos(angle), np.sin(angle)])
-
-
-def _line(values: FloatArray, period: float) -> FloatArray:
-    """Return constant, cosine and sine amplitude of the fit to ``values``."""
-    fitted = np.linalg.lstsq(_basis(len(values), period), values, rcond=None)[0]
-    return np.asarray(fitted)
-
-
-def _explained(
-    error: FloatArray, stretches: Sequence[tuple[int, int]], period: float
-) -> FloatArray:
-    """Return the energy, shape (p,), that a line at ``period`` takes out of the holds."""
-    taken = np.zeros(error.shape[1])
-    for first, last in stretches:
-        if last - first < period:
-            continue
-        values = error[first:last]
-        centred = values - values.mean(axis=0)
-        basis = _basis(last - first, period)
-        fitted = np.linalg.lstsq(basis, centred, rcond=None)[0]
-        taken += (centred**2).sum(axis=0) - ((centred - basis @ fitted) ** 2).sum(axis=0)
-    return np.asarray(taken)
-
-
-def _count_swings(
-    values: FloatArray,
-    stretches: Sequence[tuple[int, int]],
-    settled: Sequence[tuple[int, int]],
-    period: float,
-) -> int:
-    """Return how many whole cycles ``values`` go through inside the holds.
-
-    A half cycle ends where the error, smoothed over an eighth of a period, crosses from
-    beyond half the RMS of the settled parts on one side of their mean to beyond it on the
-    other. A hold in which the valve rests adds none.
-    """
-    width = max(int(period / 8), 1)
-    smooth = np.convolve(values, np.ones(width) / width, mode="same")
-    means = [float(smooth[a:b].mean()) for a, b in settled]
-    energy = sum(_energy(smooth[a:b]) for a, b in settled)
-    level = 0.5 * float(np.sqrt(energy / sum(b - a for a, b in settled)))
-    by_end = {b: mean for (_, b), mean in zip(settled, means, strict=True)}
-    halves = 0
-    for first, last in stretches:
-        if last not in by_end:
-            continue
-        part = smooth[first + round(period / 4) : last] - by_end[last]
-        sides = np.sign(part[np.abs(part) > level])
-        turns = int(np.count_nonzero(np.diff(sides)))
-        halves += turns + 1 if turns else 0
-    return halves // 2

@@ -90,11 +90,13 @@ def test_json_has_the_keys_of_the_contract() -> None:
     assert {"samples", "sample_time", "seconds", "model", "valves", "outputs"} == found.keys()
     assert found["valves"][0].keys() == {
         *("name", "verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval", "jump"),
-        "evidence",
+        *("band_share", "evidence"),
     }
     assert found["outputs"][0].keys() == {
         *("name", "a", "b", "delay", "bias", "noise_std", "fit_one_step", "fit_free_run"),
+        "cause",
     }
+    assert found["outputs"][0]["cause"].keys() == {"kind", "period", "regularity", "amplitude"}
 
 
 def test_same_record_gives_the_same_result() -> None:

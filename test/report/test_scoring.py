@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from stiction_ros.identification.closed_loop.oscillation import amplitude, dominant_cycle
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 from stiction_ros.report.scoring import (
     PhaseStatus,
-    amplitude,
-    dominant_cycle,
     iae_per_hour,
     offset,
     phases,

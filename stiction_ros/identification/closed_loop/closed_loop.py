@@ -1,0 +1,336 @@
+"""The loop closed again: does the identified friction keep this loop cycling as recorded?
+
+The recovered controller, the identified process and friction are simulated together without
+noise, from states that the record went through and from kicks. A valve that sticks keeps OP
+moving as it was recorded, and without its friction OP comes to rest. Where a load from outside
+moved the loop, friction fitted to it does neither.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+
+import numpy as np
+
+from stiction_ros.identification.closed_loop.damping import LinearController, Ringing, ringing
+from stiction_ros.identification.closed_loop.loop_run import Process
+from stiction_ros.identification.closed_loop.movement import STILL, Movement, compare
+from stiction_ros.identification.closed_loop.oscillation import (
+    Oscillation,
+    amplitude,
+    oscillation,
+)
+from stiction_ros.identification.closed_loop.outside_line import (
+    NO_LINE,
+    OutsideLine,
+    Predicted,
+    beside,
+    outside_line,
+)
+from stiction_ros.identification.closed_loop.recovered_controller import (
+    ControllerStatus,
+    LoopSignals,
+    RecoveredController,
+    recover,
+)
+from stiction_ros.identification.closed_loop.repeated_runs import (
+    MOST,
+    Repeated,
+    period_of,
+    span_of,
+)
+from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, scaled, scaled_process
+from stiction_ros.identification.results import FitStatus, Identification, ValveEstimate
+from stiction_ros.loop.set_points import holds
+from stiction_ros.records.record import Record
+
+UNSEEN_CYCLES = 10
+"""Cycles that a record without an oscillation is taken to have room for."""
+
+SPAN_SHARE = 3.0
+"""Spans of the controller's fit go up to the period over this."""
+
+MOST_ALIKE = 0.5
+"""Share of the runs that must move as recorded."""
+
+GROWN = 1.7
+"""Movement over the recorded one that is another cycle."""
+
+
+class LoopStatus(enum.StrEnum):
+    """What a loop does when it is closed again.
+
+    ``SUSTAINED``: OP moves as recorded with the friction. ``DIES``: it comes to rest, or
+    moves otherwise. ``UNSTABLE``: it moves much more. ``UNTESTABLE``: it cannot be closed.
+    """
+
+    SUSTAINED = "sustained"
+    DIES = "dies"
+    UNSTABLE = "unstable"
+    UNTESTABLE = "untestable"
+
+
+@dataclasses.dataclass(frozen=True)
+class ValveLoop:
+    """One valve in its loop.
+
+    Attributes:
+        valve: its tag.
+        output: tag of the output that its controller reads; empty when none was found.
+        status: see :class:`LoopStatus`.
+        reason: one sentence; empty when the loop could be closed.
+        controller: as recovered, in the units of the record; None where no output fits.
+        oscillation: of OP, %; None where there is none to speak of.
+        with_friction, without_friction: movement of OP over the recorded one.
+        ringing: of the loop without friction, the least damped first.
+        ringing_beside: the same for the process beside a wave at the period of the cycle, see
+            :func:`.outside_line.beside`.
+        driven: share of OP's movement, 0 to 1, that the loop without friction makes of the
+            recorded set-point alone.
+        band_share: f_S + f_D over the width of OP's movement about its slow mean.
+        moved_with, moved_without: movement of OP over the recorded one when the record is
+            repeated with its set-point and noise, with the friction and without.
+        gone: share of that movement that goes away with the friction.
+        before: a line from outside in OP, beside what comes from PV.
+        outside: a line from outside in PV, beside what comes from the stem.
+    """
+
+    valve: str
+    output: str
+    status: LoopStatus
+    reason: str
+    controller: RecoveredController | None = None
+    oscillation: Oscillation | None = None
+    with_friction: Movement = STILL
+    without_friction: Movement = STILL
+    ringing: tuple[Ringing, ...] = ()
+    ringing_beside: tuple[Ringing, ...] = ()
+    driven: float = 0.0
+    band_share: float = 0.0
+    moved_with: float = 0.0
+    moved_without: float = 0.0
+    gone: float = 0.0
+    before: OutsideLine = NO_LINE
+    outside: OutsideLine = NO_LINE
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputLoop:
+    """One output in its loop.
+
+    Attributes:
+        name: its tag.
+        oscillation: of PV − SP, engineering units; None where there is no room for one.
+        after: a line from outside in PV at this period, beside what comes from the stems.
+        alone: the same beside what comes from valves that follow OP.
+        set_point: how the recorded set-point oscillates; None where it does not, or there is none.
+        set_point_line: line of the recorded set-point at this period over that of PV; None
+            where no set-point was recorded.
+    """
+
+    name: str
+    oscillation: Oscillation | None
+    after: OutsideLine = NO_LINE
+    alone: OutsideLine = NO_LINE
+    set_point: Oscillation | None = None
+    set_point_line: float | None = None
+
+    @property
+    def rivalry(self) -> float:
+        """BIC gain by the line alone over the gain by friction; infinite where that is none."""
+        friction = self.alone.plain - self.after.plain
+        return self.alone.gain / friction if friction > 0.0 else math.inf
+
+
+@dataclasses.dataclass(frozen=True)
+class ClosedLoop:
+    """All valves and outputs of a record in their loops, in the order of the record."""
+
+    valves: tuple[ValveLoop, ...]
+    outputs: tuple[OutputLoop, ...]
+
+
+def close_loop(record: Record, found: Identification) -> ClosedLoop:
+    """Close every loop of a record again.
+
+    Control is taken as decentralised: one valve per controller and output, paired by how much
+    of OP the output explains.
+
+    Args:
+        record: what was measured.
+        found: what identification made of it.
+    """
+    loop = scaled(record, found.stem) if found.status is FitStatus.OK else None
+    if loop is None:
+        reason = found.reason or "OP or PV does not move"
+        return ClosedLoop(
+            tuple(ValveLoop(tag, "", LoopStatus.UNTESTABLE, reason) for tag in record.valves),
+            tuple(OutputLoop(tag, None) for tag in record.outputs),
+        )
+    process = scaled_process(found.outputs, record.valves, loop)
+    swings = [oscillation(loop.op[:, j], loop.stretches) for j in range(len(record.valves))]
+    periods = [period_of(swing, loop, UNSEEN_CYCLES) for swing in swings]
+    outputs = [_output(loop, process, tag, i) for i, tag in enumerate(record.outputs)]
+    repeated = Repeated.of(loop, process, found.valves, paired(loop, periods), periods)
+    valves = [
+        _valve(repeated, estimate, outputs, in_units(swing, loop.op_scale[j]), j)
+        for j, (estimate, swing) in enumerate(zip(found.valves, swings, strict=True))
+    ]
+    in_pv = [
+        dataclasses.replace(one, oscillation=in_units(one.oscillation, loop.pv_scale[i]))
+        for i, one in enumerate(outputs)
+    ]
+    return ClosedLoop(tuple(valves), tuple(in_pv))
+
+
+def _output(loop: ScaledLoop, process: Process, tag: str, i: int) -> OutputLoop:
+    """Return how an output oscillates, scaled, and whether a clock outside drives it."""
+    swing = output_oscillation(loop, i)
+    if swing is None:
+        return OutputLoop(tag, None)
+    rows = _last_rows(loop)
+    delays = [int(delay) + 1 for delay in process.delay[i]]
+    after, alone = (
+        outside_line(Predicted(loop.pv[rows, i], list(inputs[rows].T), delays), swing.period)
+        for inputs in (loop.stem, loop.op)
+    )
+    if loop.sp is None:
+        return OutputLoop(tag, swing, after, alone)
+    whole = [(0, rows.stop - rows.start)]
+    lines = [
+        amplitude(values[rows, i], whole, swing.period) or 0.0 for values in (loop.sp, loop.pv)
+    ]
+    driver = oscillation(loop.sp[:, i], loop.stretches)
+    return OutputLoop(tag, swing, after, alone, driver, lines[0] / max(lines[1], 1e-300))
+
+
+def _last_rows(loop: ScaledLoop) -> slice:
+    """Return the end of the longest stretch, as many samples as a run has at most."""
+    first, last = loop.longest
+    return slice(max(first, last - MOST), last)
+
+
+def output_oscillation(loop: ScaledLoop, i: int) -> Oscillation | None:
+    """Return how PV − SP of an output oscillates between moves of its set-point.
+
+    Where the set-point moves most of the time, it is looked at throughout.
+    """
+    if loop.sp is None:
+        return oscillation(loop.pv[:, i], loop.stretches)
+    error = loop.pv[:, i] - loop.sp[:, i]
+    still = [(a + f, a + b) for a, z in loop.stretches for f, b in holds(loop.sp[a:z, i : i + 1])]
+    longest = max(b - a for a, b in still)
+    whole = max(b - a for a, b in loop.stretches)
+    return oscillation(error, still if longest >= MOST_ALIKE * whole else loop.stretches)
+
+
+def paired(loop: ScaledLoop, periods: list[float]) -> list[tuple[int, RecoveredController]]:
+    """Return for each valve the output of its controller, −1 for none, and the controller."""
+    valves, outputs = loop.op.shape[1], loop.pv.shape[1]
+    table = {}
+    for j in range(valves):
+        for i in range(outputs):
+            signals = LoopSignals(
+                loop.op[:, j],
+                loop.pv[:, i],
+                None if loop.sp is None else loop.sp[:, i],
+                loop.stretches,
+            )
+            table[j, i] = recover(signals, round(periods[j] / SPAN_SHARE))
+    chosen: dict[int, int] = {}
+    for j, i in sorted(table, key=lambda key: -table[key].r_squared):
+        if j not in chosen and i not in chosen.values():
+            chosen[j] = i
+    pairs = []
+    for j in range(valves):
+        i = chosen.get(j, -1)
+        law = table[j, max(i, 0)]
+        pairs.append((i if law.status is ControllerStatus.OK else -1, law))
+    return pairs
+
+
+def in_units(swing: Oscillation | None, scale: float) -> Oscillation | None:
+    """Return an oscillation of a scaled signal in its own units."""
+    if swing is None:
+        return None
+    return dataclasses.replace(swing, amplitude=swing.amplitude * float(scale))
+
+
+def _valve(
+    repeated: Repeated,
+    estimate: ValveEstimate,
+    outputs: list[OutputLoop],
+    swing: Oscillation | None,
+    j: int,
+) -> ValveLoop:
+    loop, (i, law), period = repeated.loop, repeated.pairs[j], repeated.periods[j]
+    scale, tag = float(loop.op_scale[j]), estimate.name
+    band = (estimate.static_friction + estimate.dynamic_friction) / scale
+    share = band / max(span_of(loop, j, period), 1e-12)
+    if i < 0:
+        return ValveLoop(
+            tag, "", LoopStatus.UNTESTABLE, law.reason, oscillation=swing, band_share=share
+        )
+    recorded = repeated.recorded(j)
+    free = compare(repeated.without_friction(j), recorded, period)
+    linear = LinearController(law.coefficients, law.lag, law.smoothing)
+    cycle = outputs[i].oscillation
+    at = outputs[i].alone.period or (period if cycle is None else cycle.period)
+    moved = repeated.moved(j, at)
+    if estimate.static_friction > 0.0:
+        stuck = compare(repeated.with_friction(j), recorded, period)
+        status, reason = _status(stuck), ""
+    else:
+        stuck, status, reason = STILL, LoopStatus.UNTESTABLE, "no friction was identified"
+    rows = _last_rows(loop)
+    error = law.set_point[rows] - loop.pv[rows, i]
+    return ValveLoop(
+        tag,
+        outputs[i].name,
+        status,
+        reason,
+        _in_units(law, scale, float(loop.pv_scale[i]), float(loop.pv_mean[i])),
+        swing,
+        stuck,
+        free,
+        ringing(repeated.process, i, j, linear),
+        ringing(_beside(loop, repeated.process, i, at), 0, j, linear),
+        repeated.driven(j),
+        share,
+        moved[0],
+        moved[1],
+        max(0.0, 1.0 - moved[1] / moved[0]) if 0.0 < moved[0] < math.inf else 0.0,
+        outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
+        outputs[i].after,
+    )
+
+
+def _beside(loop: ScaledLoop, process: Process, i: int, period: float) -> Process:
+    """Return the process of one output from valves that follow OP, beside a wave."""
+    rows = _last_rows(loop)
+    delays = process.delay[i]
+    a, b = beside(
+        Predicted(loop.pv[rows, i], list(loop.op[rows].T), [int(d) + 1 for d in delays]), period
+    )
+    return Process(a[None], b[None], delays[None], np.zeros(1))
+
+
+def _status(stuck: Movement) -> LoopStatus:
+    if stuck.alike >= MOST_ALIKE:
+        return LoopStatus.SUSTAINED
+    return LoopStatus.UNSTABLE if stuck.ratio > GROWN else LoopStatus.DIES
+
+
+def _in_units(
+    law: RecoveredController, op_scale: float, pv_scale: float, pv_mean: float
+) -> RecoveredController:
+    """Return a controller between scaled signals in the units of the record."""
+    ratio = op_scale / pv_scale
+    return dataclasses.replace(
+        law,
+        coefficients=law.coefficients * ratio,
+        covariance=law.covariance * ratio**2,
+        set_point=law.set_point * pv_scale + pv_mean,
+    )

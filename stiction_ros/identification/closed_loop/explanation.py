@@ -1,0 +1,197 @@
+"""Which cause explains an oscillation: one decision from all that closing the loop shows."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
+from stiction_ros.identification.closed_loop.closed_loop import (
+    ClosedLoop,
+    LoopStatus,
+    OutputLoop,
+    ValveLoop,
+    close_loop,
+)
+from stiction_ros.identification.closed_loop.damping import Ringing
+from stiction_ros.identification.closed_loop.oscillation import REGULAR
+from stiction_ros.identification.results import Identification, ValveEstimate
+from stiction_ros.records.record import Record
+
+ENDLESS = 1e6
+"""Stands in the figures for a movement that grows without end."""
+
+BELIEVED = 10.0
+"""BIC by which friction must beat the friction-free model to be a cause: very strong evidence."""
+
+MATERIAL = 0.15
+"""Share of OP's movement that must go away with the friction for the valve to be the cause."""
+
+LINE = 6.0
+"""BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
+
+RIVAL = 0.3
+"""BIC gain of a line alone over that of the friction from which on the friction may be fitted to a
+wave from outside. Of valves that make their loop cycle it is below 0: no clock follows slips."""
+
+PLAIN_LINE = 60.0
+"""BIC gain from which on a line shows an oscillation that is too short or too faint to be regular
+by its autocorrelation."""
+
+PLAIN_SHARE = 0.5
+"""Share of the variance from which on a line is an oscillation though it has too few cycles for a
+regularity."""
+
+FAINT = 0.05
+"""Share of the variance below which a line that nothing explains is no oscillation."""
+
+DRIVEN = 0.5
+"""Share of the cycle, of PV and of OP, that the set-point must make to be the cause."""
+
+ALL_DRIVEN = 0.9
+"""Share of OP's movement that moves of the set-point without a line must make to be the cause."""
+
+OPEN = 0.9
+"""R² of the controller below which an unrecorded set-point may move OP."""
+
+HALF_OPEN = 0.95
+"""The same where the line shows more clearly in OP than in PV."""
+
+RINGING = 0.5
+"""Share of an oscillation left after a period: a quarter is usual tuning, half of it rings long."""
+
+STILL_RINGING = 0.85
+"""The same of the process beside a wave, from which on the loop makes the wave itself."""
+
+SAME_PERIOD = 1.3
+"""Factor within which the loop rings at the period of the oscillation."""
+
+
+def explained(record: Record, found: Identification) -> Identification:
+    """Return the identification with causes, and with what the closed loop says of each valve."""
+    closed = close_loop(record, found)
+    valves = tuple(
+        dataclasses.replace(
+            valve,
+            band_share=loop.band_share,
+            evidence={**valve.evidence, **figures(loop, closed)},
+        )
+        for valve, loop in zip(found.valves, closed.valves, strict=True)
+    )
+    outputs = tuple(
+        dataclasses.replace(model, cause=cause(record, found, closed, i))
+        for i, model in enumerate(found.outputs)
+    )
+    return dataclasses.replace(found, valves=valves, outputs=outputs)
+
+
+def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
+    """Return the figures of one closed loop, by name; none where it could not be closed.
+
+    ``loop_ratio`` and ``loop_ratio_free``: movement of OP over the recorded one when the loop
+    is closed without noise, with the friction and without. ``loop_alike``: share of those
+    runs that move as recorded. ``moved_with``, ``moved_without``: the same when the record is
+    repeated with its noise. ``loop_gone``: share of that movement that goes away.
+    ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve;
+    ``line_rivalry``: that of a line alone over that of the friction.
+    """
+    if loop.controller is None:
+        return {}
+    told = {
+        "controller_fit": loop.controller.r_squared,
+        "loop_ratio_free": loop.without_friction.ratio,
+        "moved_without": loop.moved_without,
+        "outside_line": loop.outside.gain,
+    }
+    if loop.status is not LoopStatus.UNTESTABLE:
+        output = next(one for one in closed.outputs if one.name == loop.output)
+        told |= {
+            "line_rivalry": output.rivalry,
+            "loop_ratio": loop.with_friction.ratio,
+            "loop_alike": loop.with_friction.alike,
+            "moved_with": loop.moved_with,
+            "loop_gone": loop.gone,
+        }
+    return {name: max(-ENDLESS, min(value, ENDLESS)) for name, value in told.items()}
+
+
+def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:
+    """Return why output ``i`` oscillates."""
+    output = closed.outputs[i]
+    swing = output.oscillation
+    if swing is None:
+        return Cause(CauseKind.NONE, None, 0.0, 0.0, "There is no room for four cycles.")
+    acting = [
+        (estimate, loop)
+        for estimate, loop in zip(found.valves, closed.valves, strict=True)
+        if found.outputs[i].b[estimate.name] and _is_cause(estimate, loop, output)
+    ]
+    kind, sentence = _kind(output, closed, acting)
+    driver = output.set_point if kind is CauseKind.SET_POINT else None
+    period = (driver or swing).period * record.sample_time
+    return Cause(kind, period, swing.regularity, swing.amplitude, sentence)
+
+
+def _is_cause(valve: ValveEstimate, loop: ValveLoop, output: OutputLoop) -> bool:
+    """Tell whether the friction of a valve makes its loop move."""
+    return (
+        valve.static_friction > 0.0
+        and valve.evidence.get("delta_bic", 0.0) > BELIEVED
+        and loop.gone > MATERIAL
+        and output.rivalry < RIVAL
+    )
+
+
+def _kind(
+    output: OutputLoop, closed: ClosedLoop, acting: list[tuple[ValveEstimate, ValveLoop]]
+) -> tuple[CauseKind, str]:
+    swing = output.oscillation
+    assert swing is not None
+    loop = next((one for one in closed.valves if one.output == output.name), None)
+    regular = swing.regularity > REGULAR
+    if regular and _set_point(output, loop):
+        return CauseKind.SET_POINT, "The set-point moves the loop at this period."
+    if acting:
+        valve, with_it = max(acting, key=lambda one: one[1].gone)
+        gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
+        return (
+            CauseKind.VALVE,
+            f"Without the friction of {valve.name}, {gone} of OP's movement goes away.",
+        )
+    rings = regular and loop is not None and _growth(loop.ringing, swing.period) > RINGING
+    line = max(output.after.gain, output.alone.gain) > (LINE if regular else PLAIN_LINE)
+    itself = loop is not None and _growth(loop.ringing_beside, swing.period) > STILL_RINGING
+    clear = regular and swing.share > FAINT
+    if clear and not line and loop is not None and loop.driven > ALL_DRIVEN:
+        return CauseKind.SET_POINT, "Moves of the set-point make all of it."
+    if rings and (itself or not line):
+        return CauseKind.TUNING, "Controller and process ring at this period without friction."
+    if line:
+        return (
+            CauseKind.DISTURBANCE,
+            "A wave that keeps its period to the sample enters behind the valve.",
+        )
+    if swing.regularity == 0.0 and swing.share > PLAIN_SHARE:
+        return CauseKind.UNKNOWN, "The record has too few cycles to tell."
+    if not regular:
+        return CauseKind.NONE, "There is no regular oscillation."
+    if swing.share < FAINT:
+        return CauseKind.NONE, "The oscillation is too faint to be told from noise."
+    return CauseKind.UNKNOWN, "Nothing that was identified explains this oscillation."
+
+
+def _set_point(output: OutputLoop, loop: ValveLoop | None) -> bool:
+    """Tell whether the set-point makes the cycle, a recorded one or one that is not."""
+    if loop is None or loop.controller is None:
+        return False
+    if output.set_point_line is not None:
+        return output.set_point_line > DRIVEN and loop.driven > DRIVEN
+    ahead = loop.before.gain > output.after.gain and loop.controller.r_squared < HALF_OPEN
+    return loop.before.gain > LINE and (ahead or loop.controller.r_squared < OPEN)
+
+
+def _growth(ringing: tuple[Ringing, ...], period: float) -> float:
+    """Return how much of an oscillation at about ``period`` samples is left after a period."""
+    near = (
+        one.growth for one in ringing if period / SAME_PERIOD < one.period < period * SAME_PERIOD
+    )
+    return max(near, default=0.0)

@@ -1,0 +1,106 @@
+"""How much OP moves about its slow mean, and at which period."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.oscillation import slow_mean
+
+ALIKE = (0.5, 1.7)
+"""Movement of OP over the recorded one that is the same cycle."""
+
+SAME_PERIOD = 1.6
+"""Factor within which the periods of two cycles are the same."""
+
+SLOW = 3.0
+"""Periods over which the slow mean is taken."""
+
+LATE = 0.6
+"""Share of a run, at its end, that is looked at."""
+
+FAST = 8.0
+"""Parts of a period over which noise is averaged out."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Movement:
+    """How OP moved in simulated runs, over how it was recorded.
+
+    Attributes:
+        ratio: median of the runs; infinite where they grow without end.
+        low, high: quartiles.
+        alike: share of the runs that move as recorded, with about the recorded period.
+        period: median of the runs that move over the recorded one; 0 where none does.
+    """
+
+    ratio: float
+    low: float
+    high: float
+    alike: float
+    period: float
+
+
+STILL = Movement(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def moving(values: FloatArray, period: float) -> FloatArray:
+    """Return ``values``, shape (N,), about their slow mean and without their fast noise."""
+    fast = slow_mean(values, period / FAST) if period >= 2 * FAST else values
+    return fast - slow_mean(values, SLOW * period)
+
+
+def size(moved: FloatArray) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(moved**2)))
+
+
+def own_period(moved: FloatArray) -> float:
+    """Return the samples per cycle of what moves about zero; 0 with less than one cycle.
+
+    A half cycle ends where the signal goes from beyond half its size on one side to beyond it
+    on the other.
+    """
+    level = 0.5 * size(moved)
+    rows = np.flatnonzero(np.abs(moved) > level)
+    if level <= 0.0 or not len(rows):
+        return 0.0
+    sides = np.sign(moved[rows])
+    turns = rows[1:][sides[1:] != sides[:-1]]
+    if len(turns) < 3:
+        return 0.0
+    return float(2.0 * (turns[-1] - turns[0]) / (len(turns) - 1))
+
+
+def compare(runs: FloatArray, recorded: float, period: float) -> Movement:
+    """Return how OP moves at the end of runs.
+
+    Args:
+        runs: OP of R runs, shape (R, n).
+        recorded: size of the recorded movement, units of OP.
+        period: recorded one, samples.
+    """
+    late = int((1.0 - LATE) * runs.shape[1])
+    ratios, periods = [], []
+    for run in runs:
+        if not np.isfinite(run).all():
+            ratios.append(np.inf)
+            periods.append(0.0)
+            continue
+        moved = run[late:] - run[late:].mean()
+        ratios.append(size(moved) / recorded)
+        periods.append(own_period(moved) / period)
+    ratio, own = np.array(ratios), np.array(periods)
+    same = (own > 1.0 / SAME_PERIOD) & (own < SAME_PERIOD)
+    alike = (ratio > ALIKE[0]) & (ratio < ALIKE[1]) & same
+    going = own[(own > 0.0) & (ratio > 0.2)]
+    low, middle, high = np.sort(ratio)[[len(ratio) // 4, len(ratio) // 2, 3 * len(ratio) // 4]]
+    return Movement(
+        float(middle),
+        float(low),
+        float(high),
+        float(alike.mean()),
+        float(np.median(going)) if len(going) else 0.0,
+    )

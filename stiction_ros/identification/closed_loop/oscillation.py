@@ -1,0 +1,280 @@
+"""Does a signal oscillate, at which period, how regularly and how much?
+
+- *Dominant period* T: the one period at which sine, cosine and a constant, fitted to every
+  stretch on its own, explain most (log likelihood for white noise). The first quarter of
+  each stretch is left out, as it still settles.
+- *Amplitude*: √2 × RMS of the spectral line at T. Each stretch gives its last whole number of
+  periods that fits after half a period for settling; sine, cosine and a constant are fitted to
+  them, and the squared amplitudes are averaged with the number of samples as weight. A stretch
+  too short for one period says nothing.
+- *Regularity*: mean of the intervals between zero crossings of the autocorrelation over three
+  of their standard deviations. Noise averages out in the autocorrelation; a cycle that keeps its
+  time leaves even intervals.
+
+References:
+    N. F. Thornhill, B. Huang, H. Zhang: Detection of multiple oscillations in control loops.
+    J. Process Control 13, 2003, 91-100.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+Stretches = Sequence[tuple[int, int]]
+
+LEAST_LINE = 0.25
+"""Share of the variance inside the stretches that a cycle explains at least."""
+
+NEEDED_CYCLES = 4
+"""Whole cycles below which one cannot speak of a cycle."""
+
+SHORTEST = 6.0
+"""Samples of a period; below that a cycle cannot be told from noise."""
+
+FINE = 16
+"""Frequencies per line width: a step turns the phase by 1/16 of a cycle over a stretch."""
+
+FASTEST = 3.0
+"""Samples of a period that a regular autocorrelation may show."""
+
+CROSSINGS = 6, 13
+"""Zero crossings of the autocorrelation needed, and looked at: later ones are noise."""
+
+NEAR = 1.4
+"""Factor within which the line of a regular oscillation lies from its period."""
+
+REGULAR = 1.0
+"""Regularity from which on an oscillation is regular."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Cycle:
+    """The oscillation of a loop.
+
+    Attributes:
+        period: dominant period, samples.
+        share: of the variance inside the stretches that it explains, of the clearest output.
+        count: whole cycles that this output went through inside the stretches.
+        output: index of that output.
+    """
+
+    period: float
+    share: float
+    count: int
+    output: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Oscillation:
+    """How one signal oscillates.
+
+    Attributes:
+        period: dominant period, samples.
+        share: of the variance that the line at this period explains.
+        count: whole cycles.
+        regularity: above 1 is regular.
+        amplitude: √2 × RMS of the line, units of the signal.
+    """
+
+    period: float
+    share: float
+    count: int
+    regularity: float
+    amplitude: float
+
+
+def oscillation(values: FloatArray, stretches: Stretches) -> Oscillation | None:
+    """Return how ``values``, shape (N,), oscillate inside the stretches.
+
+    What is slower than a quarter of the longest stretch is drift and taken out first.
+
+    Returns:
+        None when there is no room for four cycles, or nothing moves.
+    """
+    longest = max((b - a for a, b in stretches), default=0)
+    if longest < NEEDED_CYCLES * SHORTEST:
+        return None
+    slowest = longest / NEEDED_CYCLES
+    level = values.copy()
+    for first, last in stretches:
+        level[first:last] -= slow_mean(values[first:last], slowest)
+    first, last = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
+    regular, period = regularity(level[first:last])
+    periods = (SHORTEST, slowest)
+    if regular > REGULAR and FASTEST < period < slowest:
+        periods = (max(period / NEAR, FASTEST), min(period * NEAR, slowest))
+    cycle = dominant_cycle(level[:, None], stretches, periods)
+    if cycle is None:
+        return None
+    size = amplitude(level, stretches, cycle.period)
+    return Oscillation(
+        cycle.period, cycle.share, cycle.count, regular, 0.0 if size is None else size
+    )
+
+
+def dominant_cycle(
+    error: FloatArray, stretches: Stretches, periods: tuple[float, float] | None = None
+) -> Cycle | None:
+    """Return the oscillation that explains the errors inside the stretches best.
+
+    Args:
+        error: PV − SP, shape (N, p).
+        stretches: the holds.
+        periods: shortest and longest looked for, samples; None for all up to the longest hold.
+
+    Returns:
+        None when no hold has room for one period, or nothing moves at all.
+    """
+    settled = [(a + (b - a) // 4, b) for a, b in stretches]
+    longest = max(b - a for a, b in settled)
+    settled = [(a, b) for a, b in settled if b - a >= longest / 3]
+    total = np.array([sum(_energy(error[a:b, j]) for a, b in settled) for j in _columns(error)])
+    if longest < 2 * SHORTEST or not np.any(total > 0):
+        return None
+    count = sum(b - a for a, b in settled)
+    shortest, slowest = periods or (SHORTEST, float(longest))
+    least = max(FINE, int(np.ceil(FINE * longest / slowest)))
+    bins = np.arange(least, int(np.ceil(FINE * longest / shortest)))
+    if not len(bins):
+        return None
+    frequencies = bins / (FINE * longest)
+    shares = _explained(error, settled, bins, FINE * longest) / np.maximum(total, 1e-300)
+    gains = -0.5 * count * np.log(np.maximum(1.0 - shares, 1e-12)).sum(axis=1)
+    best = int(np.argmax(gains))
+    period = float(1 / frequencies[best])
+    output = int(np.argmax(shares[best]))
+    swings = _count_swings(error[:, output], stretches, settled, period)
+    return Cycle(period, float(shares[best, output]), swings, output)
+
+
+def amplitude(error: FloatArray, stretches: Stretches, period: float) -> float | None:
+    """Return √2 × RMS of the spectral line of ``error``, shape (N,), at ``period`` samples."""
+    squares = weight = 0.0
+    for first, last in stretches:
+        room = last - first - period / 2
+        count = round(np.floor(room / period + 1e-9) * period)
+        if count < period / 2 or count < 4:
+            continue
+        fitted = _line(error[last - count : last], period)
+        squares += count * float(fitted[1] ** 2 + fitted[2] ** 2)
+        weight += count
+    return float(np.sqrt(squares / weight)) if weight else None
+
+
+def regularity(values: FloatArray) -> tuple[float, float]:
+    """Return regularity and period, samples, by the autocorrelation of ``values``, shape (N,).
+
+    Returns:
+        Zeros where the first half of the lags has fewer than six zero crossings.
+    """
+    count = len(values)
+    row = np.arange(count) - 0.5 * (count - 1)
+    level = values - values.mean()
+    level = level - row * float(row @ level) / max(float(row @ row), 1e-300)
+    length = 1 << (2 * count - 1).bit_length()
+    power = np.abs(np.fft.rfft(level, length)) ** 2
+    correlation = np.fft.irfft(power, length)[: count // 2]
+    crossings = np.flatnonzero(np.diff(np.signbit(correlation)))[: CROSSINGS[1]]
+    if len(crossings) < CROSSINGS[0]:
+        return 0.0, 0.0
+    before, after = correlation[crossings], correlation[crossings + 1]
+    intervals = np.diff(crossings + before / (before - after))
+    mean = float(intervals.mean())
+    return mean / (3.0 * max(float(intervals.std(ddof=1)), 1e-3 * mean)), 2.0 * mean
+
+
+def slow_mean(values: FloatArray, width: float) -> FloatArray:
+    """Return the running mean of ``values``, shape (N,), over about ``width`` samples.
+
+    Where the window does not fit, at both ends, the nearest mean is held.
+    """
+    count = len(values)
+    half = max(int(width / 2), 1)
+    if count <= 2 * half + 1:
+        return np.full(count, float(values.mean()))
+    sums = np.concatenate([[0.0], np.cumsum(values - values[0])])
+    middle = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1) + values[0]
+    return np.concatenate([np.full(half, middle[0]), middle, np.full(half, middle[-1])])
+
+
+def _columns(error: FloatArray) -> range:
+    return range(error.shape[1])
+
+
+def _energy(values: FloatArray) -> float:
+    return float(((values - values.mean()) ** 2).sum())
+
+
+def _line(values: FloatArray, period: float) -> FloatArray:
+    """Return constant, cosine and sine amplitude of the fit to ``values``."""
+    angle = 2 * np.pi / period * np.arange(len(values))
+    basis = np.column_stack([np.ones(len(values)), np.cos(angle), np.sin(angle)])
+    fitted = np.linalg.lstsq(basis, values, rcond=None)[0]
+    return np.asarray(fitted)
+
+
+def _explained(
+    error: FloatArray, stretches: Stretches, bins: np.ndarray[tuple[int], np.dtype[np.intp]], n: int
+) -> FloatArray:
+    """Return the energy, shape (F, p), that a line at each frequency takes out of the holds.
+
+    The sums of a stretch times sine and cosine come from its Fourier transform over n samples,
+    those of sine and cosine with themselves from geometric series.
+
+    Args:
+        bins: frequencies times n, shape (F,).
+        n: length of the transform, at least that of every stretch.
+    """
+    taken = np.zeros((len(bins), error.shape[1]))
+    turn: FloatArray = np.asarray(2 * np.pi / n * bins, dtype=np.float64)
+    for first, last in stretches:
+        count = last - first
+        one, two = _geometric(turn, count), _geometric(2 * turn, count)
+        cc = (count + two.real) / 2 - one.real**2 / count
+        ss = (count - two.real) / 2 - one.imag**2 / count
+        cs = two.imag / 2 - one.real * one.imag / count
+        room = bins * count >= n  # one period at least
+        for j in _columns(error):
+            values = error[first:last, j] - error[first:last, j].mean()
+            sums = np.fft.rfft(values, n)[bins]
+            c, s = sums.real, -sums.imag
+            energy = (ss * c**2 - 2 * cs * c * s + cc * s**2) / np.maximum(cc * ss - cs**2, 1e-300)
+            taken[room, j] += energy[room]
+    return taken
+
+
+def _geometric(turn: FloatArray, count: int) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
+    """Return Σ exp(i turn k) over k = 0 … count − 1."""
+    half = np.exp(0.5j * turn * (count - 1))
+    return np.asarray(half * np.sin(0.5 * turn * count) / np.sin(0.5 * turn))
+
+
+def _count_swings(
+    values: FloatArray, stretches: Stretches, settled: Stretches, period: float
+) -> int:
+    """Return how many whole cycles ``values`` go through inside the holds.
+
+    A half cycle ends where the error, smoothed over an eighth of a period, crosses from
+    beyond half the RMS of the settled parts on one side of their mean to beyond it on the
+    other. A hold in which the valve rests adds none.
+    """
+    width = max(int(period / 8), 1)
+    smooth = np.convolve(values, np.ones(width) / width, mode="same")
+    means = [float(smooth[a:b].mean()) for a, b in settled]
+    energy = sum(_energy(smooth[a:b]) for a, b in settled)
+    level = 0.5 * float(np.sqrt(energy / sum(b - a for a, b in settled)))
+    by_end = {b: mean for (_, b), mean in zip(settled, means, strict=True)}
+    halves = 0
+    for first, last in stretches:
+        if last not in by_end:
+            continue
+        part = smooth[first + round(period / 4) : last] - by_end[last]
+        sides = np.sign(part[np.abs(part) > level])
+        turns = int(np.count_nonzero(np.diff(sides)))
+        halves += turns + 1 if turns else 0
+    return halves // 2

@@ -1,0 +1,351 @@
+r"""The controller of a loop, recovered from SP, PV and OP by least squares.
+
+In velocity form, over a span of h samples and with the error e = SP − PV behind a filter,
+
+.. math::
+
+    u_k - u_{k-h} = K (e_k - e_{k-h}) + K_i \sum_{i=k-h+1}^{k} e_i
+                    + K_d (\Delta e_k - \Delta e_{k-h}) + h c
+
+e may be that of the sample before. A span of one sample is the textbook form; longer ones let
+signals that are rounded, or held between reports, be told from their steps, so the shortest span
+is taken whose fit is nearly as good as any. The constant c stands for a set-point that is not
+recorded: it is there when the record has none, and the set-point is then the mean of PV plus
+c / K_i, at which OP rests.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import itertools
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
+Stretches = list[tuple[int, int]]
+
+LEAST_FIT = 0.2
+"""R² from which on a controller is believed: rounded and held signals leave no more."""
+
+NEARLY = 0.03
+"""R² that a shorter span may lose against the best one."""
+
+SPANS = (1, 2, 3, 5, 8, 12, 20, 32, 50, 80, 130)
+"""Spans h tried, samples: about 1.6 times the one before."""
+
+LAGS = (0, 1, 2)
+"""Samples between PV and the OP that answers it."""
+
+FILTERS = (0.0, 0.5, 0.8)
+"""Shares of the last value in the filter of the error, per sample."""
+
+BLOCKS = 12
+"""Blocks of the jackknife behind the standard errors."""
+
+PRICE = 0.01
+"""R² of what is left that a sample of lag or a filter must explain to be taken, a derivative half
+more: with it the law of one sample later is another form of the law without."""
+
+LEAST_ROWS = 30
+"""Samples in automatic that a fit needs."""
+
+CLIPPED_RUN = 5
+"""Samples in a row at its end of range from which on OP may rest at a limit."""
+
+CLIPPED_LEVELS = 20
+"""Values between its ends that OP must take for a rest at an end to be a limit, not a step."""
+
+
+class ControllerStatus(enum.StrEnum):
+    """Whether a controller was recovered."""
+
+    OK = "ok"
+    NO_MOVES = "no_moves"
+    NO_RELATION = "no_relation"
+
+
+@dataclasses.dataclass(frozen=True)
+class RecoveredController:
+    """A PI(D) controller in velocity form, all times in samples.
+
+    Attributes:
+        status: ok, or why there is none.
+        reason: one sentence; empty when ok.
+        coefficients: (K, K_i, K_d), OP per unit of PV and sample, signed for e = SP − PV,
+            shape (3,).
+        covariance: of the coefficients from a jackknife over blocks, shape (3, 3).
+        lag: samples between PV and the OP that answers it.
+        smoothing: share of the last value in the filter of the error.
+        span: h, samples.
+        r_squared: share of the moves of OP over h samples that is explained.
+        set_point: as recorded or found, shape (N,).
+        limits: where OP was seen to rest while the controller would have gone on; infinite
+            where it was not.
+    """
+
+    status: ControllerStatus
+    reason: str
+    coefficients: FloatArray
+    covariance: FloatArray
+    lag: int
+    smoothing: float
+    span: int
+    r_squared: float
+    set_point: FloatArray
+    limits: tuple[float, float]
+
+    @property
+    def gain(self) -> float:
+        """K, OP per unit of PV."""
+        return float(self.coefficients[0])
+
+    @property
+    def integral_time(self) -> float:
+        """T_i = K / K_i, samples; infinite without reset."""
+        if self.coefficients[1] == 0.0:
+            return float("inf")
+        return float(self.coefficients[0] / self.coefficients[1])
+
+    @property
+    def errors(self) -> FloatArray:
+        """Standard errors of the coefficients, shape (3,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopSignals:
+    """What a controller reads and writes.
+
+    Attributes:
+        op, pv: shape (N,).
+        sp: shape (N,), or None when not recorded.
+        stretches: first sample of each stretch in automatic and the one behind its last.
+    """
+
+    op: FloatArray
+    pv: FloatArray
+    sp: FloatArray | None
+    stretches: Stretches
+
+
+def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
+    """Return the controller between PV and OP.
+
+    Args:
+        signals: of one loop.
+        longest_span: of h, samples; a third of the period of a cycle serves well.
+    """
+    op, pv, sp = signals.op, signals.pv, signals.sp
+    rows = np.concatenate([np.arange(a, b) for a, b in signals.stretches] or [np.empty(0, int)])
+    rest = float(pv[rows].mean()) if len(rows) else 0.0
+    set_point = np.full(len(pv), rest) if sp is None else sp
+    limits = _limits(op[rows])
+    free = (op < limits[1]) & (op > limits[0])
+    scales = (_spread(op[rows]), _spread(set_point[rows] - pv[rows]))
+    if len(rows) < LEAST_ROWS or min(scales) <= 0.0:
+        reason = "OP or the error does not move in automatic"
+        return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
+    error = (set_point - pv) / scales[1]
+    command = (op - float(op[rows].mean())) / scales[0]
+    data = _Data(command, error, sp is None, signals.stretches, free)
+    textbook = {
+        span: _best(data, [_Form(lag, 0.0, False, span) for lag in LAGS])
+        for span in SPANS
+        if span <= max(longest_span, 1)
+    }
+    fits = {span: fit for span, fit in textbook.items() if fit is not None}
+    if not fits:
+        reason = f"fewer than {LEAST_ROWS} samples in automatic"
+        return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
+    top = max(fit.r_squared for fit in fits.values())
+    span = next(span for span, fit in fits.items() if fit.r_squared >= top - NEARLY)
+    kinds = itertools.product(LAGS, FILTERS, (False, True))
+    chosen = _best(data, [_Form(*kind, span) for kind in kinds])
+    assert chosen is not None
+    return _told(chosen, set_point, limits, scales, data)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Data:
+    """Scaled signals: u and e, whether SP is unknown, stretches, and where OP is free."""
+
+    command: FloatArray
+    error: FloatArray
+    unknown: bool
+    stretches: Stretches
+    free: BoolArray
+
+
+@dataclasses.dataclass(frozen=True)
+class _Form:
+    lag: int
+    smoothing: float
+    derivative: bool
+    span: int
+
+    @property
+    def price(self) -> float:
+        """What the form costs beyond the textbook one, as log of the squared rest."""
+        return PRICE * (self.lag + (self.smoothing > 0.0) + 1.5 * self.derivative)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Fit:
+    form: _Form
+    theta: FloatArray
+    kept: BoolArray
+    r_squared: float
+
+    @property
+    def worth(self) -> float:
+        return -float(np.log(max(1.0 - self.r_squared, 1e-9))) - self.form.price
+
+
+def _best(data: _Data, forms: list[_Form]) -> _Fit | None:
+    fits = [fit for form in forms if (fit := _fit(data, form)) is not None]
+    return max(fits, key=lambda fit: fit.worth, default=None)
+
+
+def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
+    """Return regressors, shape (n, q), and moves of OP, shape (n,), over h samples."""
+    h, rows, moves = form.span, [], []
+    for first, last in data.stretches:
+        start = first + form.lag + 1
+        if last - start <= h:
+            continue
+        error = smoothed(data.error[first:last], form.smoothing)
+        error = error[1 : last - first - form.lag]
+        before = smoothed(data.error[first:last], form.smoothing)[: len(error)]
+        sums = np.concatenate([[0.0], np.cumsum(error)])
+        columns = [error[h:] - error[:-h], (sums[h:] - sums[:-h])[1:]]
+        if form.derivative:
+            change = error - before
+            columns.append(change[h:] - change[:-h])
+        if data.unknown:
+            columns.append(np.full(len(error) - h, float(h)))
+        command, free = data.command[start:last], data.free[start:last]
+        kept = free[h:] & free[:-h]
+        rows.append(np.column_stack(columns)[kept])
+        moves.append((command[h:] - command[:-h])[kept])
+    if not rows:
+        return np.empty((0, 2)), np.empty(0)
+    return np.vstack(rows), np.concatenate(moves)
+
+
+def _fit(data: _Data, form: _Form) -> _Fit | None:
+    columns, moves = _columns(data, form)
+    total = float(moves @ moves)
+    if len(moves) < LEAST_ROWS or total <= 0.0:
+        return None
+    gram, side = columns.T @ columns, columns.T @ moves
+    kept = np.ones(len(side), dtype=bool)
+    theta = _solved(gram, side, kept)
+    if theta[0] * theta[1] < 0.0:  # a reset against the gain is none
+        kept[1] = False
+        kept[-1] = kept[-1] and not data.unknown
+        theta = _solved(gram, side, kept)
+    r_squared = float(2.0 * theta @ side - theta @ gram @ theta) / total
+    return _Fit(form, theta, kept, r_squared)
+
+
+def _covariance(data: _Data, fit: _Fit) -> FloatArray:
+    """Return the covariance of a fit by leaving out one block after the other."""
+    columns, moves = _columns(data, fit.form)
+    edges = np.linspace(0, len(moves), BLOCKS + 1).astype(int)
+    parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    grams = np.array([columns[part].T @ columns[part] for part in parts])
+    sides = np.array([columns[part].T @ moves[part] for part in parts])
+    gram, side = grams.sum(axis=0), sides.sum(axis=0)
+    without = [_solved(gram - g, side - s, fit.kept) for g, s in zip(grams, sides, strict=True)]
+    about = np.array(without) - np.mean(without, axis=0)
+    return np.asarray((BLOCKS - 1) / BLOCKS * about.T @ about)
+
+
+def _solved(gram: FloatArray, side: FloatArray, kept: BoolArray) -> FloatArray:
+    """Return the least-squares solution, shape (q,), zero where a column is not kept."""
+    part = gram[np.ix_(kept, kept)]
+    scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
+    scaled = np.linalg.lstsq(part / np.outer(scale, scale), side[kept] / scale, rcond=1e-12)[0]
+    theta = np.zeros(len(side))
+    theta[kept] = scaled / scale
+    return theta
+
+
+def _told(
+    fit: _Fit,
+    set_point: FloatArray,
+    limits: tuple[float, float],
+    scales: tuple[float, float],
+    data: _Data,
+) -> RecoveredController:
+    """Return the fit in the units of the record."""
+    ratio = scales[0] / scales[1]
+    wanted = [0, 1, 2] if fit.form.derivative else [0, 1]
+    coefficients, covariance = np.zeros(3), np.zeros((3, 3))
+    coefficients[wanted] = fit.theta[wanted] * ratio
+    found = _covariance(data, fit)
+    covariance[np.ix_(wanted, wanted)] = found[np.ix_(wanted, wanted)] * ratio**2
+    if data.unknown and fit.theta[1] != 0.0:
+        shift = float(fit.theta[-1] / fit.theta[1])
+        set_point = set_point + np.clip(shift, -1.0, 1.0) * scales[1]
+    believed = fit.r_squared >= LEAST_FIT
+    status = ControllerStatus.OK if believed else ControllerStatus.NO_RELATION
+    reason = "" if believed else f"a PI law explains {fit.r_squared:.2f} of the moves of OP"
+    form = fit.form
+    return RecoveredController(
+        status,
+        reason,
+        coefficients,
+        covariance,
+        form.lag,
+        form.smoothing,
+        form.span,
+        fit.r_squared,
+        set_point,
+        limits,
+    )
+
+
+def _failed(
+    status: ControllerStatus, reason: str, set_point: FloatArray, limits: tuple[float, float]
+) -> RecoveredController:
+    return RecoveredController(
+        status, reason, np.zeros(3), np.zeros((3, 3)), 0, 0.0, 1, 0.0, set_point, limits
+    )
+
+
+def smoothed(values: FloatArray, share: float) -> FloatArray:
+    """Return ``values``, shape (N,), behind a filter that keeps ``share`` of its last value."""
+    if share == 0.0:
+        return values
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([1.0 - share], [1.0, -share], values, zi=[share * values[0]])[0])
+
+
+def _spread(values: FloatArray) -> float:
+    return float(values.std()) if len(values) else 0.0
+
+
+def _limits(op: FloatArray) -> tuple[float, float]:
+    """Return where OP rests at the ends of its range, infinite where it does not.
+
+    A coarse step also lets OP rest at an end: then it takes few values.
+    """
+    limits = [-np.inf, np.inf]
+    if len(op) < LEAST_ROWS or len(np.unique(op)) < CLIPPED_LEVELS:
+        return limits[0], limits[1]
+    longest = _longest_run(np.diff(op[(op > op.min()) & (op < op.max())]) == 0.0)
+    for side, end in enumerate((float(op.min()), float(op.max()))):
+        run = _longest_run(op == end)
+        if run >= max(CLIPPED_RUN, 3 * (longest + 1)):
+            limits[side] = end
+    return limits[0], limits[1]
+
+
+def _longest_run(there: BoolArray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))

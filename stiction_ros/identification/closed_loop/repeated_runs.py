@@ -1,0 +1,351 @@
+"""The runs of a loop that is closed again: which frictions, controllers and starts."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
+from stiction_ros.identification.closed_loop.movement import moving, size
+from stiction_ros.identification.closed_loop.oscillation import (
+    Oscillation,
+)
+from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
+from stiction_ros.identification.closed_loop.scaled_loop import DIGITS, ScaledLoop, free_run
+from stiction_ros.identification.results import ValveEstimate
+
+STARTS = (0.2, 0.5, 0.8)
+"""Shares of the longest stretch at which runs begin as recorded."""
+
+KICKS = (-2.0, 2.0)
+"""Standard deviations of PV by which the other runs begin away from rest."""
+
+CYCLES = 14
+"""Periods that a run goes on."""
+
+FEWEST, MOST = 240, 6000
+"""Samples of a run."""
+
+NOISES = 3
+"""Noises drawn for each friction when a record is repeated."""
+
+LINES = 3
+"""Harmonics of a cycle that are taken out of what the model leaves."""
+
+SEED = 20
+"""Of the noises: the same record gives the same answer."""
+
+KNOWN = 1e-10
+"""Variance of coefficients over their square that is rounding and no uncertainty."""
+
+DOUBTED = 0.7
+"""Share of the friction that is tried as its least where the interval begins at none."""
+
+Pairs = Sequence[tuple[int, RecoveredController]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Repeated:
+    """One loop, ready to be run again and again; everything scaled.
+
+    Attributes:
+        loop: the signals.
+        process: equation (9).
+        frictions: per valve the (f_S, f_D) tried, the estimate first, shape (m, F, 2).
+        pairs: per valve the output of its controller, −1 for none, and the controller.
+        periods: of OP of each valve, samples.
+        simulated: PV of the process driven by the estimated stems, shape (N, p).
+        load: what that leaves of PV, shape (N, p).
+    """
+
+    loop: ScaledLoop
+    process: Process
+    frictions: FloatArray
+    pairs: Pairs
+    periods: tuple[float, ...]
+    simulated: FloatArray
+    load: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        loop: ScaledLoop,
+        process: Process,
+        valves: Sequence[ValveEstimate],
+        pairs: Pairs,
+        periods: Sequence[float],
+    ) -> Repeated:
+        """Return the loop of identified ``valves``."""
+        frictions = np.array([tried_frictions(valve) for valve in valves])
+        simulated = free_run(process, loop, loop.stem)
+        return cls(
+            loop,
+            process,
+            np.round(frictions / loop.op_scale[:, None, None], DIGITS),
+            pairs,
+            tuple(periods),
+            simulated,
+            loop.pv - simulated,
+        )
+
+    @property
+    def past(self) -> int:
+        """H, samples before the first of a run."""
+        a, b, delay, _ = self.process
+        late = max(law.lag for _, law in self.pairs)
+        return int(max(a.shape[1], b.shape[2] + int(delay.max()), 3 + late))
+
+    @property
+    def controllers(self) -> Controllers:
+        """The controllers as the runs take them."""
+        laws = [law for _, law in self.pairs]
+        return Controllers(
+            np.array([i for i, _ in self.pairs]),
+            np.array([law.lag for law in laws]),
+            np.array([law.smoothing for law in laws]),
+            np.array([law.limits[0] for law in laws]),
+            np.array([law.limits[1] for law in laws]),
+        )
+
+    def with_friction(self, valve: int) -> FloatArray:
+        """Return OP, shape (R, n), with the frictions tried for ``valve``."""
+        return self._run(valve, self.frictions[valve])
+
+    def without_friction(self, valve: int) -> FloatArray:
+        """Return OP, shape (R, n), of a valve that follows it."""
+        return self._run(valve, np.zeros((1, 2)))
+
+    def recorded(self, valve: int) -> float:
+        """Return the size of the recorded movement of OP about its slow mean.
+
+        The samples for one period after a move of the set-point are left out while enough
+        others remain.
+        """
+        period, op = self.periods[valve], self.loop.op[:, valve]
+        moved = np.full(len(op), np.nan)
+        for first, last in self.loop.stretches:
+            moved[first:last] = moving(op[first:last], period)
+        calm = np.isfinite(moved)
+        output, law = self.pairs[valve]
+        if output >= 0:
+            for row in np.flatnonzero(np.diff(law.set_point) != 0.0):
+                calm[row : row + round(period)] = False
+        enough = calm.sum() >= max(2 * period, 0.2 * len(op))
+        return size(moved[calm if enough else np.isfinite(moved)])
+
+    def driven(self, valve: int) -> float:
+        """Return the share of OP's movement that the recorded set-point makes without friction."""
+        first, last = self._end(self.loop.longest)
+        rows = slice(first, last)
+        if not any(np.ptp(law.set_point[rows]) > 0.0 for i, law in self.pairs if i >= 0):
+            return 0.0
+        frictions = self.frictions[:, 0].copy()
+        frictions[valve] = 0.0
+        op = self._again(first, last, frictions[None], np.zeros((1, last - first, self._p)))
+        if not np.isfinite(op).all():
+            return 0.0
+        period = self.periods[valve]
+        begun = first + self.past
+        recorded = moving(self.loop.op[begun:last, valve], period)
+        apart = recorded - moving(op[0, :, valve], period)
+        return max(0.0, 1.0 - float(apart @ apart) / max(float(recorded @ recorded), 1e-300))
+
+    def moved(self, valve: int, period: float) -> tuple[float, float]:
+        """Return the movement of OP over the recorded one, with friction and without.
+
+        The record is repeated from its start with its set-point, and with noise of the
+        spectrum of what the model leaves, without the line at the period. Medians of the
+        frictions and noises tried; infinite where most runs grow without end.
+
+        Args:
+            valve: index.
+            period: of the cycle, samples.
+        """
+        first, last = self._end(self.loop.longest)
+        noises = [without_lines(self.load[first:last, i], period) for i in range(self._p)]
+        random = np.random.default_rng(SEED)
+        tried = self.frictions[valve]
+        tried = tried if tried.any() else tried[:1]
+        number = NOISES * len(tried)
+        frictions = np.repeat(self.frictions[None, :, 0], number + NOISES, axis=0)
+        frictions[number:, valve] = 0.0
+        load = np.empty((number + NOISES, last - first, self._p))
+        for n in range(NOISES):
+            load[number + n] = np.column_stack([surrogate(noise, random) for noise in noises])
+            for k, pair in enumerate(tried):
+                frictions[n * len(tried) + k, valve] = pair
+                load[n * len(tried) + k] = load[number + n]
+        op = self._again(first, last, frictions, load)[:, :, valve]
+        recorded = size(moving(self.loop.op[first + self.past : last, valve], period))
+        sizes = [size(moving(run, period)) if np.isfinite(run).all() else np.inf for run in op]
+        with_friction, without = np.sort(sizes[:number]), np.sort(sizes[number:])
+        return (
+            float(with_friction[number // 2]) / recorded,
+            float(without[NOISES // 2]) / recorded,
+        )
+
+    @property
+    def _p(self) -> int:
+        return int(self.loop.pv.shape[1])
+
+    def _end(self, stretch: tuple[int, int]) -> tuple[int, int]:
+        """Return the last ``MOST`` samples of a stretch."""
+        return max(stretch[0], stretch[1] - MOST), stretch[1]
+
+    def _set_points(self, rows: slice) -> FloatArray:
+        """Return set-points, shape (n, p): recorded, or found with the controller."""
+        loop = self.loop
+        sp = (
+            np.zeros((rows.stop - rows.start, self._p)) if loop.sp is None else loop.sp[rows].copy()
+        )
+        for i, law in self.pairs:
+            if i >= 0:
+                sp[:, i] = law.set_point[rows]
+        return sp
+
+    def _again(self, first: int, last: int, frictions: FloatArray, load: FloatArray) -> FloatArray:
+        """Return OP, shape (R, n, m), from the recorded state after ``past`` samples on.
+
+        Args:
+            first, last: rows.
+            frictions: shape (R, m, 2).
+            load: shape (R or 1, last − first, p).
+        """
+        number, past = len(frictions), self.past
+        rows = slice(first, first + past)
+        runs = Runs(
+            np.ascontiguousarray(frictions),
+            np.repeat(np.array([law.coefficients for _, law in self.pairs])[None], number, axis=0),
+            np.repeat(self.simulated[rows].T[None], number, axis=0),
+            np.repeat(self.loop.stem[rows].T[None], number, axis=0),
+            np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
+        )
+        sp = np.repeat(self._set_points(slice(first, last))[None], number, axis=0)
+        return run_loops(self.process, self.controllers, runs, sp, np.ascontiguousarray(load))[0]
+
+    def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
+        """Return OP of one valve, shape (R, n), without a load and with resting set-points."""
+        period, past = self.periods[valve], self.past
+        count = int(np.clip(CYCLES * period, FEWEST, MOST))
+        laws = [law.coefficients for _, law in self.pairs]
+        tunings = tried_tunings(self.pairs[valve][1])
+        starts = self._starts(valve)
+        number = len(frictions) * len(tunings) * len(starts)
+        friction = np.repeat(self.frictions[None, :, 0], number, axis=0)
+        tuning = np.repeat(np.array(laws)[None], number, axis=0)
+        begins, sp = [], np.empty((number, past + count, self._p))
+        row = 0
+        for pair in frictions:
+            for law in tunings:
+                for start in starts:
+                    friction[row, valve], tuning[row, valve] = pair, law
+                    begins.append(start)
+                    sp[row] = start.sp
+                    row += 1
+        runs = Runs(
+            friction,
+            tuning,
+            np.array([start.pv for start in begins]),
+            np.array([start.stem for start in begins]),
+            np.array([start.op for start in begins]),
+        )
+        op, _ = run_loops(self.process, self.controllers, runs, sp, np.zeros_like(sp))
+        return np.ascontiguousarray(op[:, :, valve])
+
+    def _starts(self, valve: int) -> list[_Start]:
+        first, last = self.loop.longest
+        past, half = self.past, round(self.periods[valve] / 2)
+        starts = []
+        for share in STARTS:
+            row = min(first + max(past, round(share * (last - first))), last - 1)
+            rows = slice(row - past, row)
+            near = slice(max(first, row - half), min(last, row + half + 1))
+            pv = self.simulated[rows] + self.load[near].mean(axis=0)
+            sp = self._set_points(slice(row, row + 1))[0]
+            starts.append(_Start(pv.T, self.loop.stem[rows].T, self.loop.op[row - 1], sp))
+        output = self.pairs[valve][0]
+        rest = self._set_points(slice(first, last)).mean(axis=0)
+        for kick in KICKS:
+            pv = np.repeat(rest[:, None], past, axis=1)
+            pv[output] += kick
+            stem = np.zeros((self.loop.op.shape[1], past))
+            starts.append(_Start(pv, stem, stem[:, 0].copy(), rest))
+        return starts
+
+
+@dataclasses.dataclass(frozen=True)
+class _Start:
+    """PV, shape (p, H), stems, shape (m, H), and OP, shape (m,), before a run; SP during it."""
+
+    pv: FloatArray
+    stem: FloatArray
+    op: FloatArray
+    sp: FloatArray
+
+
+def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Return noise of the spectrum of ``values``, shape (N,), its phases drawn anew.
+
+    References:
+        J. Theiler, S. Eubank, A. Longtin, B. Galdrikian, J. D. Farmer: Testing for nonlinearity
+        in time series: the method of surrogate data. Physica D 58, 1992, 77-94.
+    """
+    spectrum = np.fft.rfft(values)
+    turns = np.exp(2j * np.pi * random.random(len(spectrum)))
+    turns[0] = 1.0
+    return np.asarray(np.fft.irfft(spectrum * turns, len(values)))
+
+
+def without_lines(values: FloatArray, period: float) -> FloatArray:
+    """Return ``values``, shape (N,), without sine and cosine at the period and its harmonics."""
+    angle = 2 * np.pi / period * np.arange(len(values))
+    columns = [np.ones(len(values))]
+    for k in range(1, LINES + 1):
+        columns += [np.cos(k * angle), np.sin(k * angle)]
+    basis = np.column_stack(columns)
+    mean = float(values.mean())
+    return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0] + mean)
+
+
+def tried_frictions(valve: ValveEstimate) -> FloatArray:
+    """Return (f_S, f_D) of the estimate and at both ends of its intervals, shape (3, 2), %."""
+    f_s, f_d = valve.static_friction, valve.dynamic_friction
+    low_s, high_s = valve.static_interval
+    low_d, high_d = valve.dynamic_interval
+    if low_s <= 0.0:
+        low_s, low_d = DOUBTED * f_s, DOUBTED * f_d
+    return np.array(
+        [(f_s, f_d), (low_s, min(low_d, low_s)), (max(high_s, f_s), min(high_d, high_s))]
+    )
+
+
+def tried_tunings(law: RecoveredController) -> FloatArray:
+    """Return the coefficients and those one standard error away along each axis, shape (T, 3)."""
+    values, vectors = np.linalg.eigh(law.covariance)
+    found = [law.coefficients]
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value <= KNOWN * float(law.coefficients @ law.coefficients):
+            continue
+        for sign in (-1.0, 1.0):
+            one = law.coefficients + sign * np.sqrt(value) * vector
+            for k in range(2):  # gain and reset keep their sign
+                if one[k] * law.coefficients[k] <= 0.0:
+                    one[k] = 0.2 * law.coefficients[k]
+            found.append(one)
+    return np.array(found)
+
+
+def span_of(loop: ScaledLoop, valve: int, period: float) -> float:
+    """Return the width of OP's movement about its slow mean, 98 of 100 samples."""
+    parts = [moving(loop.op[a:b, valve], period) for a, b in loop.stretches]
+    low, high = np.percentile(np.concatenate(parts), [1.0, 99.0])
+    return float(high - low)
+
+
+def period_of(swing: Oscillation | None, loop: ScaledLoop, unseen_cycles: int) -> float:
+    """Return the period of a signal, or that of ``unseen_cycles`` in the longest stretch."""
+    first, last = loop.longest
+    return (last - first) / unseen_cycles if swing is None else swing.period

@@ -1,0 +1,132 @@
+"""A record and its identified process in units of their own movement.
+
+OP and PV about their means over their standard deviations: what is computed in these units does
+not depend on those of the record.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.loop_run import Process
+from stiction_ros.identification.results import OutputModel
+from stiction_ros.records.record import Record
+
+DIGITS = 9
+"""Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bit of
+a unit would make another run of it."""
+
+LONGEST = 20_000
+"""Samples of a record that are looked at: thousands of cycles say no more than hundreds."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ScaledLoop:
+    """Signals of one record, scaled.
+
+    Attributes:
+        op, stem: shape (N, m), by the same means and scales.
+        pv: shape (N, p).
+        sp: shape (N, p), as PV, or None.
+        stretches: first sample of each stretch in automatic and the one behind its last.
+        op_mean, op_scale: shape (m,), %.
+        pv_mean, pv_scale: shape (p,), engineering units.
+    """
+
+    op: FloatArray
+    stem: FloatArray
+    pv: FloatArray
+    sp: FloatArray | None
+    stretches: list[tuple[int, int]]
+    op_mean: FloatArray
+    op_scale: FloatArray
+    pv_mean: FloatArray
+    pv_scale: FloatArray
+
+    @property
+    def longest(self) -> tuple[int, int]:
+        """The longest stretch."""
+        return max(self.stretches, key=lambda stretch: stretch[1] - stretch[0])
+
+
+def scaled(record: Record, stem: FloatArray) -> ScaledLoop | None:
+    """Return the usable samples, the last ``LONGEST`` of a longer record.
+
+    Args:
+        stem: estimated stems, shape (N, m), %.
+
+    Returns:
+        None when nothing is usable, or a signal does not move at all.
+    """
+    first = max(len(record) - LONGEST, 0)
+    part = record.part(first, len(record))
+    stretches = part.usable_rows()
+    if not stretches:
+        return None
+    rows = np.concatenate([np.arange(a, b) for a, b in stretches])
+    op_mean, op_scale = part.op[rows].mean(axis=0), part.op[rows].std(axis=0)
+    pv_mean, pv_scale = part.pv[rows].mean(axis=0), part.pv[rows].std(axis=0)
+    if min(op_scale.min(), pv_scale.min()) <= 0.0:
+        return None
+    return ScaledLoop(
+        np.round((part.op - op_mean) / op_scale, DIGITS),
+        np.round((stem[first:] - op_mean) / op_scale, DIGITS),
+        np.round((part.pv - pv_mean) / pv_scale, DIGITS),
+        None if part.sp is None else np.round((part.sp - pv_mean) / pv_scale, DIGITS),
+        stretches,
+        op_mean,
+        op_scale,
+        pv_mean,
+        pv_scale,
+    )
+
+
+def scaled_process(
+    outputs: tuple[OutputModel, ...], valves: tuple[str, ...], loop: ScaledLoop
+) -> Process:
+    """Return equation (9) of all outputs in the units of ``loop``."""
+    p, m = len(outputs), len(valves)
+    na = max(len(output.a) for output in outputs)
+    nb = max(len(output.b[valve]) for output in outputs for valve in valves)
+    a, b = np.zeros((p, na)), np.zeros((p, m, nb))
+    delay, bias = np.zeros((p, m), dtype=np.int64), np.zeros(p)
+    for i, output in enumerate(outputs):
+        a[i, : len(output.a)] = output.a
+        bias[i] = output.bias - (1.0 + a[i].sum()) * loop.pv_mean[i]
+        for j, valve in enumerate(valves):
+            b[i, j, : len(output.b[valve])] = output.b[valve]
+            delay[i, j] = output.delay[valve]
+            bias[i] += b[i, j].sum() * loop.op_mean[j]
+        b[i] *= loop.op_scale[:, None] / loop.pv_scale[i]
+        bias[i] /= loop.pv_scale[i]
+    return Process(a, np.round(b, DIGITS + 3), delay, np.round(bias, DIGITS))
+
+
+def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray:
+    """Return PV of the process driven by ``stem`` alone, shape (N, p); NaN outside stretches."""
+    from scipy.signal import lfilter, lfiltic
+
+    found = np.full(loop.pv.shape, np.nan)
+    for first, last in loop.stretches:
+        for i in range(loop.pv.shape[1]):
+            drive = np.full(last - first, process.bias[i])
+            for j in range(loop.op.shape[1]):
+                shift = int(process.delay[i, j]) + 1
+                moves = np.concatenate(
+                    [np.full(shift, stem[first, j]), stem[first : max(last - shift, first), j]]
+                )[: last - first]
+                drive += lfilter(
+                    process.b[i, j], [1.0], moves, zi=_held(process.b[i, j], moves[0])
+                )[0]
+            poles = np.concatenate([[1.0], process.a[i]])
+            rest = lfiltic([1.0], poles, np.full(len(poles) - 1, loop.pv[first, i]))
+            found[first:last, i] = lfilter([1.0], poles, drive, zi=rest)[0]
+    return found
+
+
+def _held(taps: FloatArray, value: float) -> FloatArray:
+    """Return the state of a filter of ``taps`` that has seen ``value`` for ever."""
+    return np.asarray(np.cumsum(taps[::-1])[::-1][1:] * value)

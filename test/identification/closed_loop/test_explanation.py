@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from known_loops import Kind, Known, changed, known
+
+from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
+from stiction_ros.identification.closed_loop.explanation import explained
+from stiction_ros.identification.results import Identification
+
+
+def wave(shape: str, period: float, samples: int = 900) -> np.ndarray:
+    turn = np.sin(2 * np.pi * np.arange(samples) / period + 0.4)
+    return {"sine": turn, "square": np.sign(turn), "triangle": np.arcsin(turn)}[shape]
+
+
+def told(one: Known) -> Identification:
+    return explained(one.record, one.found)
+
+
+def cause(one: Known) -> Cause:
+    found = told(one).outputs[0].cause
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("friction", [(3.0, 1.0), (6.0, 2.0)])
+@pytest.mark.parametrize("noise", [0.01, 0.1])
+def test_a_sticky_valve_is_the_cause(friction: tuple[float, float], noise: float) -> None:
+    found = cause(known(Kind(friction=friction, noise=noise)))
+    assert found.kind is CauseKind.VALVE
+    assert found.regularity > 1.0
+    assert found.period == pytest.approx(5.0 * 70.0, rel=0.15)
+    assert "V1" in found.sentence
+
+
+@pytest.mark.parametrize("shape", ["sine", "square", "triangle"])
+@pytest.mark.parametrize("friction", [(0.0, 0.0), (0.5, 0.4)])
+def test_a_load_that_swings_is_the_cause(shape: str, friction: tuple[float, float]) -> None:
+    moved = known(Kind(noise=0.05), load=0.4 * wave(shape, 57.0))
+    blamed = known(Kind(friction=friction)).found
+    found = cause(Known(moved.record, dataclasses.replace(blamed, stem=moved.record.op)))
+    assert found.kind is CauseKind.DISTURBANCE
+    assert found.period == pytest.approx(5.0 * 57.0, rel=0.03)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_set_point_that_swings_is_the_cause(kept: bool) -> None:
+    one = known(Kind(noise=0.05), sp=20.0 + wave("square", 80.0))
+    record = one.record if kept else dataclasses.replace(one.record, sp=None)
+    found = cause(Known(record, one.found))
+    assert found.kind is CauseKind.SET_POINT
+    assert found.period == pytest.approx(5.0 * 80.0, rel=0.03)
+
+
+def test_a_controller_that_rings_is_the_cause() -> None:
+    found = cause(known(Kind(noise=0.1, gain=2.8, integral_time=12.0), samples=2000))
+    assert found.kind is CauseKind.TUNING
+    assert found.regularity > 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_is_no_oscillation(seed: int) -> None:
+    found = cause(known(Kind(noise=0.1, gain=0.5), seed, samples=1500))
+    assert found.kind is CauseKind.NONE
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    op=st.floats(0.05, 20.0),
+    pv=st.floats(0.05, 20.0),
+    mirrored=st.booleans(),
+    shift=st.floats(-50.0, 50.0),
+    time=st.floats(0.01, 100.0),
+)
+def test_units_change_only_units(
+    op: float, pv: float, mirrored: bool, shift: float, time: float
+) -> None:
+    one = known(Kind(friction=(3.0, 1.0), noise=0.1), seed=2)
+    before, after = cause(one), cause(changed(one, (-op if mirrored else op, shift), (pv, 3), time))
+    assert after.kind is before.kind
+    assert before.period is not None
+    assert after.period == pytest.approx(before.period * time)
+    assert after.amplitude == pytest.approx(before.amplitude * pv, rel=1e-6)
+    assert after.regularity == pytest.approx(before.regularity, rel=1e-3)
+
+
+def test_the_keys_of_the_contract() -> None:
+    document = told(known(Kind(friction=(3.0, 1.0)))).to_json()
+    found = document["outputs"][0]["cause"]
+    assert list(found) == ["kind", "period", "regularity", "amplitude"]
+    assert found["kind"] == "valve"
+    assert 0.5 < document["valves"][0]["band_share"] < 1.5
+    assert document["valves"][0]["evidence"]["loop_gone"] > 0.9
+    assert document["valves"][0]["evidence"]["outside_line"] < 0.0

@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from known_loops import DELAY, A, B, Kind, known
+
+from stiction_ros.identification.closed_loop.damping import LinearController, ringing
+from stiction_ros.identification.closed_loop.loop_run import (
+    Controllers,
+    Process,
+    Runs,
+    run_loops,
+)
+
+PAST = 8
+PROCESS = Process(
+    np.array([A]), np.array([[B]]), np.array([[DELAY]]), np.array([20.0 * (1.0 + sum(A))])
+)
+
+
+def controllers(lag: int = 0) -> Controllers:
+    return Controllers(
+        np.array([0]), np.array([lag]), np.zeros(1), np.array([-np.inf]), np.array([np.inf])
+    )
+
+
+def runs(friction: tuple[float, float], gain: float, reset: float) -> Runs:
+    return Runs(
+        np.array([[friction]]),
+        np.array([[[gain, reset, 0.0]]]),
+        np.full((1, 1, PAST), 20.0),
+        np.full((1, 1, PAST), -0.9 * friction[0]),
+        np.zeros((1, 1)),
+    )
+
+
+@pytest.mark.parametrize("friction", [(0.0, 0.0), (3.0, 1.0), (2.0, 2.0)])
+@pytest.mark.parametrize("lag", [0, 1, 2])
+def test_the_kernel_does_what_a_plain_loop_does(friction: tuple[float, float], lag: int) -> None:
+    load = np.random.default_rng(1).standard_normal(300)
+    plain = known(Kind(friction, noise=0.0, lag=lag), samples=300, load=load).record
+    sp = np.full((1, PAST + 300, 1), 20.0)
+    outside = np.concatenate([np.zeros(PAST), load])[None, :, None]
+    op, pv = run_loops(PROCESS, controllers(lag), runs(friction, 1.0, 1.0 / 8.0), sp, outside)
+    assert op[0, :, 0] + 50.0 == pytest.approx(plain.op[:, 0], abs=1e-9)
+    assert pv[0, :, 0] == pytest.approx(plain.pv[:, 0], abs=1e-9)
+
+
+def test_a_run_that_grows_without_end_is_infinite() -> None:
+    sp = np.full((1, PAST + 4000, 1), 20.0)
+    sp[:, PAST + 5 :] = 21.0
+    op, pv = run_loops(PROCESS, controllers(), runs((0.0, 0.0), 9.0, 3.0), sp, np.zeros_like(sp))
+    assert np.isinf(op[0, -1, 0])
+    assert np.isinf(pv[0, -1, 0])
+
+
+def test_op_stays_within_its_limits() -> None:
+    limited = controllers()._replace(low=np.array([-2.0]), high=np.array([1.0]))
+    sp = np.full((1, PAST + 300, 1), 20.0)
+    sp[:, PAST + 5 :] = 23.0
+    op, _ = run_loops(PROCESS, limited, runs((1.0, 0.5), 1.0, 0.1), sp, np.zeros_like(sp))
+    assert op.max() == 1.0
+    assert op.min() >= -2.0
+
+
+def test_a_valve_without_a_controller_keeps_its_op() -> None:
+    alone = controllers()._replace(output=np.array([-1]))
+    sp = np.full((1, PAST + 50, 1), 25.0)
+    op, pv = run_loops(PROCESS, alone, runs((0.0, 0.0), 1.0, 0.1), sp, np.zeros_like(sp))
+    assert not op.any()
+    assert pv == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("gain", [2.0, 2.6])
+@pytest.mark.parametrize("lag", [0, 1])
+def test_poles_ring_as_the_simulated_loop_does(gain: float, lag: int) -> None:
+    controller = LinearController(np.array([gain, gain / 10.0, 0.0]), lag, 0.0)
+    found = ringing(PROCESS, 0, 0, controller)[0]
+    sp = np.full((1, PAST + 600, 1), 20.0)
+    sp[:, PAST + 5 :] = 21.0
+    _, pv = run_loops(
+        PROCESS, controllers(lag), runs((0.0, 0.0), gain, gain / 10.0), sp, np.zeros_like(sp)
+    )
+    apart = pv[0, 40:, 0] - 21.0
+    peaks = np.flatnonzero((apart[1:-1] > apart[:-2]) & (apart[1:-1] > apart[2:]))[:5] + 1
+    assert np.mean(np.diff(peaks)) == pytest.approx(found.period, rel=0.08)
+    growth = (apart[peaks[-1]] / apart[peaks[0]]) ** (1.0 / (len(peaks) - 1))
+    assert growth == pytest.approx(found.growth, abs=0.05)

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiction_ros.identification.closed_loop.oscillation import (
+    LEAST_LINE,
+    REGULAR,
+    oscillation,
+    regularity,
+    slow_mean,
+)
+
+
+def wave(size: float, period: float, samples: int) -> np.ndarray:
+    return size * np.sin(2 * np.pi * np.arange(samples) / period + 0.3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    period=st.floats(10.0, 80.0),
+    size=st.floats(0.01, 50.0),
+    drift=st.floats(-3.0, 3.0),
+    seed=st.integers(0, 100),
+)
+def test_a_sine_in_noise_on_a_drift_is_seen(
+    period: float, size: float, drift: float, seed: int
+) -> None:
+    noise = 0.4 * np.random.default_rng(seed).standard_normal(900)
+    values = size * (wave(1.0, period, 900) + noise + drift * np.linspace(0.0, 1.0, 900))
+    found = oscillation(values, [(0, 900)])
+    assert found is not None
+    assert found.period == pytest.approx(period, rel=0.03)
+    assert found.amplitude == pytest.approx(size, rel=0.15)
+    assert found.regularity > 1.5
+    assert found.share > LEAST_LINE
+
+
+def test_noise_is_irregular() -> None:
+    found = [
+        oscillation(np.random.default_rng(seed).standard_normal(800), [(0, 800)])
+        for seed in range(20)
+    ]
+    assert all(one is not None and one.share < LEAST_LINE for one in found)
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.7])
+def test_noise_has_an_irregular_autocorrelation(kept: float) -> None:
+    irregular = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        values = np.zeros(1500)
+        for k in range(1, 1500):
+            values[k] = kept * values[k - 1] + rng.standard_normal()
+        irregular += regularity(values)[0] < REGULAR
+    assert irregular >= 18
+
+
+def test_a_clean_sine_is_as_regular_as_can_be_told() -> None:
+    regular, period = regularity(wave(1.0, 31.0, 900))
+    assert regular > 20.0
+    assert period == pytest.approx(31.0, rel=0.02)
+
+
+def test_too_few_cycles_are_none() -> None:
+    assert oscillation(wave(1.0, 8.0, 20), [(0, 20)]) is None
+    assert oscillation(np.full(900, 3.0), [(0, 900)]) is None
+    assert regularity(wave(1.0, 600.0, 900)) == (0.0, 0.0)
+
+
+@given(st.integers(1, 400), st.floats(-5.0, 5.0))
+def test_the_slow_mean_of_a_constant_is_the_constant(count: int, value: float) -> None:
+    assert slow_mean(np.full(count, value), 40.0) == pytest.approx(np.full(count, value))
