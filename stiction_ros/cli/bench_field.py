@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -17,7 +18,8 @@ from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import run_seeds
 from stiction_ros.errors import InputError
 from stiction_ros.field import MANY, ValveKind, field_loop
-from stiction_ros.identification import identify
+from stiction_ros.identification import IdentificationOptions, identify
+from stiction_ros.identification.options import METHOD_NAMES
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 
@@ -87,9 +89,9 @@ def _interval(values: Sequence[float]) -> Interval:
     return float(low), float(high)
 
 
-def identified(record: Record) -> Mapping[str, Any]:
-    """Return the mapping of ``identify --json`` with default options."""
-    return identify(record).to_json()
+def identified(method: str, record: Record) -> Mapping[str, Any]:
+    """Return the mapping of ``identify --json`` by a method, else with default options."""
+    return identify(record, IdentificationOptions(method=method)).to_json()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,8 +162,8 @@ class Judged:
         }
 
 
-def judge(seed: int) -> Judged:
-    """Identify one loop of the field with default options."""
+def judge(method: str, seed: int) -> Judged:
+    """Identify one loop of the field by a method, else with default options."""
     loop = field_loop(seed)
     truth = loop.truth
     return Judged(
@@ -177,7 +179,7 @@ def judge(seed: int) -> Judged:
         f_d=truth.f_d,
         causes=tuple(sorted(cause.value for cause in truth.causes)),
         slips=loop.judged_slips,
-        answer=answer_of(loop.record, identified),
+        answer=answer_of(loop.record, functools.partial(identified, method)),
     )
 
 
@@ -278,19 +280,20 @@ def table_row(name: str, rows: Sequence[Judged]) -> dict[str, Any]:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the option that this benchmark shares with ``stability``."""
+    """Add the options that this benchmark shares with ``stability``."""
     from stiction_ros.cli.seeds import seed_range
 
     group = parser.add_argument_group("field and stability; --jobs also for both")
     group.add_argument(
         "--seeds", type=seed_range, metavar="A:B", help=f"of the field's loops ({FIRST}:{LAST})"
     )
+    group.add_argument("--method", default="exact", choices=METHOD_NAMES, help="search (exact)")
 
 
 def run(options: argparse.Namespace, machine: str) -> int:
     """Run the benchmark."""
     seeds = options.seeds or (FIRST, LAST)
-    rows = run_seeds(judge, seeds, options.jobs or 1, "field")
+    rows = run_seeds(functools.partial(judge, options.method), seeds, options.jobs or 1, "field")
     if options.json is not None:
         write_json(options.json, document(rows, machine))
     if options.json != "-":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import dataclasses
+import functools
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -182,15 +183,15 @@ class Held:
         return (verdict in FOUND) != self.source.label
 
 
-def hold(source: Source) -> Held:
-    """Identify every variant of one record."""
+def hold(method: str, source: Source) -> Held:
+    """Identify every variant of one record by a method."""
     record = source.read()
-    return Held(source, {v.name: varied(record, v) for v in VARIANTS})
+    return Held(source, {v.name: varied(method, record, v) for v in VARIANTS})
 
 
-def varied(record: Record, variant: Variant) -> Answer:
+def varied(method: str, record: Record, variant: Variant) -> Answer:
     """Return what is said of one variant, frictions in the unit of the record as it is."""
-    options = IdentificationOptions()
+    options = IdentificationOptions(method=method)
     if variant.delay is not None:
         options = dataclasses.replace(options, delay=variant.delay)
     said = answer_of(variant.applied(record), lambda changed: identify(changed, options).to_json())
@@ -270,7 +271,8 @@ def run(options: argparse.Namespace, machine: str) -> int:
     if seeds is None and folder is None:
         seeds = (FIRST, LAST)
     wanted = sources(seeds, folder)
-    rows = run_each(hold, wanted, options.jobs or 1, f"stability: {len(wanted)} records")
+    work = functools.partial(hold, options.method)
+    rows = run_each(work, wanted, options.jobs or 1, f"stability: {len(wanted)} records")
     if options.json is not None:
         write_json(options.json, document(rows, machine))
     if options.json != "-":

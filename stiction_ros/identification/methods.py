@@ -1,6 +1,8 @@
 """Identification by any method.
 
 - ``exact``: the default search, :mod:`.engine`.
+- ``evidence``: friction by the marginal likelihood under any smooth process,
+  :mod:`.evidence.engine`; it needs neither orders nor delays for that.
 - ``nlp``: the paper's nonlinear programme (12), :mod:`.nlp`.
 - ``grid``: the grid search that the paper compares with, :mod:`.grid_search`.
 """
@@ -36,6 +38,7 @@ def _in_module(name: str) -> Method:
 
 METHODS: Mapping[str, Method] = {
     "exact": _in_module("engine"),
+    "evidence": _in_module("evidence.engine"),
     "nlp": _in_module("nlp"),
     "grid": _in_module("grid_search"),
 }

@@ -7,7 +7,7 @@ import math
 
 from stiction_ros.errors import InputError
 
-METHOD_NAMES = ("exact", "nlp", "grid")
+METHOD_NAMES = ("exact", "evidence", "nlp", "grid")
 GRID_LAWS = ("he_smoothed", "he")
 
 
@@ -16,9 +16,10 @@ class IdentificationOptions:
     """Options of :func:`stiction_ros.identification.identify`.
 
     Attributes:
-        method: ``exact``, or one of the paper's: ``nlp``, ``grid``; see :mod:`.methods`.
+        method: ``exact``, ``evidence``, or one of the paper's ``nlp`` and ``grid``; see
+            :mod:`.methods`.
         output_order: n_a; None lets BIC choose among 1, 2 and 3 under the noise model (method
-            ``exact``; the others take 3).
+            ``exact`` or ``evidence``; the others take 3).
         input_order: n_b; None means equal to n_a.
         delay: inclusive range of t_d, samples, for every channel.
         law: friction law.

@@ -54,7 +54,8 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
     gain = found.ideal.loss - best.loss
     slack = float(chi2.ppf(confidence, FREEDOM)) + MISFIT * max(gain, 0.0)
     rows, losses = _looked_at(problem, found, valve)
-    inside = losses <= best.loss + slack
+    losses = losses - losses.min()
+    inside = losses <= slack
     static, dynamic = rows[inside].T
     band = static + dynamic
     flat = rows[:, 1] >= rows[:, 0] * (1.0 - 1e-9)
@@ -63,8 +64,8 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         dynamic=(float(dynamic.min()), float(dynamic.max())),
         band=(float(band.min()), float(band.max())),
         none=gain <= slack,
-        deadband_loss=float(losses[flat].min(initial=np.inf) - best.loss),
-        profile=_profile(rows[:, 0], losses - best.loss),
+        deadband_loss=float(losses[flat].min(initial=np.inf)),
+        profile=_profile(rows[:, 0], losses),
     )
 
 
@@ -81,7 +82,7 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
         grids += [finer_grid(centre[None, :], step * size / 3.0, limit) for step in STEPS]
     grid = np.vstack(grids)
     grid = np.vstack([grid, np.column_stack([grid[:, 0], grid[:, 0]])])  # deadbands
-    stems = problem.stems(valve, grid, 0.0)
+    stems = problem.stems(valve, grid, float(best.starts[valve]))
     total = np.zeros(len(grid))
     for i, fit in enumerate(best.fits):
         others = np.delete(best.stems, valve, axis=0)

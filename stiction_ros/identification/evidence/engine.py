@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stiction_ros.identification.closed_loop.explanation import RIVAL, explained
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
@@ -22,10 +23,17 @@ from stiction_ros.identification.preparation import (
     tried_orders,
     window,
 )
-from stiction_ros.identification.results import Identification, ValveEstimate, VerdictKind
+from stiction_ros.identification.results import (
+    Identification,
+    OrderRow,
+    ValveEstimate,
+    VerdictKind,
+)
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
+
+LEAST_GONE = 0.1  # share of OP's movement that must go away with a friction
 
 
 def identify(
@@ -53,10 +61,32 @@ def identify(
     found = search(problem)
     report(0.7)
     valves = tuple(_judged(record, problem, found, j, options) for j in range(len(record.valves)))
-    model, table = _process(data, options, valves, found)
+    model, table = _process(data, options, valves, record)
     report(1.0)
-    findings = Findings(model, valves, table, (), None)
-    return conclude(record, data, findings, time.perf_counter() - begun)
+    concluded = conclude(record, data, Findings(model, valves, table, (), None), 0.0)
+    looped = explained(record, dataclasses.replace(concluded, method="evidence"))
+    judged = tuple(_doubted(valve) for valve in looped.valves)
+    return dataclasses.replace(looped, valves=judged, seconds=time.perf_counter() - begun)
+
+
+def _doubted(valve: ValveEstimate) -> ValveEstimate:
+    """Return the estimate, no longer sticky where its loop says otherwise.
+
+    A wave of one period that explains the record nearly as well comes from outside, and a
+    friction without which OP would move all the same is not what moves it.
+    """
+    if valve.verdict is not VerdictKind.STICKY:
+        return valve
+    wave = valve.evidence.get("line_rivalry", 0.0) > RIVAL
+    idle = 0.0 < valve.evidence.get("loop_gone", 1.0) < LEAST_GONE
+    if not (wave or idle):
+        return valve
+    return dataclasses.replace(
+        valve,
+        verdict=VerdictKind.UNDECIDED,
+        static_interval=(0.0, valve.static_interval[1]),
+        dynamic_interval=(0.0, valve.dynamic_interval[1]),
+    )
 
 
 def _judged(
@@ -71,7 +101,8 @@ def _judged(
     low = (held.static[0], held.dynamic[0]) if believed else (0.0, 0.0)
     if verdict is VerdictKind.HEALTHY:
         static = dynamic = 0.0
-    stem = stem_of_valve(problem, valve, (static, dynamic))
+    start = 0.0 if verdict is VerdictKind.HEALTHY else float(found.best.starts[valve])
+    moves = np.count_nonzero(np.diff(found.best.stems[valve]))
     return ValveEstimate(
         name=record.valves[valve],
         verdict=verdict,
@@ -81,16 +112,11 @@ def _judged(
         dynamic_friction=dynamic,
         dynamic_interval=(low[1], max(held.dynamic[1], dynamic)),
         jump=0.0 if held.deadband_loss < 4.0 else static - dynamic,
-        stem_start=float(record.op[0, valve]),
-        moves=int(np.count_nonzero(np.diff(stem))),
+        stem_start=float(record.op[0, valve]) + start,
+        moves=int(moves if static > 0.0 else np.count_nonzero(np.diff(record.op[:, valve]))),
         evidence=figures,
         profile=held.profile,
     )
-
-
-def stem_of_valve(problem: Problem, valve: int, friction: tuple[float, float]) -> np.ndarray:
-    """Return the scaled stem of a valve, shape (n,)."""
-    return np.asarray(problem.stems(valve, np.array([friction]), 0.0)[0])
 
 
 def evidence_of(problem: Problem, found: Found, valve: int) -> dict[str, float]:
@@ -143,18 +169,19 @@ def _process(
     data: Data,
     options: IdentificationOptions,
     valves: tuple[ValveEstimate, ...],
-    found: Found,
-) -> tuple[Model, tuple]:
+    record: Record,
+) -> tuple[Model, tuple[OrderRow, ...]]:
     """Return orders, delays and linear parts for the stems, and all orders that were tried."""
     friction = np.array([[v.static_friction, v.dynamic_friction] for v in valves])
+    starts = np.array([v.stem_start for v in valves]) - record.op[0]
     stems = data.u.copy()
     for j in np.flatnonzero(friction[:, 0]):
-        stems[j] = stem_of(data, int(j), friction[j], 0.0)
+        stems[j] = stem_of(data, int(j), friction[j], float(starts[j]))
     delays = ((data.delay[0],) * len(valves),) * len(data.y)
-    base = Model(friction, np.zeros(len(valves)), stems, delays, ())
+    base = Model(friction, starts, stems, delays, ())
     tried = [window(options, n, input_order_for(options, n)) for n in tried_orders(options)]
     models = [linear_model(data, orders, base) for orders in tried]
     table = tuple(order_row(*pair) for pair in zip(tried, models, strict=True))
     best = min(range(len(models)), key=lambda i: models[i].bic)
     model, _ = settle_delays(data, models[best], tried[best])
-    return dataclasses.replace(model, friction=friction), table
+    return model, table

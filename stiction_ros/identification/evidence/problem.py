@@ -88,7 +88,7 @@ class Problem:
 
     def ideal_stems(self) -> FloatArray:
         """Return the stems of valves without friction, scaled, shape (m, n)."""
-        return self._slowed(self.op) / self.scale[:, None]
+        return np.asarray(self._slowed(self.op) / self.scale[:, None])
 
     def stems(self, valve: int, friction: FloatArray, starts: FloatArray | float) -> FloatArray:
         """Return stems of one valve, scaled, shape (G, n).
@@ -101,12 +101,12 @@ class Problem:
         op = self.op[valve]
         begin = op[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(friction),))
         stems = simulate(self.law, friction, op, begin)
-        return self._slowed(stems.T) / self.scale[valve]
+        return np.asarray(self._slowed(stems.T) / self.scale[valve])
 
     def _slowed(self, signals: FloatArray) -> FloatArray:
         shape = (len(signals), self.rows, self.rate)
         slow = np.ascontiguousarray(signals).reshape(shape).mean(axis=2)
-        delayed = np.empty_like(slow)
+        delayed: FloatArray = np.empty_like(slow)
         delayed[:, self.skipped :] = slow[:, : slow.shape[1] - self.skipped]
         delayed[:, : self.skipped] = slow[:, :1]
         return delayed

@@ -30,6 +30,9 @@ STEP = 0.03  # of the limit: first step of the polish
 FINEST = 1e-4
 SHRINK = 2.5
 LINES = 100  # steps along J and S over the limit
+BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of a stem, shares of f_S away from OP
+THINNED = 3  # rows of the grid of which one is tried with these
+STARTS = 41  # beginnings of a head
 MOVES = 6  # of the stem, fewest of a candidate
 GAIN = 0.5  # of the loss: a sweep over the valves that gains less is the last
 SWEEPS = 3
@@ -41,11 +44,13 @@ class Candidate:
 
     Attributes:
         friction: rows (f_S, f_D), %, shape (m, 2).
+        starts: stem before the first sample minus the first OP, %, shape (m,).
         stems: scaled, shape (m, n).
         fits: one per output.
     """
 
     friction: FloatArray
+    starts: FloatArray
     stems: FloatArray
     fits: tuple[OutputFit, ...]
 
@@ -77,70 +82,89 @@ class _Valve:
         self.problem, self.base, self.valve = problem, base, valve
         self.limit = float(problem.limit[valve])
         self.met: list[Candidate] = []
-        self._keys: set[tuple[float, float]] = set()
+        self._keys: set[tuple[float, ...]] = set()
 
-    def losses(self, grid: FloatArray, fits: Sequence[OutputFit]) -> FloatArray:
-        """Return the loss of rows (f_S, f_D) under the noise and prior of ``fits``."""
-        stems = self.problem.stems(self.valve, grid, 0.0)
+    def losses(self, rows: FloatArray, fits: Sequence[OutputFit]) -> FloatArray:
+        """Return the loss of rows (f_S, f_D, start) under the noise and prior of ``fits``."""
+        stems = self.problem.stems(self.valve, rows[:, :2], rows[:, 2])
         others = np.delete(self.base.stems, self.valve, axis=0)
-        total = np.zeros(len(grid))
+        total = np.zeros(len(rows))
         for i, fit in enumerate(fits):
             criterion = Criterion.of(self.problem, i, others, fit.noise, fit.prior)
             total += criterion.losses(stems)
         moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
         return np.where(moves < MOVES, np.inf, total)
 
-    def stems(self, friction: FloatArray) -> FloatArray:
-        stems = self.base.stems.copy()
-        stems[self.valve] = self.problem.stems(self.valve, friction[None, :], 0.0)[0]
-        return stems
-
-    def add(self, friction: FloatArray, fits: Sequence[OutputFit], *, whole: bool) -> None:
-        """Fit a friction from neighbouring fits; ``whole`` until nothing changes."""
-        key = (round(float(friction[0]), 9), round(float(friction[1]), 9))
+    def add(self, row: FloatArray, fits: Sequence[OutputFit], *, whole: bool) -> None:
+        """Fit a row (f_S, f_D, start) from neighbouring fits; ``whole`` until nothing changes."""
+        key = tuple(round(float(value), 9) for value in row)
         if key in self._keys and not whole:
             return
         self._keys.add(key)
-        stems = self.stems(friction)
+        stems = self.base.stems.copy()
+        stems[self.valve] = self.problem.stems(self.valve, row[None, :2], row[2])[0]
         if whole:
             found = tuple(fit_output(self.problem, i, stems, (f,)) for i, f in enumerate(fits))
         else:
             found = tuple(follow(self.problem, i, stems, f) for i, f in enumerate(fits))
-        all_friction = self.base.friction.copy()
-        all_friction[self.valve] = friction
-        self.met.append(Candidate(all_friction, stems, found))
+        friction, starts = self.base.friction.copy(), self.base.starts.copy()
+        friction[self.valve], starts[self.valve] = row[:2], row[2]
+        self.met.append(Candidate(friction, starts, stems, found))
+
+    def row_of(self, candidate: Candidate) -> FloatArray:
+        """Return (f_S, f_D, start) of this valve."""
+        return np.append(candidate.friction[self.valve], candidate.starts[self.valve])
 
     def look(self, fits: Sequence[OutputFit]) -> None:
         """Take the best of the whole triangle under the noise of ``fits``."""
         grid = coarse_grid(self.limit)
-        losses = self.losses(grid, fits)
-        for i in apart(grid, losses, SEEDS, APART * self.limit):
-            self.add(grid[i], fits, whole=False)
+        rows = [np.column_stack([grid, np.zeros(len(grid))])]
+        for share in BEGINNINGS:
+            away = grid[::THINNED]
+            rows.append(np.column_stack([away, share * away[:, 0]]))
+        self._take(np.vstack(rows), fits, SEEDS, APART * self.limit)
 
     def heads(self, count: int, distance: float) -> list[Candidate]:
+        """Return the best that was met, frictions apart."""
         met = sorted(self.met, key=lambda one: one.loss)
         places = np.array([one.friction[self.valve] for one in met]).reshape(-1, 2)
-        return [met[i] for i in apart(places, np.arange(len(met)), count, distance)]
+        ranks = np.arange(len(met), dtype=float)
+        return [met[i] for i in apart(places, ranks, count, distance)]
 
     def settle(self) -> None:
         """Fit the heads until nothing changes, once more from the noise of the best."""
         for head in self.heads(HEADS, APART * self.limit):
-            self.add(head.friction[self.valve], head.fits, whole=True)
+            self.add(self.row_of(head), head.fits, whole=True)
 
     def polish(self) -> None:
         """Look closer and closer round the heads, and along the lines through them."""
         step = STEP * self.limit
         for head in self.heads(HEADS, step):
-            self._take(self._lines(head), head, 2, step)
+            self._near(self._lines(head), head, 2, step)
+            self._begin(head)
         while step > FINEST * self.limit:
             for head in self.heads(HEADS if step > 0.1 * STEP * self.limit else 1, step):
                 centre = head.friction[self.valve][None, :]
-                self._take(finer_grid(centre, step / 3.0, self.limit), head, 2, step / 3.0)
+                self._near(finer_grid(centre, step / 3.0, self.limit), head, 2, step / 3.0)
             step /= SHRINK
+        self._begin(self.heads(1, 0.0)[0])
 
-    def _take(self, grid: FloatArray, head: Candidate, count: int, distance: float) -> None:
-        for i in apart(grid, self.losses(grid, head.fits), count, distance):
-            self.add(grid[i], head.fits, whole=False)
+    def _near(self, grid: FloatArray, head: Candidate, count: int, distance: float) -> None:
+        start = np.full(len(grid), head.starts[self.valve])
+        self._take(np.column_stack([grid, start]), head.fits, count, distance)
+
+    def _begin(self, head: Candidate) -> None:
+        """Try where the stem may have been before the first sample: wherever it had stayed."""
+        static = head.friction[self.valve][0]
+        starts = static * np.linspace(-1.0, 1.0, STARTS)
+        rows = np.column_stack([np.tile(head.friction[self.valve], (STARTS, 1)), starts])
+        self._take(rows, head.fits, 1, 0.0)
+
+    def _take(
+        self, rows: FloatArray, fits: Sequence[OutputFit], count: int, distance: float
+    ) -> None:
+        for i in apart(rows[:, :2], self.losses(rows, fits), count, distance):
+            self.add(rows[i], fits, whole=False)
 
     def _lines(self, head: Candidate) -> FloatArray:
         static, dynamic = head.friction[self.valve]
@@ -167,7 +191,7 @@ def ideal(problem: Problem, starts: Iterable[Sequence[OutputFit]] = ()) -> Candi
         for row, fit in zip(begun, fits, strict=True):
             row.append(fit)
     fits = tuple(fit_output(problem, i, stems, row) for i, row in enumerate(begun))
-    return Candidate(np.zeros((len(stems), 2)), stems, fits)
+    return Candidate(np.zeros((len(stems), 2)), np.zeros(len(stems)), stems, fits)
 
 
 def search_valve(problem: Problem, base: Candidate, valve: int) -> list[Candidate]:

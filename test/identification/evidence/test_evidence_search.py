@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from evidence_loops import he, pi_loop
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiction_ros.identification.evidence.accepted import accepted
+from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.search import Found, apart, search
+
+STATIC, DYNAMIC = 3.0, 1.0
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return Problem.of(pi_loop(STATIC, DYNAMIC))
+
+
+@pytest.fixture(scope="module")
+def found(problem: Problem) -> Found:
+    return search(problem)
+
+
+def test_stems_are_those_of_the_law(problem: Problem) -> None:
+    stem = problem.stems(0, np.array([[STATIC, DYNAMIC]]), 0.0)[0] * problem.scale[0]
+    assert stem == pytest.approx(he(problem.op[0], STATIC, DYNAMIC), abs=1e-9)
+
+
+def test_rows_are_means_of_the_samples() -> None:
+    record = pi_loop(STATIC, DYNAMIC)
+    slow = Problem.of(record, rate=4)
+    assert slow.rows == len(record) // 4
+    stem = slow.stems(0, np.array([[STATIC, DYNAMIC]]), 0.0)[0] * slow.scale[0]
+    fast = he(slow.op[0], STATIC, DYNAMIC)
+    assert stem == pytest.approx(fast.reshape(-1, 4).mean(axis=1), abs=1e-9)
+
+
+def test_the_friction_is_found_and_beats_none_by_far(found: Found) -> None:
+    assert found.best.friction[0] == pytest.approx([STATIC, DYNAMIC], abs=0.1)
+    assert found.ideal.loss - found.best.loss > 100.0
+
+
+def test_nothing_that_was_met_is_better_than_the_best(found: Found) -> None:
+    losses = [one.loss for one in found.met]
+    assert losses == sorted(losses)
+    assert found.best.loss == losses[0]
+
+
+def test_an_ideal_valve_gives_no_evidence_of_friction() -> None:
+    found = search(Problem.of(pi_loop(0.0, 0.0, seed=1)))
+    assert found.ideal.loss - found.best.loss < 15.0
+
+
+@settings(deadline=None, max_examples=4)
+@given(
+    st.sampled_from([0.05, 20.0, -3.0]),
+    st.sampled_from([0.0, 50.0]),
+    st.sampled_from([1e-3, -40.0]),
+)
+def test_units_change_no_answer(op_unit: float, op_zero: float, pv_unit: float) -> None:
+    record = pi_loop(STATIC, DYNAMIC, samples=400)
+    other = dataclasses.replace(
+        record, op=op_unit * record.op + op_zero, pv=pv_unit * record.pv - 7.0, sp=None
+    )
+    one, two = search(Problem.of(record)), search(Problem.of(other))
+    assert two.best.friction / abs(op_unit) == pytest.approx(one.best.friction, rel=1e-3)
+    gains = [each.ideal.loss - each.best.loss for each in (one, two)]
+    assert gains[1] == pytest.approx(gains[0], abs=0.5)
+
+
+def test_what_is_accepted_holds_the_truth_and_grows_with_the_level(
+    problem: Problem, found: Found
+) -> None:
+    wide, narrow = (accepted(problem, found, 0, level) for level in (0.999, 0.9))
+    for held in (wide, narrow):
+        assert held.static[0] <= STATIC <= held.static[1]
+        assert held.dynamic[0] <= DYNAMIC <= held.dynamic[1]
+        assert not held.none
+    assert wide.band[0] <= narrow.band[0] <= narrow.band[1] <= wide.band[1]
+    assert min(loss for _, loss in narrow.profile) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_places_apart_are_the_best_first_and_none_that_is_impossible() -> None:
+    places = np.array([[1.0, 0.0], [1.1, 0.0], [3.0, 0.0], [5.0, 0.0]])
+    assert apart(places, np.array([2.0, 1.0, 3.0, np.inf]), 3, 0.5) == [1, 2]
