@@ -277,7 +277,9 @@ class LiveController:
             return
         self._first = False
         if np.any(np.abs(result.plan.op - self._in_force) > FIRST_MOVE):
-            self._approach = Approach(pv, sp, self.settings.approach_samples)
+            seen = self._controller.observer
+            begin = np.where(seen.held_back, seen.output, pv)  # an outlier is no place to begin
+            self._approach = Approach(begin, sp, self.settings.approach_samples)
 
     def _upset(self, dv: FloatArray | None) -> FloatArray:
         return np.zeros(self._design.model.e.shape[1]) if dv is None else dv

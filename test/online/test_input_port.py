@@ -159,9 +159,9 @@ LOCKSTEP_TABLE: dict[str, tuple[str, list[tuple[Any, ...]], str, dict[str, int]]
     ),
     "too fast": (
         "external",
-        [("sp", 0), ("pv", 1), ("pv", 2, 70.0), ("pv", 3, 70.0)],
-        "^1+ 2+? 3+",
-        {"out of range": 1},
+        [("sp", 0), ("pv", 1), ("pv", 2, 70.0), ("pv", 3, 70.0), ("pv", 4, 70.0)],
+        "^1+ 2+? 3+? 4+",
+        {"out of range": 2},
     ),
     "sp out of range": (
         "scheduled",

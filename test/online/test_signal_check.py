@@ -13,11 +13,21 @@ TABLE: dict[str, tuple[Instrument, list[float], list[float]]] = {
     "no limits": (Instrument(), [1.0, 1e9, -1e9], [1.0, 1e9, -1e9]),
     "no numbers": (Instrument(), [1.0, NAN, np.inf, 2.0], [1.0, NAN, NAN, 2.0]),
     "range": (Instrument(0.0, 10.0), [0.0, 10.0, 10.1, -0.1, 5.0], [0.0, 10.0, NAN, NAN, 5.0]),
-    "rate": (Instrument(rate_limit=1.0), [5.0, 6.0, 8.0, 8.0], [5.0, 6.0, NAN, 8.0]),
+    "rate": (Instrument(rate_limit=1.0), [5.0, 6.0, 8.0, 6.5], [5.0, 6.0, NAN, 6.5]),
     "the time since the last good one": (
         Instrument(rate_limit=1.0),
-        [5.0, NAN, NAN, 8.0],
-        [5.0, NAN, NAN, 8.0],
+        [5.0, NAN, NAN, 8.0, 8.0, 8.0],
+        [5.0, NAN, NAN, NAN, NAN, 8.0],
+    ),
+    "back where it was after a gap": (
+        Instrument(rate_limit=1.0),
+        [5.0, NAN, NAN, 5.8],
+        [5.0, NAN, NAN, 5.8],
+    ),
+    "what an instrument shows first when it comes back": (
+        Instrument(0.0, 100.0, 5.0),
+        [50.0] + [1e6] * 10 + [0.0, 0.0, 50.1, 50.0],
+        [50.0] + [NAN] * 12 + [50.1, 50.0],
     ),
     "one spike": (Instrument(rate_limit=1.0), [5.0, 50.0, 5.5], [5.0, NAN, 5.5]),
     "a wrong first one": (
