@@ -196,7 +196,7 @@ class Probe:
 
     def relay(self, topic: str) -> None:
         """Hand ``TOPIC_direct`` on as ``TOPIC``; :meth:`rule` says what becomes of it."""
-        publisher = self.node.create_publisher(JointState, topic, SIGNAL_QOS)
+        publisher = self.node.create_publisher(JointState, topic, DEEP_QOS)
         self._rules[topic] = as_it_is
 
         def hand_on(message: Any) -> None:
