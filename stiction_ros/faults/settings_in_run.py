@@ -31,7 +31,7 @@ REFUSED: tuple[Mapping[str, Any], ...] = (
     {"horizon": 10**6},
     {"horizon": 3},
     {"output_weights": [1.0, 2.0, 3.0]},
-    {"op_low": [80.0], "op_high": [20.0]},
+    {"op_low": [120.0]},  # above op_high; of two at once the first alone might be possible
     {"move_weights": [-1.0]},
     {"move_weights": [math.nan]},
     {"mode": "asleep"},
