@@ -224,7 +224,10 @@ class LiveEstimator:
             if friction.settled:
                 changes.append(look_for_change(self.settings, evidence, j, friction))
             else:
-                self._trust.renew(name, narrowed(evidence, j, friction, whole=evidence.first > 0))
+                change = self._changed.get(name)
+                since = change is not None and change.first >= end + 1 - len(record)
+                whole = since and evidence.first > 0
+                self._trust.renew(name, narrowed(evidence, j, friction, whole=whole))
         return tuple(changes)
 
     def _evidence(self, reference: Reference, end: int, record: Record) -> Evidence | None:

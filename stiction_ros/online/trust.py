@@ -74,6 +74,8 @@ class TrustedFriction:
         both = static if anew else _intersect(self.static_interval, static) or static
         settled = both[1] <= SETTLED * both[0]
         value = 0.5 * (both[0] + both[1]) if settled else RESOLUTION * both[0]
+        if both[0] <= 0.0:  # the moves say nothing of how little it may be
+            value = min(self.static_friction, both[1])
         known = dynamic_interval[0] <= self.dynamic_friction <= dynamic_interval[1]
         return dataclasses.replace(
             self,

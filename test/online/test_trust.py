@@ -226,3 +226,11 @@ def test_only_what_a_controller_would_notice_is_a_difference() -> None:
     assert not alike({"V1": old}, {"V1": far})
     assert not alike({"V1": old}, {})
     assert alike({}, {})
+
+
+@pytest.mark.parametrize("high", [4.0, 12.0])
+def test_moves_that_tell_no_lower_end_leave_the_friction_in_force(high: float) -> None:
+    known = TrustedFriction(8.0, (7.8, 8.2), 1.0, (0.9, 1.1))
+    found = known.narrowed((0.0, high), 1.0, (0.9, 1.1), anew=True)
+    assert not found.settled
+    assert found.static_friction == min(8.0, high)
