@@ -158,8 +158,8 @@ def test_frictions_come_back_in_the_record_s_own_unit(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(bench_stability, "identify", lambda record, options: Found())
     variant = next(variant for variant in VARIANTS if variant.op[0] == 20.0)
-    assert varied(record_of(), variant).f_s == (1.0, 2.0)
-    assert varied(record_of(), variant).band == (1.0, 2.1)
+    assert varied("exact", record_of(), variant).f_s == (1.0, 2.0)
+    assert varied("exact", record_of(), variant).band == (1.0, 2.1)
 
 
 def held(**verdicts: Answer) -> Held:
