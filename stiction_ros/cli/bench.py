@@ -30,8 +30,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "control": ("seed", "quick"),
     "identification": ("repeat", "seed", "longest", "quick"),
     "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
-    "field": ("seeds", "jobs"),
-    "stability": ("seeds", "data", "jobs"),
+    "field": ("seeds", "method", "jobs"),
+    "stability": ("seeds", "method", "data", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 

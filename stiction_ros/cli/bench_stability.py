@@ -17,6 +17,7 @@ from rich.table import Table
 
 from stiction_ros.cli.bench_field import (
     FOUND,
+    METHOD,
     Answer,
     Interval,
     Share,
@@ -271,7 +272,7 @@ def run(options: argparse.Namespace, machine: str) -> int:
     if seeds is None and folder is None:
         seeds = (FIRST, LAST)
     wanted = sources(seeds, folder)
-    work = functools.partial(hold, options.method)
+    work = functools.partial(hold, options.method or METHOD)
     rows = run_each(work, wanted, options.jobs or 1, f"stability: {len(wanted)} records")
     if options.json is not None:
         write_json(options.json, document(rows, machine))

@@ -26,12 +26,7 @@ from stiction_ros.identification.one_step_best import one_step_best, seen
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.output_error import Orders
 from stiction_ros.identification.patterns import has_cells
-from stiction_ros.identification.preparation import (
-    input_order_for,
-    prepare,
-    tried_orders,
-    window,
-)
+from stiction_ros.identification.preparation import prepare, windows
 from stiction_ros.identification.results import (
     Identification,
     OrderRow,
@@ -131,7 +126,7 @@ def choose(
     data: Data, options: IdentificationOptions
 ) -> tuple[Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
     """Return the orders, the friction-free model, the one with friction and all orders tried."""
-    orders_list = [window(options, n, input_order_for(options, n)) for n in tried_orders(options)]
+    orders_list = windows(options)
     start = orders_list[len(orders_list) // 2]
     linear = linear_model(data, start)
     found = search(data, linear, start)

@@ -51,6 +51,11 @@ def input_order_for(options: IdentificationOptions, output_order: int) -> int:
     return output_order if options.input_order is None else options.input_order
 
 
+def windows(options: IdentificationOptions) -> list[Orders]:
+    """Return all orders that are tried, on one window."""
+    return [window(options, n, input_order_for(options, n)) for n in tried_orders(options)]
+
+
 def window(options: IdentificationOptions, output_order: int, input_order: int) -> Orders:
     """Return orders with the one window that suits all rivals of this identification."""
     largest = max(tried_orders(options)) + 2

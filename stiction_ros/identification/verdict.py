@@ -17,6 +17,8 @@ Evidence, all under the noise model:
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
@@ -38,7 +40,8 @@ def evidence(
     rival = min(rivals, key=lambda model: model.bic)
     count = sum(fit.count for fit in sticky.fits)
     friction_parameters = 2.0 * np.log(count)
-    halves = half_gains(sticky, rival)
+    pairs = zip(sticky.fits, rival.fits, strict=True)
+    halves = half_gains((one.innovations, other.innovations) for one, other in pairs)
     return {
         "delta_bic": float(rival.bic - sticky.bic - friction_parameters),
         "variance_ratio": float(np.exp((rival.loss - sticky.loss) / count)),
@@ -51,21 +54,28 @@ def evidence(
     }
 
 
-def half_gains(sticky: Model, rival: Model) -> tuple[float, float]:
-    """Return −2 log likelihood gained by friction in both halves, variances from the whole."""
+def half_gains(innovations: Iterable[tuple[FloatArray, FloatArray]]) -> tuple[float, float]:
+    """Return −2 log likelihood gained by friction in both halves, variances from the whole.
+
+    Args:
+        innovations: with friction and without, of each output, shape (n,) each.
+    """
     gains = np.zeros(2)
-    for with_friction, without in zip(sticky.fits, rival.fits, strict=True):
-        scale = with_friction.energy / with_friction.count
-        rival_scale = without.energy / without.count
+    for with_friction, without in innovations:
+        scale, rival_scale = _mean_square(with_friction), _mean_square(without)
         gain: FloatArray = (
-            without.innovations**2 / rival_scale
+            without**2 / rival_scale
             + np.log(rival_scale)
-            - with_friction.innovations**2 / scale
+            - with_friction**2 / scale
             - np.log(scale)
         )
         middle = len(gain) // 2
         gains += [gain[:middle].sum(), gain[middle:].sum()]
     return float(gains[0]), float(gains[1])
+
+
+def _mean_square(values: FloatArray) -> float:
+    return max(float(values @ values), 1e-300) / len(values)
 
 
 def free_run_energy(data: Data, model: Model) -> float:

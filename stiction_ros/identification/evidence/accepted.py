@@ -8,9 +8,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.output_fit import Criterion
 from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.search import MOVES, Found
+from stiction_ros.identification.evidence.search import Found, losses
 from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
 
 Interval = tuple[float, float]
@@ -53,9 +52,9 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
     best = found.best
     gain = found.ideal.loss - best.loss
     slack = float(chi2.ppf(confidence, FREEDOM)) + MISFIT * max(gain, 0.0)
-    rows, losses = _looked_at(problem, found, valve)
-    losses = losses - losses.min()
-    inside = losses <= slack
+    rows, lost = _looked_at(problem, found, valve)
+    lost = lost - lost.min()
+    inside = lost <= slack
     static, dynamic = rows[inside].T
     band = static + dynamic
     flat = rows[:, 1] >= rows[:, 0] * (1.0 - 1e-9)
@@ -64,8 +63,8 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         dynamic=(float(dynamic.min()), float(dynamic.max())),
         band=(float(band.min()), float(band.max())),
         none=gain <= slack,
-        deadband_loss=float(losses[flat].min(initial=np.inf)),
-        profile=_profile(rows[:, 0], losses),
+        deadband_loss=float(lost[flat].min(initial=np.inf)),
+        profile=_profile(rows[:, 0], lost),
     )
 
 
@@ -74,7 +73,7 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
     best, limit = found.best, float(problem.limit[valve])
     met = [one for one in found.met if one.friction[valve, 0] > 0.0] or [best]
     rows = [np.array([one.friction[valve] for one in met])]
-    losses = [np.array([one.loss for one in met])]
+    lost = [np.array([one.loss for one in met])]
     centre = best.friction[valve]
     grids = [coarse_grid(limit)]
     if centre[0] > 0.0:
@@ -82,23 +81,18 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
         grids += [finer_grid(centre[None, :], step * size / 3.0, limit) for step in STEPS]
     grid = np.vstack(grids)
     grid = np.vstack([grid, np.column_stack([grid[:, 0], grid[:, 0]])])  # deadbands
-    stems = problem.stems(valve, grid, float(best.starts[valve]))
-    total = np.zeros(len(grid))
-    for i, fit in enumerate(best.fits):
-        others = np.delete(best.stems, valve, axis=0)
-        total += Criterion.of(problem, i, others, fit.noise, fit.prior).losses(stems)
-    moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
+    start = np.full(len(grid), best.starts[valve])
     rows.append(grid)
-    losses.append(np.where(moves < MOVES, np.inf, total))
-    return np.vstack(rows), np.concatenate(losses)
+    lost.append(losses(problem, best, valve, np.column_stack([grid, start]), best.fits))
+    return np.vstack(rows), np.concatenate(lost)
 
 
-def _profile(static: FloatArray, losses: FloatArray) -> tuple[tuple[float, float], ...]:
+def _profile(static: FloatArray, lost: FloatArray) -> tuple[tuple[float, float], ...]:
     """Return the lower envelope of the loss over f_S."""
     order = np.argsort(static, kind="stable")
-    static, losses = static[order], losses[order]
+    static, lost = static[order], lost[order]
     edges = np.flatnonzero(np.diff(static, prepend=-1.0) > 1e-9)
-    least = np.minimum.reduceat(losses, edges)
+    least = np.minimum.reduceat(lost, edges)
     return tuple(
         (float(f), float(loss))
         for f, loss in zip(static[edges], least, strict=True)

@@ -8,27 +8,25 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import RIVAL, explained
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
 from stiction_ros.identification.evidence.kernels import whitened
+from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.search import Candidate, Found, search
 from stiction_ros.identification.models import Data, Model, linear_model, settle_delays, stem_of
 from stiction_ros.identification.options import IdentificationOptions
-from stiction_ros.identification.preparation import (
-    input_order_for,
-    prepare,
-    tried_orders,
-    window,
-)
+from stiction_ros.identification.preparation import prepare, windows
 from stiction_ros.identification.results import (
     Identification,
     OrderRow,
     ValveEstimate,
     VerdictKind,
 )
+from stiction_ros.identification.verdict import half_gains
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -95,14 +93,11 @@ def _judged(
     held = accepted(problem, found, valve, options.confidence)
     figures = evidence_of(problem, found, valve)
     figures["deadband_loss"] = held.deadband_loss
-    static, dynamic = (float(value) for value in found.best.friction[valve])
     verdict = _verdict(figures, held, float(problem.limit[valve]), options)
     believed = verdict is VerdictKind.STICKY
     low = (held.static[0], held.dynamic[0]) if believed else (0.0, 0.0)
-    if verdict is VerdictKind.HEALTHY:
-        static = dynamic = 0.0
-    start = 0.0 if verdict is VerdictKind.HEALTHY else float(found.best.starts[valve])
-    moves = np.count_nonzero(np.diff(found.best.stems[valve]))
+    chosen = found.ideal if verdict is VerdictKind.HEALTHY else found.best
+    static, dynamic = (float(value) for value in chosen.friction[valve])
     return ValveEstimate(
         name=record.valves[valve],
         verdict=verdict,
@@ -112,8 +107,8 @@ def _judged(
         dynamic_friction=dynamic,
         dynamic_interval=(low[1], max(held.dynamic[1], dynamic)),
         jump=0.0 if held.deadband_loss < 4.0 else static - dynamic,
-        stem_start=float(record.op[0, valve]) + start,
-        moves=int(moves if static > 0.0 else np.count_nonzero(np.diff(record.op[:, valve]))),
+        stem_start=float(record.op[0, valve]) + float(chosen.starts[valve]),
+        moves=int(np.count_nonzero(np.diff(chosen.stems[valve]))),
         evidence=figures,
         profile=held.profile,
     )
@@ -124,28 +119,22 @@ def evidence_of(problem: Problem, found: Found, valve: int) -> dict[str, float]:
     best, without = found.best, found.ideal
     count = problem.count * len(problem.pv)
     gain = without.loss - best.loss
-    halves = _half_gains(problem, best, without)
-    stem = best.stems[valve]
+    halves = half_gains(
+        (_innovations(problem, one), _innovations(problem, other))
+        for one, other in zip(best.fits, without.fits, strict=True)
+    )
     return {
         "delta_bic": gain - 2.0 * float(np.log(count)),
         "free_run_ratio": _free_run(problem, without) / _free_run(problem, best),
         "half_1": halves[0],
         "half_2": halves[1],
         "share": float(best.friction[valve, 0] / problem.limit[valve]),
-        "moves": float(np.count_nonzero(np.diff(stem))),
+        "moves": float(np.count_nonzero(np.diff(best.stems[valve]))),
     }
 
 
-def _half_gains(problem: Problem, best: Candidate, without: Candidate) -> tuple[float, float]:
-    """Return −2 log likelihood gained by friction in both halves, variances from the whole."""
-    gain = np.zeros(problem.count)
-    for one, other in zip(best.fits, without.fits, strict=True):
-        for fit, sign in ((other, 1.0), (one, -1.0)):
-            seen = whitened(fit.noise, fit.rest, float(fit.rest[0]))[problem.first :]
-            variance = float(np.mean(seen**2))
-            gain += sign * (seen**2 / variance + np.log(variance))
-    middle = len(gain) // 2
-    return float(gain[:middle].sum()), float(gain[middle:].sum())
+def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
+    return whitened(fit.noise, fit.rest, float(fit.rest[0]))[problem.first :]
 
 
 def _free_run(problem: Problem, candidate: Candidate) -> float:
@@ -179,9 +168,7 @@ def _process(
         stems[j] = stem_of(data, int(j), friction[j], float(starts[j]))
     delays = ((data.delay[0],) * len(valves),) * len(data.y)
     base = Model(friction, starts, stems, delays, ())
-    tried = [window(options, n, input_order_for(options, n)) for n in tried_orders(options)]
-    models = [linear_model(data, orders, base) for orders in tried]
-    table = tuple(order_row(*pair) for pair in zip(tried, models, strict=True))
-    best = min(range(len(models)), key=lambda i: models[i].bic)
-    model, _ = settle_delays(data, models[best], tried[best])
-    return model, table
+    rivals = [(orders, linear_model(data, orders, base)) for orders in windows(options)]
+    orders, best = min(rivals, key=lambda rival: rival[1].bic)
+    model, _ = settle_delays(data, best, orders)
+    return model, tuple(order_row(*rival) for rival in rivals)

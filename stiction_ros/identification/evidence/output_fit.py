@@ -68,42 +68,6 @@ class Criterion:
     energy: float
     constant: float
 
-    @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        output: int,
-        others: FloatArray,
-        noise: FloatArray,
-        prior: ResponsePrior,
-    ) -> Criterion:
-        """Return the criterion beside the stems of the ``others``, scaled, shape (m − 1, n)."""
-        taps, first = problem.taps, problem.first
-        precision = prior.precision(taps)
-        y = problem.pv[output]
-        seen = whitened(noise, y, float(y[0]))[first:]
-        ones = np.full((1, len(seen)), float(noise.sum()) or 1.0)
-        parts = [ones / np.linalg.norm(ones)]
-        for stem in others:
-            signal = whitened(noise, stem, float(stem[0]))
-            parts.append(lagged(signal, float(signal[0]), first, taps))
-        rows = np.vstack(parts)
-        gram = rows @ rows.T
-        for j in range(len(others)):
-            block = slice(1 + j * taps, 1 + (j + 1) * taps)
-            gram[block, block] += precision
-        determinant = factorised(gram)
-        fixed = np.ascontiguousarray(_forward(gram, rows))
-        explained = fixed @ seen
-        return cls(
-            noise=noise,
-            precision=precision,
-            fixed=fixed,
-            target=seen - fixed.T @ explained,
-            energy=float(seen @ seen - explained @ explained),
-            constant=determinant + (1 + len(others)) * prior.log_determinant(taps),
-        )
-
     def losses(self, stems: FloatArray) -> FloatArray:
         """Return the loss of each of many stems, scaled, shape (G, n)."""
         found = evidences(stems, self.noise, self.fixed, self.target, self.energy, self.precision)
@@ -117,8 +81,59 @@ class Criterion:
         return float(loss) + self.constant, response
 
 
-def _forward(factor: FloatArray, rows: FloatArray) -> FloatArray:
-    return np.asarray(solve_triangular(factor, rows, lower=True, check_finite=False))
+@dataclasses.dataclass(frozen=True)
+class Whitened:
+    """One output and the stems beside one valve, whitened: what no prior changes.
+
+    Attributes:
+        noise: D.
+        seen: the output, shape (n,).
+        rows: a constant, then M lags of every other stem, shape (q, n).
+        products: of these rows with each other, shape (q, q).
+        taps: M.
+    """
+
+    noise: FloatArray
+    seen: FloatArray
+    rows: FloatArray
+    products: FloatArray
+    taps: int
+
+    @classmethod
+    def of(cls, problem: Problem, output: int, others: FloatArray, noise: FloatArray) -> Whitened:
+        """Whiten an output and the stems of the ``others``, scaled, shape (m − 1, n)."""
+        taps, first = problem.taps, problem.first
+        y = problem.pv[output]
+        seen = whitened(noise, y, float(y[0]))[first:]
+        ones = np.full((1, len(seen)), float(noise.sum()) or 1.0)
+        parts = [ones / np.linalg.norm(ones)]
+        for stem in others:
+            signal = whitened(noise, stem, float(stem[0]))
+            parts.append(lagged(signal, float(signal[0]), first, taps))
+        rows = np.vstack(parts)
+        return cls(noise, seen, rows, rows @ rows.T, taps)
+
+    def under(self, prior: ResponsePrior) -> Criterion:
+        """Return the criterion under a prior, the others' responses integrated out."""
+        precision, seen = prior.precision(self.taps), self.seen
+        factor = self.products.copy()
+        starts = range(1, len(factor), self.taps)
+        for start in starts:
+            block = slice(start, start + self.taps)
+            factor[block, block] += precision
+        determinant = factorised(factor)
+        fixed = np.ascontiguousarray(
+            solve_triangular(factor, self.rows, lower=True, check_finite=False)
+        )
+        explained = fixed @ seen
+        return Criterion(
+            noise=self.noise,
+            precision=precision,
+            fixed=fixed,
+            target=seen - fixed.T @ explained,
+            energy=float(seen @ seen - explained @ explained),
+            constant=determinant + (1 + len(starts)) * prior.log_determinant(self.taps),
+        )
 
 
 def fit_output(
@@ -176,12 +191,12 @@ def _tuned(
     problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
 ) -> ResponsePrior:
     """Return the prior to which no neighbour is better, downhill from ``prior``."""
+    beside = Whitened.of(problem, output, stems[1:], noise)
     met: dict[ResponsePrior, float] = {}
 
     def loss(one: ResponsePrior) -> float:
         if one not in met:
-            criterion = Criterion.of(problem, output, stems[1:], noise, one)
-            met[one] = criterion.best(stems[0])[0]
+            met[one] = beside.under(one).best(stems[0])[0]
         return met[one]
 
     while True:
@@ -198,8 +213,8 @@ def _fitted(
     responses = np.empty((len(stems), taps))
     loss = np.inf
     for j in range(len(stems)):
-        others = np.delete(stems, j, axis=0)
-        loss, responses[j] = Criterion.of(problem, output, others, noise, prior).best(stems[j])
+        beside = Whitened.of(problem, output, np.delete(stems, j, axis=0), noise)
+        loss, responses[j] = beside.under(prior).best(stems[j])
     rest = y.copy()
     for stem, response in zip(stems, responses, strict=True):
         rest -= response @ lagged(stem, float(stem[0]), 0, taps)

@@ -13,14 +13,15 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.output_fit import (
-    Criterion,
     OutputFit,
+    Whitened,
     fit_output,
     follow,
     white,
 )
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.friction_grid import coarse_grid, cross_grid, finer_grid
+from stiction_ros.identification.scan_kernels import best_apart
 
 SEEDS = 6  # frictions taken from one look at the whole triangle
 APART = 0.03  # of the limit, by which they differ
@@ -84,17 +85,6 @@ class _Valve:
         self.met: list[Candidate] = []
         self._keys: set[tuple[float, ...]] = set()
 
-    def losses(self, rows: FloatArray, fits: Sequence[OutputFit]) -> FloatArray:
-        """Return the loss of rows (f_S, f_D, start) under the noise and prior of ``fits``."""
-        stems = self.problem.stems(self.valve, rows[:, :2], rows[:, 2])
-        others = np.delete(self.base.stems, self.valve, axis=0)
-        total = np.zeros(len(rows))
-        for i, fit in enumerate(fits):
-            criterion = Criterion.of(self.problem, i, others, fit.noise, fit.prior)
-            total += criterion.losses(stems)
-        moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
-        return np.where(moves < MOVES, np.inf, total)
-
     def add(self, row: FloatArray, fits: Sequence[OutputFit], *, whole: bool) -> None:
         """Fit a row (f_S, f_D, start) from neighbouring fits; ``whole`` until nothing changes."""
         key = tuple(round(float(value), 9) for value in row)
@@ -129,7 +119,7 @@ class _Valve:
         met = sorted(self.met, key=lambda one: one.loss)
         places = np.array([one.friction[self.valve] for one in met]).reshape(-1, 2)
         ranks = np.arange(len(met), dtype=float)
-        return [met[i] for i in apart(places, ranks, count, distance)]
+        return [met[i] for i in _apart(places, ranks, count, distance)]
 
     def settle(self) -> None:
         """Fit the heads until nothing changes, once more from the noise of the best."""
@@ -163,7 +153,8 @@ class _Valve:
     def _take(
         self, rows: FloatArray, fits: Sequence[OutputFit], count: int, distance: float
     ) -> None:
-        for i in apart(rows[:, :2], self.losses(rows, fits), count, distance):
+        found = losses(self.problem, self.base, self.valve, rows, fits)
+        for i in _apart(rows[:, :2], found, count, distance):
             self.add(rows[i], fits, whole=False)
 
     def _lines(self, head: Candidate) -> FloatArray:
@@ -172,15 +163,31 @@ class _Valve:
         return cross_grid(jump, band, self.limit, LINES)
 
 
-def apart(places: FloatArray, losses: FloatArray, count: int, distance: float) -> list[int]:
-    """Return the indices of the best of ``places``, shape (G, 2), that are apart, best first."""
-    chosen: list[int] = []
-    for i in np.argsort(losses, kind="stable"):
-        if not np.isfinite(losses[i]) or len(chosen) == count:
-            break
-        if all(np.abs(places[i] - places[j]).max() > distance for j in chosen):
-            chosen.append(int(i))
-    return chosen
+def losses(
+    problem: Problem, beside: Candidate, valve: int, rows: FloatArray, fits: Sequence[OutputFit]
+) -> FloatArray:
+    """Return the loss of many frictions of one valve, infinite where it hardly moves, shape (G,).
+
+    Args:
+        problem: the record.
+        beside: whose other valves are kept.
+        valve: index.
+        rows: (f_S, f_D, start), %, shape (G, 3).
+        fits: whose noise and prior are taken.
+    """
+    stems = problem.stems(valve, rows[:, :2], rows[:, 2])
+    others = np.delete(beside.stems, valve, axis=0)
+    total = np.zeros(len(rows))
+    for i, fit in enumerate(fits):
+        total += Whitened.of(problem, i, others, fit.noise).under(fit.prior).losses(stems)
+    moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
+    return np.where(moves < MOVES, np.inf, total)
+
+
+def _apart(places: FloatArray, found: FloatArray, count: int, distance: float) -> list[int]:
+    """Return the best of ``places``; what lies just at the distance, as in a grid, is too near."""
+    beyond = float(np.nextafter(distance, np.inf))
+    return [int(i) for i in best_apart(places, found, count, beyond)]
 
 
 def ideal(problem: Problem, starts: Iterable[Sequence[OutputFit]] = ()) -> Candidate:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from stiction_ros.identification.evidence.accepted import accepted
 from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.search import Found, apart, search
+from stiction_ros.identification.evidence.search import Found, search
+from stiction_ros.identification.scan_kernels import best_apart
 
 STATIC, DYNAMIC = 3.0, 1.0
 
@@ -86,4 +87,4 @@ def test_what_is_accepted_holds_the_truth_and_grows_with_the_level(
 
 def test_places_apart_are_the_best_first_and_none_that_is_impossible() -> None:
     places = np.array([[1.0, 0.0], [1.1, 0.0], [3.0, 0.0], [5.0, 0.0]])
-    assert apart(places, np.array([2.0, 1.0, 3.0, np.inf]), 3, 0.5) == [1, 2]
+    assert best_apart(places, np.array([2.0, 1.0, 3.0, np.inf]), 3, 0.5).tolist() == [1, 2]
