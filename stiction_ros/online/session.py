@@ -33,9 +33,8 @@ from stiction_ros.online.gap_monitor import GapLook, MonitorRule
 from stiction_ros.online.live_controller import LiveController, ModeChange
 from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitoring import Monitoring, check_model
-from stiction_ros.online.node_settings import (
-    ControllerNodeSettings,
-    EstimatorNodeSettings,
+from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
+from stiction_ros.online.plain_settings import (
     NodeSettings,
     PlantNodeSettings,
     RecorderNodeSettings,
