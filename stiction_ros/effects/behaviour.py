@@ -80,6 +80,17 @@ class Behaviour(ABC):
         signature: what a record of the loop shows, one sentence.
         minimum_data: what a record must hold to tell its size, one sentence.
         confusable: places and effects, such as ``sensor lag``, that look alike.
+
+    Raises:
+        InputError: a parameter that is not finite or lies outside its range.
+
+    Examples:
+        >>> from stiction_ros import effects
+        >>> valve = effects.from_mapping({"effect": "backlash", "band": 2.0})
+        >>> memory = valve.rest(50.0)
+        >>> memory, stem = valve.step(memory, 53.0)  # OP leads by half the band
+        >>> stem, [entry.key for entry in valve.parameters()]
+        (52.0, ['band'])
     """
 
     effect: ClassVar[str]

@@ -27,6 +27,13 @@ class HeStiction(FrictionPair):
 
     Raises:
         InputError: a negative or non-finite friction, or f_D > f_S.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import HeStiction
+        >>> valve = HeStiction(static_friction=4.0, dynamic_friction=1.5)
+        >>> valve.simulate(np.array([50.0, 53.0, 55.0, 54.0])).tolist()
+        [50.0, 50.0, 53.5, 53.5]
     """
 
     law: ClassVar[str | None] = "he"

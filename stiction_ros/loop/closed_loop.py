@@ -57,6 +57,22 @@ def simulate_closed_loop(
         seed: of the plant's noise.
         progress: called with the number of samples done, about a hundred times.
         valve_changes: valves that change in mid-run, in the order of their times.
+
+    Raises:
+        InputError: a signal that grows without bound.
+
+    Returns:
+        The record with the true stems (%), and the outputs without noise.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import LoopModel, SetPoints, find_config, simulate_closed_loop
+        >>> model = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> schedule = SetPoints.load(find_config("flow.set_points.yaml"), model.outputs)
+        >>> by_hand = lambda measured, sp: np.array([50.0 + 0.5 * (sp[0] - measured.pv[0])])
+        >>> run = simulate_closed_loop(model, by_hand, schedule, samples=30, seed=1)
+        >>> run.record.op.shape
+        (30, 1)
     """
     plant = Plant(model, seed, valve_changes)
     m, p = len(model.valves), len(model.outputs)
@@ -157,7 +173,7 @@ def simulate(
         InputError: no controller, or one that does not fit the loop; a schedule of other
             outputs; a number out of range.
 
-    Example:
+    Examples:
         >>> from stiction_ros import LoopModel, find_config, simulate
         >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=300)
         >>> len(record), record.valves, record.outputs

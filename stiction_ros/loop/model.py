@@ -66,6 +66,14 @@ class LoopModel:
         provenance: who added which effect, when, with what evidence.
         instruments: what the instrument of each output can show, in the order of the outputs.
         document: the validated YAML mapping, which :meth:`to_yaml` writes.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config
+        >>> model = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> model.valve_names, model.outputs, model.sample_time
+        (('V1',), ('PV1',), 1.0)
+        >>> model.with_ideal_valves().valves[0].effects
+        ()
     """
 
     name: str

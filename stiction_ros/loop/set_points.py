@@ -24,6 +24,13 @@ class SetPoints:
         times: seconds of the moves, increasing, the first 0; shape (M,).
         values: set-points from each move on, shape (M, p), engineering units.
         repeat: seconds after which the schedule starts again; inf for never.
+
+    Examples:
+        >>> from stiction_ros import SetPoints
+        >>> moves = [{"time": 0.0, "PV1": 40.0}, {"time": 60.0, "PV1": 44.0}]
+        >>> schedule = SetPoints.from_mapping({"moves": moves}, ("PV1",), "example")
+        >>> schedule.at(59.0).item(), schedule.at(60.0).item()
+        (40.0, 44.0)
     """
 
     outputs: tuple[str, ...]
