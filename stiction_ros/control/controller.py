@@ -170,7 +170,11 @@ class MpcController:
         return misfit
 
     def follow(self, history: History) -> None:
-        """Go on behind :meth:`take_over` over the samples since then, all of them answered."""
+        """Go on behind :meth:`take_over` over the samples since then, all of them answered.
+
+        Args:
+            history: the samples since then, in order.
+        """
         if len(history.op):
             self._follow(history, 0, self.valves.step(history.op[0]))
 
@@ -220,9 +224,11 @@ class MpcController:
     def pass_over(
         self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
     ) -> None:
-        """Take in a sample that is not answered: OP stays at ``applied``; as :meth:`step`.
+        """Take in a sample that is not answered: OP stays where it is.
 
-        What is not finite of ``pv`` is missing.
+        Args:
+            pv: measurement, shape (p,); what is not finite is missing.
+            dv, applied, known: as :meth:`step`.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             applied = self._take_in(pv, dv, applied, known)

@@ -42,6 +42,11 @@ class SetPoints:
     def from_mapping(cls, value: Any, outputs: tuple[str, ...], where: str) -> SetPoints:
         """Read ``{repeat: s, moves: [{time: s, TAG: value, …}, …]}``; the first sets every tag.
 
+        Args:
+            value: the mapping.
+            outputs: tags of the loop's outputs.
+            where: named in messages.
+
         Raises:
             InputError: unknown tags, times that do not increase, or no value for a tag.
         """
@@ -68,7 +73,15 @@ class SetPoints:
 
     @classmethod
     def load(cls, path: Path | str, outputs: tuple[str, ...]) -> SetPoints:
-        """Read the schedule from a YAML file."""
+        """Read the schedule from a YAML file.
+
+        Args:
+            path: the file.
+            outputs: tags of the loop's outputs.
+
+        Raises:
+            InputError: as :meth:`from_mapping`; no such file.
+        """
         return cls.from_mapping(load_yaml(path), outputs, str(path))
 
     def at(self, time: float) -> FloatArray:

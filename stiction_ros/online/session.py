@@ -98,6 +98,9 @@ class Scenario:
 
         Raises:
             InputError: anything missing or wrong, in one line.
+
+        Args:
+            path: the scenario, ``*.scenario.yaml`` by custom.
         """
         path = Path(path)
         top = Section(load_yaml(path), str(path))
