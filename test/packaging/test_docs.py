@@ -74,3 +74,18 @@ def test_the_forge_runs_what_ci_runs() -> None:
     steps = [step.get("run") for step in workflow["jobs"]["test"]["steps"]]
     assert ".ci/run" in steps
     assert "make docs" in steps
+
+
+def test_the_first_program_of_the_readme_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    after = text[text.index("## Two commands") :].split("```sh", 1)[1].split("```", 1)[1]
+    block = re.search(r"^```(\w+)\n(.*?)^```", after, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    assert block.group(1) == "python"
+    model = stiction_ros.LoopModel.load(stiction_ros.find_config("flow.loop.yaml"))
+    monkeypatch.chdir(tmp_path)
+    stiction_ros.write_csv(stiction_ros.simulate(model, samples=600), "history.csv")
+    exec(compile(block.group(2), "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("V1 sticky ")
