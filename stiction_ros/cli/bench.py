@@ -12,15 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli import (
-    bench_control,
-    bench_field,
-    bench_gap,
-    bench_graph,
-    bench_identification,
-    bench_record,
-    bench_stability,
-)
+from stiction_ros.cli import bench_field, bench_gap, bench_stability
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
@@ -114,14 +106,20 @@ def machine() -> str:
 
 
 def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_graph
+
     return bench_graph.graph(show)
 
 
 def _record(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_record
+
     return bench_record.record(show)
 
 
 def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_identification
+
     plan = bench_identification.QUICK if options.quick else bench_identification.FULL
     chosen = {
         key: value
@@ -132,6 +130,8 @@ def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
 
 
 def _control(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_control
+
     plan = bench_control.QUICK if options.quick else bench_control.FULL
     if options.seed is not None:
         plan = dataclasses.replace(plan, seed=options.seed)

@@ -9,14 +9,16 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stiction_ros.cli import compare
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.cli.scenarios import SCENARIOS, find, loop_nodes
 from stiction_ros.errors import InputError
-from stiction_ros.online.session import Scenario
+
+if TYPE_CHECKING:
+    from stiction_ros.online.session import Scenario
 
 
 def add(commands: Any) -> None:
@@ -51,7 +53,10 @@ def run(options: argparse.Namespace) -> int:
     if options.compare:
         return compare.run(options)
     compare.refuse_options(options)
-    scenarios = [Scenario.load(find(name)) for name in options.scenario or SCENARIOS]
+    paths = [find(name) for name in options.scenario or SCENARIOS]
+    from stiction_ros.online.session import Scenario
+
+    scenarios = [Scenario.load(path) for path in paths]
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)
     good = True

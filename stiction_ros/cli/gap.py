@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -13,18 +13,20 @@ from rich.table import Table
 from stiction_ros.cli.identify import add_columns, columns, delay_range
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
-from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.records.open_record import open_record
 
+if TYPE_CHECKING:
+    from stiction_ros.discrepancy import Discrepancy
+
 EXIT_CODES = {
-    GapVerdict.NAMED: 0,
-    GapVerdict.NONE: 0,
-    GapVerdict.AMBIGUOUS: 3,
-    GapVerdict.UNKNOWN: 4,
-    GapVerdict.UNTESTABLE: 5,
+    "named": 0,
+    "none": 0,
+    "ambiguous": 3,
+    "unknown": 4,
+    "untestable": 5,
 }
 
 
@@ -72,6 +74,8 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     model, records = _inputs(options)
+    from stiction_ros.discrepancy import GapOptions, find_discrepancy
+
     settings = GapOptions(
         quick=options.quick, seed=options.seed, free_process=bool(options.fit_linear)
     )
@@ -89,9 +93,9 @@ def run(options: argparse.Namespace) -> int:
 def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
     chosen = columns(options)
     if options.fit_linear:
+        records = [open_record(path, chosen) for path in options.inputs]
         from stiction_ros.discrepancy.first_model import first_model
 
-        records = [open_record(path, chosen) for path in options.inputs]
         return first_model(records, options.delay), records
     if len(options.inputs) < 2:
         raise InputError(

@@ -6,21 +6,23 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
-from stiction_ros.identification import METHODS, Identification, IdentificationOptions, identify
-from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
-from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.csv_file import CsvColumns
 from stiction_ros.records.open_record import open_parts
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
+
+if TYPE_CHECKING:
+    from stiction_ros.identification import Identification
+    from stiction_ros.identification.closed_loop.cause import Cause
 
 
 def add(commands: Any) -> None:
@@ -43,10 +45,10 @@ def add(commands: Any) -> None:
         "--law",
         default="he",
         metavar="LAW",
-        help=f"friction law of method exact: {' | '.join(LAWS)} (default: he)",
+        help=f"friction law of method exact: {' | '.join(choices.laws())} (default: he)",
     )
     parser.add_argument(
-        "--method", default="exact", choices=tuple(METHODS), help="search (default: exact)"
+        "--method", default="exact", choices=choices.METHODS, help="search (default: exact)"
     )
     parser.add_argument(
         "--starts", type=int, metavar="M", help="first guesses of method nlp (default: 7)"
@@ -109,6 +111,8 @@ def delay_range(text: str) -> tuple[int, int]:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     record, parts = opened(options)
+    from stiction_ros.identification import IdentificationOptions, identify
+
     settings = IdentificationOptions(
         method=options.method,
         output_order=options.na,
@@ -188,6 +192,8 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
 
 def _cause(cause: Cause) -> str:
     """Return why an output oscillates, in words."""
+    from stiction_ros.identification.closed_loop.cause import CauseKind
+
     if cause.kind is CauseKind.NONE or cause.period is None:
         return f"cause {cause.kind}. {cause.sentence}"
     return (
