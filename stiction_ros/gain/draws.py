@@ -43,7 +43,7 @@ def drawn_tunings(law: RecoveredController, count: int, random: np.random.Genera
         kept = LEAST_SHARE * law.coefficients[k]
         weak = found[:, k] * law.coefficients[k] < kept * law.coefficients[k]
         found[weak, k] = kept
-    return found
+    return np.asarray(found)
 
 
 def _ends(interval: tuple[float, float]) -> tuple[float, float]:

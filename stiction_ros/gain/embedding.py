@@ -3,7 +3,7 @@ r"""The loop under the controller that knows the friction, and the one rule for 
 All weights follow from the identified loop, in units of OP's and PV's own movement:
 
 - the horizon reaches to where 95 % of a step's response have come, 20 to 60 samples;
-- Q = 1 on the output, and on a move of the stem :math:`S = \rho g^2` with g the response soon
+- the output's weight is 1, and on a move of the stem :math:`S = \rho g^2` with g the response soon
   after a step, see ``ANSWERED``: what the controller waits for longer it need not answer faster;
 - the price of a jump is what the output's noise costs over the samples of ``PRICED``: what is no
   more than noise is not worth a slip;
@@ -42,6 +42,9 @@ SHORTEST, LONGEST = 20, 60
 SETTLED = 0.95
 """Share of a step's response that the horizon reaches to."""
 
+STARTED = 1e-3
+"""Share of its largest value from which a step's response has begun."""
+
 LEAST_NOISE = 0.02
 """Standard deviation of the noise that is taken at least, in those of PV."""
 
@@ -54,33 +57,29 @@ STEM_NOISE = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class EmbeddingDesign:
-    """What the controller of one loop is built from; signals scaled.
+    """What the controller of one loop is built from.
 
     Attributes:
         model: of the process, its valve without friction.
         settings: weights and observer.
         friction: f_S and f_D.
-        spread: half-widths of their intervals.
+        spread: half-widths of their intervals; None where they are known.
     """
 
     model: LoopModel
     settings: ControlSettings
-    friction: HeStiction | None
+    friction: HeStiction
     spread: FrictionSpread | None
 
     @classmethod
     def of(cls, loop: RecordedLoop) -> EmbeddingDesign:
-        """Return the design by the rule.
+        """Return the design by the rule for a recorded loop, scaled.
 
         Raises:
             InputError: the process does not let a controller be designed.
         """
         i, j, process = loop.output, loop.valve, loop.process
         estimate, scale = loop.estimate, loop.op_scale
-        response = _response(loop)
-        gain = float(response[ANSWERED + int(process.delay[i, j])])
-        horizon = int(np.clip(_settled(response), SHORTEST, LONGEST))
-        noise, walk = _variances(loop.load[:, i])
         limits = [float(end) for end in loop.law.limits]
         valve: dict[str, Any] = {"name": "V", "effects": []}
         if np.isfinite(limits).all():
@@ -101,22 +100,42 @@ class EmbeddingDesign:
             },
             loop.record.name,
         )
-        f_s, f_d = estimate.static_friction / scale, estimate.dynamic_friction / scale
-        settings = ControlSettings(
-            horizon=horizon,
-            output_weights=(1.0,),
-            move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
-            embedding_move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
-            state_noise=(STEM_NOISE * f_s) ** 2,
-            disturbance_noise=(walk,),
-            measurement_noise=(noise,),
-            jump_price=PRICED * noise,
-            hand_over_samples=200,
-        )
-        friction = HeStiction(f_s, f_d) if f_s > 0.0 else None
+        friction = HeStiction(estimate.static_friction / scale, estimate.dynamic_friction / scale)
         spread = FrictionSpread(
             0.5 * float(np.ptp(estimate.static_interval)) / scale,
             0.5 * float(np.ptp(estimate.dynamic_interval)) / scale,
+        )
+        noise, walk = _variances(loop.load[:, i])
+        return cls.by_rule(model, friction, spread, (noise, walk))
+
+    @classmethod
+    def by_rule(
+        cls,
+        model: LoopModel,
+        friction: HeStiction,
+        spread: FrictionSpread | None,
+        variances: tuple[float, float],
+    ) -> EmbeddingDesign:
+        """Return the design by the rule; every unit is that of the model.
+
+        Args:
+            model: one valve and one output, the valve without friction.
+            friction: of the valve.
+            spread: half-widths of the intervals of its frictions; None where they are known.
+            variances: of the output's noise, and of a sample's move of its wandering load.
+        """
+        response, soon = _response(model)
+        gain = float(response[soon])
+        noise, walk = variances
+        settings = ControlSettings(
+            horizon=int(np.clip(_settled(response), SHORTEST, LONGEST)),
+            output_weights=(1.0,),
+            move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
+            embedding_move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
+            state_noise=(STEM_NOISE * friction.static_friction) ** 2,
+            disturbance_noise=(walk,),
+            measurement_noise=(noise,),
+            jump_price=PRICED * noise,
         )
         return cls(model, settings, friction, spread)
 
@@ -127,13 +146,16 @@ class EmbeddingDesign:
             InputError: it cannot be set up for this process.
         """
         design = self.settings.design(self.model)
-        if self.friction is None:
-            return MpcController(design, ControlMode.UNAWARE)
         return MpcController(design, ControlMode.EMBEDDING, [self.friction], [self.spread])
 
-    def weights(self, loop: RecordedLoop) -> dict[str, float]:
-        """Return the weights in engineering units, as a controller node takes them."""
-        settings, pv, op = self.settings, loop.pv_scale**2, loop.op_scale**2
+    def weights(self, pv_scale: float = 1.0, op_scale: float = 1.0) -> dict[str, float]:
+        """Return the weights as a controller node takes them, in engineering units and %.
+
+        Args:
+            pv_scale: engineering units of a PV of 1 of the model.
+            op_scale: % of an OP of 1 of the model.
+        """
+        settings, pv, op = self.settings, pv_scale**2, op_scale**2
         return {
             "horizon": float(settings.horizon),
             "output_weights": 1.0 / pv,
@@ -232,14 +254,17 @@ def _others(loop: RecordedLoop) -> FloatArray:
     return added
 
 
-def _response(loop: RecordedLoop) -> FloatArray:
-    """Return the response of the output to a step of the stem, shape (LONGEST + 1 + delay,)."""
-    from scipy.signal import lfilter
-
-    i, j, process = loop.output, loop.valve, loop.process
-    delay = 1 + int(process.delay[i, j])
-    step = np.concatenate([np.zeros(delay), np.ones(LONGEST)])
-    return np.asarray(lfilter(process.b[i, j], np.concatenate([[1.0], process.a[i]]), step))
+def _response(model: LoopModel) -> tuple[FloatArray, int]:
+    """Return the response to a step of the stem and the sample at which g is read."""
+    linear = model.process.linear(model.sample_time)
+    state = np.zeros(linear.order)
+    response = np.empty(4 * LONGEST)
+    for k in range(len(response)):
+        response[k] = float(linear.c[0] @ state)
+        state = linear.a @ state + linear.b[:, 0]
+    moved = np.abs(response) > STARTED * np.abs(response[:LONGEST]).max()
+    first = int(np.argmax(moved)) if moved.any() else 0
+    return response[first : first + LONGEST + 1], ANSWERED
 
 
 def _settled(response: FloatArray) -> int:

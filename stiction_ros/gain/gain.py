@@ -75,7 +75,7 @@ class Option:
         if self.measures is None or self.measures is now:
             return self
         factors = {key: _ratio(getattr(now, key), getattr(left, key)) for key in KEYS}
-        measures = {
+        measures: dict[str, Any] = {
             key: None if (value := getattr(self.measures, key)) is None else factors[key] * value
             for key in KEYS
         }
@@ -147,7 +147,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
         frictions = np.zeros_like(frictions)
     draws = Draws(frictions, drawn_tunings(loop.law, DRAWS, random))
     now = loop.now()
-    left = _option(What.LEAVE, loop.run(*draws), "The loop as it is, simulated.")
+    left = option_of(What.LEAVE, loop.run(*draws), "The loop as it is, simulated.")
     doubt = _doubt(now, left.measures)
     if doubt:
         note = f"Not simulated: {doubt}."
@@ -209,7 +209,7 @@ def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:
         return Option(What.SERVICE, now, interval, note)
     runs = loop.run(np.zeros_like(draws.frictions), draws.tunings)
     note = "The valve without friction under the controller that is there."
-    return _option(What.SERVICE, runs, note)
+    return option_of(What.SERVICE, runs, note)
 
 
 def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
@@ -224,7 +224,7 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
     if tuning != UNCHANGED:
         note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
     settings = {"gain_factor": tuning.gain, "integral_time_factor": tuning.integral_time}
-    return _option(What.RETUNE, runs, note, settings)
+    return option_of(What.RETUNE, runs, note, settings)
 
 
 def _embedding(loop: RecordedLoop, draws: Draws) -> Option:
@@ -237,10 +237,10 @@ def _embedding(loop: RecordedLoop, draws: Draws) -> Option:
     except InputError as error:
         return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
     note = "Predictive control that knows the friction, on the identified process."
-    return _option(What.EMBEDDING, runs, note, design.weights(loop))
+    return option_of(What.EMBEDDING, runs, note, design.weights(loop.pv_scale, loop.op_scale))
 
 
-def _option(
+def option_of(
     what: What,
     runs: Sequence[Measures | None],
     note: str,

@@ -14,7 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.oscillation import amplitude
+from stiction_ros.identification.closed_loop.oscillation import (
+    LEAST_LINE,
+    REGULAR,
+    Oscillation,
+    amplitude,
+)
 
 STANDS = 1e-9
 """Share of the stem's range up to which a move is rounding."""
@@ -75,3 +80,10 @@ def work(stem: FloatArray) -> tuple[float, int]:
     moves = moves[np.abs(moves) > STANDS * max(float(np.ptp(stem)), 1e-300)]
     turns = int(np.count_nonzero(np.diff(np.signbit(moves)))) if len(moves) else 0
     return float(np.abs(moves).sum()), turns
+
+
+def cycle_period(swing: Oscillation | None) -> float | None:
+    """Return the period of a cycle, samples; None where nothing regular or clear stands out."""
+    if swing is None or (swing.regularity <= REGULAR and swing.share < LEAST_LINE):
+        return None
+    return swing.period

@@ -15,11 +15,11 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.gain.measures import Measures, Yardstick
+from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
 from stiction_ros.gain.stems import stems_of
 from stiction_ros.identification.closed_loop.closed_loop import output_oscillation, paired
 from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
-from stiction_ros.identification.closed_loop.oscillation import REGULAR, oscillation
+from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.repeated_runs import period_of
 from stiction_ros.identification.closed_loop.scaled_loop import (
@@ -96,8 +96,7 @@ class RecordedLoop:
         simulated = free_run(process, loop, loop.stem)
         if not np.isfinite(simulated[first:last]).all():
             raise InputError("the identified process grows without end", where=record.name)
-        swing = output_oscillation(loop, output)
-        period = None if swing is None or swing.regularity <= REGULAR else swing.period
+        period = cycle_period(output_oscillation(loop, output))
         rows = slice(first + past, last)
         moves = law.set_point[rows, None]
         stretches = holds(moves)

@@ -15,6 +15,8 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.recorded_loop import RecordedLoop
 
+ComplexArray = np.ndarray[tuple[int], np.dtype[np.complex128]]
+
 FASTER = (1.0, 1.4, 2.0)
 """Factors on the gain where the valve has friction: a slower controller lets the valve rest off
 its place, and what that brings depends on loads to come."""
@@ -27,6 +29,9 @@ TIMES = (0.7, 1.0, 1.5, 2.5)
 
 SENSITIVE = 1.7
 """Largest peak of the sensitivity of a tuning that is taken: the upper end of what is usual."""
+
+CALMER = 0.9
+"""Share of the present peak up to which a tuning is taken that is calmer and still above that."""
 
 TRIED = 5
 """Draws on which tunings are compared."""
@@ -52,10 +57,17 @@ class Tuning:
 
     def applied(self, tunings: FloatArray) -> FloatArray:
         """Return (K, K_i, K_d), shape (R, 3), with the factors."""
-        return tunings * np.array([self.gain, self.gain / self.integral_time, self.gain])
+        factors = np.array([self.gain, self.gain / self.integral_time, self.gain])
+        return np.asarray(tunings * factors)
 
 
 UNCHANGED = Tuning()
+
+
+def candidates(friction: bool) -> list[Tuning]:
+    """Return the tunings to try besides the present one, of a valve with friction or without."""
+    pairs = itertools.product(FASTER if friction else SLOWER, TIMES)
+    return [tuning for pair in pairs if (tuning := Tuning(*pair)) != UNCHANGED]
 
 
 def best_tuning(loop: RecordedLoop, frictions: FloatArray, tunings: FloatArray) -> Tuning:
@@ -68,10 +80,8 @@ def best_tuning(loop: RecordedLoop, frictions: FloatArray, tunings: FloatArray) 
     present = sensitivity(loop, UNCHANGED)
     frictions, tunings = frictions[:TRIED], tunings[:TRIED]
     tried = [UNCHANGED]
-    gains = FASTER if frictions.any() else SLOWER
-    for gain, time in itertools.product(gains, TIMES):
-        tuning = Tuning(gain, time)
-        if tuning != UNCHANGED and sensitivity(loop, tuning) <= max(SENSITIVE, 0.9 * present):
+    for tuning in candidates(bool(frictions.any())):
+        if sensitivity(loop, tuning) <= max(SENSITIVE, CALMER * present):
             tried.append(tuning)
     number = len(frictions)
     runs = loop.run(
@@ -88,12 +98,21 @@ def sensitivity(loop: RecordedLoop, tuning: Tuning) -> float:
     r"""Return the peak of :math:`|1 / (1 + C P)|` of the loop without friction."""
     law, process = loop.law, loop.process
     i, j = loop.output, loop.valve
-    turn = np.exp(-1j * np.pi * np.geomspace(1e-4, 1.0, FREQUENCIES))
+    turn = frequencies()
     gain, reset, rate = tuning.applied(law.coefficients[None])[0]
     share = law.smoothing
     control = gain + reset / (1.0 - turn) + rate * (1.0 - turn)
     control = control * (1.0 - share) / (1.0 - share * turn) * turn**law.lag
     poles = np.polyval(np.concatenate([process.a[i][::-1], [1.0]]), turn)
     zeros = np.polyval(process.b[i, j][::-1], turn)
-    plant = zeros * turn ** (1 + int(process.delay[i, j])) / poles
-    return float(np.max(1.0 / np.maximum(np.abs(1.0 + control * plant), 1e-12)))
+    return peak(control * zeros * turn ** (1 + int(process.delay[i, j])) / poles)
+
+
+def frequencies() -> ComplexArray:
+    """Return the backward shift q on the frequencies that are looked at, shape (F,)."""
+    return np.asarray(np.exp(-1j * np.pi * np.geomspace(1e-4, 1.0, FREQUENCIES)))
+
+
+def peak(open_loop: ComplexArray) -> float:
+    """Return the largest sensitivity of a loop with this open-loop response, shape (F,)."""
+    return float(np.max(1.0 / np.maximum(np.abs(1.0 + open_loop), 1e-12)))
