@@ -31,6 +31,7 @@ from stiction_ros.cli import (
     study_change,
     study_control,
     study_monitor,
+    survey,
 )
 from stiction_ros.errors import InputError
 
@@ -52,6 +53,7 @@ COMMANDS = (
     study_change,
     study_control,
     study_monitor,
+    survey,
     faults,
     soak,
     bench,

@@ -54,7 +54,7 @@ def confidence(valve: Mapping[str, Any], cause: str | None) -> float:
         return HEALTHY * steady
     low, high = valve["f_s_interval"]
     known = 1.0 / (1.0 + (high - low) / max(high + low, 1e-12))
-    return known * AGREES.get(cause or "unknown", DISAGREES) * steady
+    return float(known) * AGREES.get(cause or "unknown", DISAGREES) * steady
 
 
 def kind(entry: Entry) -> int:
@@ -99,6 +99,6 @@ def _cost(entry: Entry, cost: float | None) -> float | None:
         now, service = entry.gain.get("now") or {}, entry.gain.get("service") or {}
         before, after = now.get("iae_per_hour"), service.get("iae_per_hour")
         if before is not None and after is not None:
-            return cost * max(before - after, 0.0)
+            return cost * max(float(before) - float(after), 0.0)
     amplitude = 0.0 if entry.oscillation is None else entry.oscillation.amplitude
-    return cost * 2.0 / np.pi * amplitude
+    return float(cost * 2.0 / np.pi * amplitude)
