@@ -30,7 +30,11 @@ ENDS = (5.0, 95.0)
 """Percentiles of the draws that are given as interval."""
 
 REPEATS = 0.25
-"""Share by which the simulated loop may differ from the record, and still stand for it."""
+"""Share by which a drawn loop may differ from the record in IAE and amplitude: what does not cycle
+as recorded is not the loop that was recorded."""
+
+FEWEST = 3
+"""Drawn loops that must repeat the record, for anything to be said."""
 
 RETUNED = (CauseKind.VALVE, CauseKind.TUNING)
 """Causes by which a loop shows its process well enough to be tuned by it: what comes from outside
@@ -54,7 +58,7 @@ class Option:
 
     Attributes:
         what: see :class:`What`.
-        measures: medians of the draws; None where it could not be simulated.
+        measures: medians of the draws that repeat the record; None where it could not be simulated.
         interval: 5th and 95th percentile of each measure over the draws.
         note: one sentence.
         settings: weights of the embedding, factors of the retuning.
@@ -147,12 +151,16 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
         frictions = np.zeros_like(frictions)
     draws = Draws(frictions, drawn_tunings(loop.law, DRAWS, random))
     now = loop.now()
-    left = option_of(What.LEAVE, loop.run(*draws), "The loop as it is, simulated.")
-    doubt = _doubt(now, left.measures)
-    if doubt:
-        note = f"Not simulated: {doubt}."
+    runs = loop.run(*draws)
+    kept = [k for k, run in enumerate(runs) if _repeats(now, run)]
+    if len(kept) < FEWEST:
+        left = option_of(What.LEAVE, runs, "The loop as it is, simulated.")
+        note = f"Not simulated: {_doubt(now, left.measures)}."
         others = [Option(what, None, {}, note) for what in What if what is not What.LEAVE]
         return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, left))
+    note = f"The loop as it is: {len(kept)} of {DRAWS} drawn loops repeat the record."
+    left = option_of(What.LEAVE, [runs[k] for k in kept], note)
+    draws = Draws(frictions[kept], draws.tunings[kept])
     options = (
         _service(loop, draws, now),
         _embedding(loop, draws),
@@ -186,20 +194,26 @@ def _believed(loop: RecordedLoop) -> bool:
     return verdict is not VerdictKind.HEALTHY and loop.estimate.static_friction > 0.0
 
 
+def _repeats(now: Measures, run: Measures | None) -> bool:
+    """Tell whether a drawn loop does what was recorded."""
+    if run is None:
+        return False
+    pairs = [(getattr(now, key), getattr(run, key)) for key in ("iae_per_hour", "amplitude")]
+    return all(
+        abs(simulated - recorded) <= REPEATS * recorded
+        for recorded, simulated in pairs
+        if recorded is not None and simulated is not None
+    )
+
+
 def _doubt(now: Measures, left: Measures | None) -> str:
-    """Return why the simulated loop cannot stand for the recorded one; empty for nothing."""
+    """Return why the simulated loop cannot stand for the recorded one."""
     if left is None:
         return "the identified loop grows without end"
-    for key, name in (("iae_per_hour", "IAE"), ("amplitude", "amplitude")):
-        recorded, simulated = getattr(now, key), getattr(left, key)
-        if recorded is None or simulated is None:
-            continue
-        if abs(simulated - recorded) > REPEATS * recorded:
-            return (
-                f"the identified loop does not repeat the record, its {name} is "
-                f"{simulated / max(recorded, 1e-300):.2f} times the recorded one"
-            )
-    return ""
+    return (
+        "the identified loop does not repeat the record, its IAE is "
+        f"{left.iae_per_hour / max(now.iae_per_hour, 1e-300):.2f} times the recorded one"
+    )
 
 
 def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.records.parts import DATES
 from stiction_ros.survey.beats import ALIKE, locked
 from stiction_ros.survey.entry import Entry
 
@@ -39,6 +40,7 @@ class Group:
 def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
     """Return the entries with the numbers of their groups, and the groups."""
     times = [np.array(entry.beats) for entry in entries]
+    clocks = [_clock(entry) for entry in entries]
     cycling = [k for k, entry in enumerate(entries) if len(entry.beats) and _period(entry) > 0.0]
     cycling.sort(key=lambda k: _period(entries[k]))
     parent = list(range(len(entries)))
@@ -53,7 +55,9 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
         for other in cycling[place + 1 :]:
             if math.log(_period(entries[other]) / _period(entries[one])) > 2.0 * ALIKE:
                 break
-            if root(one) != root(other) and locked(times[one], times[other]):
+            if root(one) == root(other) or clocks[one] != clocks[other]:
+                continue
+            if locked(times[one], times[other]):
                 parent[root(other)] = root(one)
     members: dict[int, list[int]] = {}
     for k in cycling:
@@ -68,6 +72,11 @@ def grouped(entries: Sequence[Entry]) -> tuple[list[Entry], list[Group]]:
         for k in rows:
             numbered[k] = dataclasses.replace(numbered[k], group=number)
     return numbered, groups
+
+
+def _clock(entry: Entry) -> object:
+    """Return what two loops must share for their times to compare: dates, else their files."""
+    return "dates" if entry.beats and entry.beats[0] > DATES else entry.files
 
 
 def _period(entry: Entry) -> float:

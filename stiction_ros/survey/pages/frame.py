@@ -42,7 +42,8 @@ th button { font: inherit; color: inherit; background: none; border: 0; padding:
 th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t { text-align: left; overflow-wrap: anywhere; }
-td.name { min-width: 9ch; font-weight: 600; }
+td.name { min-width: 15ch; font-weight: 600; }
+td.s { white-space: nowrap; }
 .sticky, .backlash, .failed { color: var(--bad); font-weight: 600; }
 .healthy { color: var(--good); } .undecided, .skipped { color: var(--open); }
 .note { border-left: 4px solid var(--open); background: var(--panel); padding: 8px 12px;
@@ -82,6 +83,8 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
     color: var(--soft); font-weight: 400; }
   table.list td:empty { display: none; }
   table.list td.name, table.list td.wordy { grid-column: 1 / -1; }
+  table.list td.wordy::before { content: none; }
+  table.list td.rank { order: 1; } table.list td { order: 2; } table.list td.name { order: 0; }
 }
 @media print { :root { color-scheme: light; } main { max-width: none; padding: 0; }
   .tools, .plot button { display: none; } tr, figure { break-inside: avoid; }

@@ -151,14 +151,14 @@ def _columns(entry: Entry, costs: bool, trends: Trends) -> list[Column]:
     amplitude = None if cycle is None else cycle.amplitude
     beat = None if cycle is None else cycle.period
     columns: list[Column] = [
-        ("", "rank", text(entry.rank or ""), entry.rank),
+        ("rank", "rank", text(entry.rank or ""), entry.rank),
         ("t name", "loop", name, entry.name),
-        ("t", "verdict", f'<span class="{kind}">{text(kind)}</span>', kind),
+        ("t s", "verdict", f'<span class="{kind}">{text(kind)}</span>', kind),
         ("t", "cycles by", text(why), why),
         ("", "band of OP", percent(entry.band_share) if found else "", entry.band_share),
         ("", "f_S %", _friction(entry), entry.f_s if found else None),
         ("", "confidence", percent(entry.confidence), entry.confidence),
-        ("", "period", period(beat), beat),
+        ("s", "period", period(beat), beat),
         ("", "amplitude", figure(amplitude), amplitude),
         ("", "after service", *_share(gain, "service")),
         ("", "embedding", *_share(gain, "embedding")),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -89,23 +89,29 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str) -> str:
     of_pv = f", {unit}" if unit else ""
     head = ("", f"amplitude{of_pv}", f"IAE per hour{of_pv}", "travel %/h", "reversals/h", "")
     keys = ("amplitude", "iae_per_hour", "travel_per_hour", "reversals_per_hour")
-    rows = [f"<tr><td class='t'>now</td>{_cells(gain['now'], keys)}<td></td></tr>"]
+    rows = [_gain_row("now", gain["now"], head, keys, "")]
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")
         between = f" IAE {interval((ends[0], ends[1]))}." if ends else ""
-        rows.append(
-            f"<tr><td class='t'>{text(OPTIONS[option['what']])}</td>{_cells(option, keys)}"
-            f"<td class='t'>{text(option['note'] + between)}</td></tr>"
-        )
-    titles = "".join(f"<th{' class=t' if not title else ''}>{text(title)}</th>" for title in head)
+        name = OPTIONS[option["what"]]
+        rows.append(_gain_row(name, option, head, keys, option["note"] + between))
+    titles = "".join(f"<th>{text(title)}</th>" for title in head)
     return (
-        "<h2>What would help, simulated</h2><div class='wide'><table><thead><tr>"
-        f"{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+        "<h2>What would help, simulated</h2><table class='list'><thead><tr>"
+        f"{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
 
-def _cells(measures: Mapping[str, Any], keys: tuple[str, ...]) -> str:
-    return "".join(f"<td>{figure(measures[key]) or '–'}</td>" for key in keys)
+def _gain_row(
+    name: str, measures: Mapping[str, Any], head: Sequence[str], keys: Sequence[str], note: str
+) -> str:
+    cells = "".join(
+        f"<td data-label='{text(label)}'>{figure(measures[key]) or '–'}</td>"
+        for label, key in zip(head[1:], keys, strict=False)
+    )
+    return (
+        f"<tr><td class='t name'>{text(name)}</td>{cells}<td class='t wordy'>{text(note)}</td></tr>"
+    )
 
 
 def _span(record: Record) -> str:
