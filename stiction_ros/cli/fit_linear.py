@@ -10,7 +10,15 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import add_columns, delay_range, opened
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
@@ -19,6 +27,7 @@ from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
 from stiction_ros.identification.linear_result import LinearIdentification
 from stiction_ros.identification.subspace import StateSpaceFit
 from stiction_ros.identification.subspace_projection import SubspaceMethod
+from stiction_ros.records.parts import longest_part
 
 
 def add(commands: Any) -> None:
@@ -31,6 +40,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     add_columns(parser)
+    add_intake(parser)
     kinds = [kind.value for kind in LinearKind]
     parser.add_argument("--kind", default="state_space", choices=kinds, help="(state_space)")
     parser.add_argument("--order", type=int, metavar="N", help="states (default: by BIC)")
@@ -59,7 +69,11 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record, _ = opened(options)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    loop = opened(options)
+    tell(loop)
+    record = longest_part(loop.parts)
     settings = LinearOptions(
         kind=LinearKind(options.kind),
         order=options.order,

@@ -6,11 +6,19 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.identify import add_columns, opened
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions, identify
+from stiction_ros.intake.intake import is_bag
 from stiction_ros.records.bag_messages import read_raw
-from stiction_ros.records.open_record import is_bag
+from stiction_ros.records.parts import longest_part
 
 
 def add(commands: Any) -> None:
@@ -22,6 +30,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument(
         "--out",
         default="report.html",
@@ -43,11 +52,15 @@ def run(options: argparse.Namespace) -> int:
     from stiction_ros.report.run_report import report_run
 
     out = Path(options.out)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
     try:
         if is_bag(options.record) and holds_live_run(options.record):
             print(report_run(options.record, out, namespace=options.namespace).page)
         else:
-            record, parts = opened(options)
+            loop = opened(options)
+            tell(loop)
+            record, parts = longest_part(loop.parts), loop.parts
             found = identify(record, IdentificationOptions())
             print(report_record(record, found, out, parts))
     except OSError as error:
