@@ -9,7 +9,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import add_columns, columns
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
@@ -28,8 +35,11 @@ def add(commands: Any) -> None:
         "the friction, another tuning, or nothing. A record is identified first and the "
         "controller of the record is the baseline; a model needs a controller of its own.",
     )
-    parser.add_argument("source", metavar="RECORD|MODEL", help=f"CSV, bag, or *{MODEL_ENDING}")
+    parser.add_argument(
+        "record", metavar="RECORD|MODEL", help=f"CSV file, other export, bag, or *{MODEL_ENDING}"
+    )
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument("--valve", metavar="TAG", help="of several valves (default: widest band)")
     parser.add_argument("--set-points", metavar="F", help="schedule, for a model")
     parser.add_argument("--samples", type=int, metavar="N", help="of a run, for a model (2000)")
@@ -42,9 +52,11 @@ def run(options: argparse.Namespace) -> int:
     # Simulating takes compiled code, which other commands do not wait for.
     from stiction_ros.gain.gain import Gain
 
-    found: Gain = _of_model(options) if _is_model(options.source) else _of_record(options)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    found: Gain = _of_model(options) if _is_model(options.record) else _of_record(options)
     if options.json is not None:
-        write_json(options.json, {"source": str(options.source)} | found.to_json())
+        write_json(options.json, {"record": str(options.record)} | found.to_json())
     if options.json != "-":
         show(found)
     return 0
@@ -57,7 +69,7 @@ def _is_model(source: str) -> bool:
 def _of_model(options: argparse.Namespace) -> Any:
     from stiction_ros.gain.model_gain import SAMPLES, gain_of_model
 
-    model = LoopModel.load(options.source)
+    model = LoopModel.load(options.record)
     schedule = None
     if options.set_points is not None:
         schedule = SetPoints.load(options.set_points, model.outputs)
@@ -71,7 +83,6 @@ def _of_model(options: argparse.Namespace) -> Any:
 def _of_record(options: argparse.Namespace) -> Any:
     from stiction_ros.gain.gain import gain_of
     from stiction_ros.identification import identify
-    from stiction_ros.intake import IntakeOptions, loops
     from stiction_ros.records.parts import longest_part
 
     for key in ("set_points", "samples"):
@@ -79,15 +90,9 @@ def _of_record(options: argparse.Namespace) -> Any:
             raise InputError(
                 "a record brings its own", where=f"--{key.replace('_', '-')}", fix="leave it out"
             )
-    intake = IntakeOptions(columns=columns(options), namespace=options.namespace)
-    found = list(loops([Path(options.source)], intake))
-    if len(found) != 1:
-        raise InputError(
-            f"holds {len(found)} loops", where=options.source, fix="use stiction survey"
-        )
-    if found[0].problem is not None:
-        raise InputError(found[0].problem)
-    record = longest_part(found[0].parts)
+    loop = opened(options)
+    tell(loop)
+    record = longest_part(loop.parts)
     with bar("identifying") as show_share:
         identified = identify(record, progress=show_share)
     with bar("simulating"):

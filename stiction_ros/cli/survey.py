@@ -10,14 +10,15 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import add_columns, columns, delay_range
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.intake import add_columns, add_intake, intake_options, show_loops
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.errors import InputError
@@ -39,8 +40,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
     add_columns(parser)
-    parser.add_argument("--tags", metavar="F", help="list of tags that make up each loop")
-    parser.add_argument("--strict", action="store_true", help="refuse what must be repaired")
+    add_intake(parser, many=True)
     parser.add_argument("--delay", type=delay_range, metavar="LO:HI", help="samples (0:10)")
     parser.add_argument("--no-gain", action="store_true", help="simulate nothing")
     parser.add_argument("--cost", metavar="F", help="CSV: loop, money per hour and unit of |PV−SP|")
@@ -64,9 +64,17 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     # Judging takes compiled code, which other commands do not wait for.
     from stiction_ros.identification.options import IdentificationOptions
+    from stiction_ros.intake import loops
     from stiction_ros.survey.options import SurveyOptions
     from stiction_ros.survey.survey import Plan, survey
 
+    paths = [Path(path) for path in options.paths]
+    for path in paths:
+        if not path.exists():
+            raise InputError("there is no such file or folder", where=str(path))
+    intake = intake_options(options)
+    if options.dry_run:
+        return show_loops(paths, intake)
     costs = {name: _number(value, options.cost) for name, value in _pairs(options.cost)}
     identification = IdentificationOptions()
     if options.delay is not None:
@@ -77,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
             gain=not options.no_gain,
             pages=options.out is not None,
             units=tuple(_pairs(options.units)),
+            read_by=repr(intake),
         ),
         None if options.out is None else Path(options.out),
         options.resume,
@@ -85,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
     trends = _trends(options.previous)
     engine = _engine(options)
     with bar("survey") as show:
-        found = survey(_loops(options), plan, engine, _Forecast(show, options.paths))
+        found = survey(loops(paths, intake), plan, engine, _Forecast(show, paths))
     found = dataclasses.replace(
         found, date=datetime.datetime.now(datetime.UTC).isoformat(" ", "minutes")
     )
@@ -118,27 +127,12 @@ def _engine(options: argparse.Namespace) -> Any:
     return DaskEngine(options.engine)
 
 
-def _loops(options: argparse.Namespace) -> Iterator[Any]:
-    from stiction_ros.intake import IntakeOptions, loops
-
-    for path in options.paths:
-        if not Path(path).exists():
-            raise InputError("there is no such file or folder", where=path)
-    intake = IntakeOptions(
-        columns=columns(options),
-        namespace=options.namespace,
-        tags=None if options.tags is None else Path(options.tags),
-        strict=options.strict,
-    )
-    return iter(loops([Path(path) for path in options.paths], intake))
-
-
 class _Forecast:
     """Shows how far a survey is, and how long the rest takes: by the bytes that are done."""
 
-    def __init__(self, show: Bar, paths: Sequence[str]) -> None:
+    def __init__(self, show: Bar, paths: Sequence[Path]) -> None:
         self._show, self._begun = show, time.monotonic()
-        self._total = sum(_size(Path(path)) for path in paths)
+        self._total = sum(_size(path) for path in paths)
         self._files: set[str] = set()
         self._done = 0
 

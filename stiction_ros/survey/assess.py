@@ -51,7 +51,8 @@ class Assessed:
 def assess(loop: Loop, options: SurveyOptions) -> Assessed:
     """Return what is said of a loop; whatever goes wrong is said there and not raised."""
     files = tuple(str(file) for file in loop.files)
-    entry = Entry(loop.name, files, Status.FAILED, notes=tuple(loop.notes))
+    notes = tuple(loop.notes)
+    entry = Entry(loop.name, files, Status.FAILED, op_unit=loop.op_unit, notes=notes)
     if loop.problem is not None or not loop.parts:
         reason = loop.problem or "it holds no samples"
         return _ended(entry, Status.FAILED, reason)

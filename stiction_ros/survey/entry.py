@@ -55,6 +55,7 @@ class Entry:
         rank: place in the list, from 1.
         group: number of the group of loops that cycle together, from 1.
         report: page of the loop, relative to the list.
+        op_unit: what OP, friction and travel are in.
         notes: what was repaired, left out, found; one sentence each.
         beats: when cycles begin, s on the clock of the record.
     """
@@ -83,6 +84,7 @@ class Entry:
     rank: int | None = None
     group: int | None = None
     report: str | None = None
+    op_unit: str = "%"
     notes: tuple[str, ...] = ()
     beats: tuple[float, ...] = ()
 

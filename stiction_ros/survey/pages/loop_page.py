@@ -53,11 +53,12 @@ def loop_page(
     """
     headline = HEADLINES.get(entry.verdict or "", "Not judged")
     pv_unit = f" {unit}" if unit else ""
+    op_unit = "% of travel" if entry.op_unit == "%" else entry.op_unit
     cycle = entry.oscillation
     cards = [
-        card("friction f_S, % of travel", figure(entry.f_s) or "–"),
+        card(f"friction f_S, {op_unit}", figure(entry.f_s) or "–"),
         card("between", interval(entry.f_s_interval) or "–"),
-        card("sliding friction f_D, %", figure(entry.f_d) or "–"),
+        card(f"sliding friction f_D, {op_unit}", figure(entry.f_d) or "–"),
         card("of what OP moves is lost in the band", percent(entry.band_share) or "–"),
         card("confidence", percent(entry.confidence) or "–"),
         card("why it cycles", CAUSES.get(entry.cause or "none") or "no cycle"),
@@ -76,7 +77,7 @@ def loop_page(
         f'<div class="cards">{"".join(cards)}</div>',
         TREND,
         gain_table(gain, unit),
-        *_figures(record, found, unit),
+        *_figures(record, found, unit, op_unit),
         _notes(entry),
     ]
     return framed(f"{entry.name}: {headline}", parts, f"stiction_ros {__version__}", SCRIPT)
@@ -122,7 +123,7 @@ def _span(record: Record) -> str:
     )
 
 
-def _figures(record: Record, found: Identification, unit: str) -> list[str]:
+def _figures(record: Record, found: Identification, unit: str, op_unit: str) -> list[str]:
     time, word = _hours(record)
     drawn = []
     for i, name in enumerate(record.outputs):
@@ -136,7 +137,7 @@ def _figures(record: Record, found: Identification, unit: str) -> list[str]:
         curves = [Curve(f"{name}, controller output", "op", record.op[:, j])]
         if known:
             curves.append(Curve("stem, estimated", "stem", found.stem[:, j], steps=True))
-        drawn.append(over_time(f"{name} and its stem.", time, word, curves, "% of travel"))
+        drawn.append(over_time(f"{name} and its stem.", time, word, curves, op_unit))
         if known:
             title = (
                 f"Stem of {name} against OP: a valve that sticks rests on level lines and then "
