@@ -11,7 +11,7 @@ from stiction_ros.survey.assess import Assessed
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.options import SurveyOptions
 
-ATTEMPTS = 2
+ATTEMPTS = 3
 """Times that a loop is tried whose worker dies: one that kills workers must not kill all."""
 
 

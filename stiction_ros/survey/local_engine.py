@@ -83,9 +83,10 @@ class LocalEngine:
         return [worker for worker in self._workers if worker.task is not None]
 
     def _free(self, options: SurveyOptions) -> _Worker:
-        for worker in self._workers:
-            if worker.task is None:
+        for worker in [one for one in self._workers if one.task is None]:
+            if worker.process.is_alive():
                 return worker
+            self._drop(worker)  # killed while it had nothing to do: no loop's fault
         context = multiprocessing.get_context("spawn")
         here, there = context.Pipe()
         process = context.Process(target=_work, args=(there, options), daemon=True)

@@ -36,9 +36,9 @@ table { border-collapse: collapse; width: 100%; font-size: .92rem;
   font-variant-numeric: tabular-nums; }
 th, td { padding: 6px 10px 6px 0; border-bottom: 1px solid var(--line); text-align: right;
   vertical-align: top; }
-th { color: var(--soft); font-weight: 600; white-space: nowrap; vertical-align: bottom; }
+th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
 th button { font: inherit; color: inherit; background: none; border: 0; padding: 2px 0;
-  cursor: pointer; font-weight: 600; }
+  cursor: pointer; font-weight: 600; text-align: inherit; }
 th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t { text-align: left; overflow-wrap: anywhere; }
