@@ -15,6 +15,7 @@ from rich.table import Table
 from stiction_ros.cli import (
     bench_control,
     bench_field,
+    bench_gain,
     bench_gap,
     bench_graph,
     bench_identification,
@@ -31,6 +32,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "identification": ("repeat", "seed", "longest", "quick"),
     "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
     "field": ("seeds", "method", "jobs"),
+    "gain": ("seeds", "jobs"),
     "stability": ("seeds", "method", "data", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
@@ -43,7 +45,8 @@ def add(commands: Any) -> None:
         help="measure speed, side by side",
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap), how often "
-        "identification is (field), and whether its answers hold still (stability).",
+        "identification is (field), whether its answers hold still (stability), and whether what "
+        "gain promises comes about (gain).",
     )
     parser.add_argument(
         "name",
@@ -171,5 +174,6 @@ BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
 
 COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
+    "gain": bench_gain.run,
     "stability": bench_stability.run,
 }

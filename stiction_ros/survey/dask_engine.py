@@ -6,6 +6,7 @@ sent, so it belongs into a closed network; with TLS in Dask's own settings it is
 
 from __future__ import annotations
 
+import queue
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -74,12 +75,9 @@ class DaskEngine:
 
     def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
         """Yield what is said of each loop as it comes."""
-        import distributed
-
         waiting = iter(tasks)
-        given: dict[str, Task] = {}
-        collect: Any = distributed.as_completed
-        coming = collect()
+        given: dict[str, tuple[Task, Any]] = {}
+        coming: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
         def hand_in() -> None:
             room = AHEAD * max(self.workers, 1) - len(given)
@@ -87,22 +85,22 @@ class DaskEngine:
                 task = next(waiting, None)
                 if task is None:
                     return
-                future = self._client.submit(
-                    assess, task.loop, options, key=f"stiction-{task.key}", retries=ATTEMPTS
-                )
-                given[future.key] = task
-                coming.add(future)
+                name = f"stiction-{task.key}-{self._client.id}"  # results of others are not ours
+                future = self._client.submit(assess, task.loop, options, key=name, retries=ATTEMPTS)
+                given[future.key] = task, future
+                future.add_done_callback(coming.put)
 
         hand_in()
         while given:
-            future = next(coming)
-            task = given.pop(future.key)
+            future = coming.get()
+            task, _ = given.pop(future.key)
             if future.status == "finished":
                 answer = future.result()
                 assert isinstance(answer, Assessed)
                 yield Done(task, answer)
             else:
-                yield lost(task, f"the cluster gave it up: {future.exception()}")
+                reason = future.exception() if future.status == "error" else future.status
+                yield lost(task, f"the cluster gave it up: {reason}")
             future.release()
             hand_in()
 

@@ -44,7 +44,8 @@ addEventListener("load", () => {
     width: innerWidth, scroll: document.documentElement.scrollWidth,
     dark: matchMedia("(prefers-color-scheme: dark)").matches, wide: wide.slice(0, 3),
     empty: texts.filter(element => seen(element) && !element.innerText.trim()).length,
-    pale: pale.slice(0, 3), paper, said, acted, fetched: performance.getEntriesByType("resource").map(one => one.name),
+    pale: pale.slice(0, 3), paper, said, acted,
+    fetched: performance.getEntriesByType("resource").map(one => one.name),
     text: document.body.innerText }), "*");
 });
 </script>"""
