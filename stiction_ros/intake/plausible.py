@@ -11,10 +11,10 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.tables.block import Block
 
-FOLLOWS = 0.6
+FOLLOWS = 0.75
 """Share of the moves of a controller's output that its law explains, at least."""
 
-LEADS = 0.3
+LEADS = 0.35
 """How much more of them the law explains one way round than the other, at least."""
 
 EXAMINED = 20_000

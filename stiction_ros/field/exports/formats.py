@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import datetime
 import enum
 import gzip
 import io
@@ -150,6 +151,8 @@ def write_parquet(tables: Sequence[Table], path: Path) -> Path:
 def write_workbook(tables: Sequence[Table], path: Path) -> Path:
     """Write loops to the sheets of a workbook, with a title and a row of units.
 
+    Times are dates of the workbook where it has an even number of loops, else text.
+
     Raises:
         InputError: openpyxl is missing.
     """
@@ -167,7 +170,9 @@ def write_workbook(tables: Sequence[Table], path: Path) -> Path:
         start = float(table.time.min())
         for k, seconds in enumerate(table.time.tolist()):
             cells = (column[k] for column in table.cells.values())
-            sheet.append([stamp(seconds, StampStyle.ISO, start), *cells])
+            at = stamp(seconds, StampStyle.ISO, start)
+            dated = datetime.datetime.fromisoformat(at) if len(tables) % 2 == 0 else at
+            sheet.append([dated, *cells])
     path = path.with_name(path.name + ".xlsx")
     book.save(path)
     return path
