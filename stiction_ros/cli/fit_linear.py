@@ -17,7 +17,6 @@ from stiction_ros.cli.intake import (
     intake_options,
     opened,
     show_loops,
-    tell,
 )
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
@@ -72,7 +71,6 @@ def run(options: argparse.Namespace) -> int:
     if options.dry_run:
         return show_loops([Path(options.record)], intake_options(options))
     loop = opened(options)
-    tell(loop)
     record = longest_part(loop.parts)
     settings = LinearOptions(
         kind=LinearKind(options.kind),
@@ -89,6 +87,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json is not None:
         write_json(options.json, {"record": str(options.record)} | found.to_json())
     if options.json != "-":
+        print(f"{loop.name}: {loop.summary}")
         _print(str(options.record), found)
     if found.status in (LinearStatus.NO_MODEL, LinearStatus.UNSTABLE):
         return 1

@@ -17,7 +17,6 @@ from stiction_ros.cli.intake import (
     intake_options,
     opened,
     show_loops,
-    tell,
 )
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
@@ -116,7 +115,6 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
 
 def _record(path: str, options: argparse.Namespace) -> Record:
     loop = opened(argparse.Namespace(**{**vars(options), "record": path}))
-    tell(loop)
     return longest_part([only_part(loop.parts, path)])
 
 

@@ -79,7 +79,6 @@ def run(options: argparse.Namespace) -> int:
     if options.dry_run:
         return show_loops([Path(options.record)], intake_options(options))
     loop = opened(options)
-    tell(loop)
     record, parts = longest_part(loop.parts), loop.parts
     settings = IdentificationOptions(
         method=options.method,
@@ -95,7 +94,10 @@ def run(options: argparse.Namespace) -> int:
     if options.json is not None:
         write_json(options.json, document)
     if options.json != "-":
+        print(f"{loop.name}: {loop.summary}")
         _print(document, found)
+    else:
+        tell(loop)
     if options.out is not None:
         from stiction_ros.report.record_report import report_record
 

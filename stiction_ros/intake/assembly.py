@@ -20,6 +20,7 @@ from stiction_ros.intake.repairs import (
     filled,
     in_order,
     with_times,
+    with_values,
     without_outliers,
 )
 from stiction_ros.intake.reported import is_reported, on_grid
@@ -38,6 +39,7 @@ class Found:
         blocks: its signals.
         named: whether a user said which column is what.
         op_unit: that a tag list says, None when it does not.
+        shared: whether other loops stand in the same rows.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Found:
     blocks: tuple[Block, ...]
     named: bool = False
     op_unit: OpUnit | None = None
+    shared: bool = False
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -61,6 +64,8 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     _refuse_incomplete(found)
     rules = Rules(options.strict)
     timed = [with_times(block, rules) for block in found.blocks]
+    if not options.as_given:
+        timed = [with_values(block, rules, shared=found.shared) for block in timed]
     block = joined([checked(one, rules) for one in timed])
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()

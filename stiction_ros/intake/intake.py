@@ -176,7 +176,7 @@ def _read(group: Sequence[_Table], options: IntakeOptions, tags: TagList | None)
         single = group[0].plan.shape is Shape.ONE
         unit = None if tags is None else tags.units.get(name)
         record = own[0].path.name if single else name
-        found = Found(name, record, own, group[0].plan.named, unit)
+        found = Found(name, record, own, group[0].plan.named, unit, not single)
         try:
             yield loop_of(found, options)
         except InputError as error:

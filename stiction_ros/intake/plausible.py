@@ -11,14 +11,11 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.tables.block import Block
 
-FOLLOWS = 0.9
+FOLLOWS = 0.75
 """Share of the moves of a controller's output that its law explains, at least."""
 
 LEADS = 0.35
 """How much more of them the law explains one way round than the other, at least."""
-
-NEAR = 0.2
-"""How far, as a share, a measurement stays from its set-point that the other one leaves."""
 
 EXAMINED = 20_000
 """Samples that are looked at."""
@@ -75,33 +72,25 @@ def in_percent(block: Block, given: OpUnit | None) -> tuple[Block, str, str]:
 def refuse_swapped(block: Block) -> None:
     """Raise when PV and OP look swapped.
 
-    With a set-point PV is the one that stays near it. Without one: in closed loop a controller's
-    output moves by K (Δe + T_s/T_i e), so that Δ of the output is explained by the measurement
-    and its Δ at the same sample, and not the other way round.
+    In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
+    measurement and its Δ at the same sample, and not the other way round. Rounding and
+    compression leave some of that. Of records with a set-point, and of exact controllers,
+    :mod:`stiction_ros.identification.input_checks` knows more.
 
     Raises:
-        InputError: PV and OP look swapped.
+        InputError: OP and PV look swapped.
     """
     op, pv = _only(block, "op"), _only(block, "pv")
-    if op is None or pv is None:
+    if op is None or pv is None or any(key.signal == "sp" for key in block.columns):
         return
-    sp = _only(block, "sp")
-    if sp is not None:
-        swapped = _by_set_point(op[1], pv[1], sp[1])
-        why = "the set-point goes with OP and not with PV"
-    else:
-        swapped = _explained(pv[1], op[1]) - _explained(op[1], pv[1]) > LEADS and (
-            _explained(pv[1], op[1]) > FOLLOWS
-        )
-        why = "PV moves as a controller's output would"
-    if swapped:
-        first, second = op[0], pv[0]
-        valve, output = (key.tag for key in block.columns if key.signal in ("op", "pv"))
+    right, wrong = _explained(op[1], pv[1]), _explained(pv[1], op[1])
+    if wrong > FOLLOWS and wrong - right > LEADS:
+        tags = {key.signal: key.tag for key in block.columns}
         raise InputError(
-            f"PV and OP look swapped: {why}",
+            f"OP and PV look swapped: {pv[0]} moves as a controller's output would, by {op[0]}",
             where=str(block.path),
-            fix=f"name them, --op {valve}={second} --pv {output}={first}, or as they are, "
-            f"--op {valve}={first} --pv {output}={second}",
+            fix=f"name them, --op {tags['op']}={pv[0]} --pv {tags['pv']}={op[0]}, or as they are, "
+            f"--op {tags['op']}={op[0]} --pv {tags['pv']}={pv[0]}",
         )
 
 
@@ -109,16 +98,6 @@ def _only(block: Block, signal: str) -> tuple[str, FloatArray] | None:
     """Return name and values of the one signal of its kind; None when there are others."""
     found = [column for key, column in block.columns.items() if key.signal == signal]
     return (found[0].name, found[0].values[:EXAMINED]) if len(found) == 1 else None
-
-
-def _by_set_point(op: FloatArray, pv: FloatArray, sp: FloatArray) -> bool:
-    there = np.isfinite(op) & np.isfinite(pv) & np.isfinite(sp)
-    if np.count_nonzero(there) < 30:
-        return False
-    far_op = float(np.median(np.abs(op[there] - sp[there])))
-    far_pv = float(np.median(np.abs(pv[there] - sp[there])))
-    reach = float(np.ptp(pv[there])) + float(np.ptp(op[there]))
-    return far_op < NEAR * far_pv and far_pv > 0.5 * reach
 
 
 def _explained(output: FloatArray, measured: FloatArray) -> float:

@@ -88,6 +88,27 @@ def with_times(block: Block, rules: Rules) -> Block:
     return block.rows(there)
 
 
+def with_values(block: Block, rules: Rules, *, shared: bool) -> Block:
+    """Return the rows in which OP, PV, SP or the stem has a value, be it a bad one.
+
+    Args:
+        block: as read.
+        rules: what is left out is noted there.
+        shared: whether other loops stand in the same rows, which then say nothing of this one.
+    """
+    columns = [column for key, column in block.columns.items() if key.signal != "mode"]
+    empty = np.all([column.blank for column in columns], axis=0)
+    if block.mask is not None:
+        empty &= block.mask != Quality.BAD
+    if not empty.any() or empty.all():
+        return block
+    if not shared:
+        row = int(np.argmax(empty))
+        note = f"{plural(int(empty.sum()), 'row')} without any value left out"
+        rules.tell(note, block, f"{block.place(row)} has no value")
+    return block.rows(~empty)
+
+
 def checked(block: Block, rules: Rules) -> Block:
     """Return the block with what is no number counted; strict, the first such cell is an error."""
     for key, column in block.columns.items():

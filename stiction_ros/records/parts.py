@@ -123,4 +123,5 @@ def joined(parts: Sequence[Record]) -> Record:
 def _moment(seconds: float) -> str:
     if not DATES < seconds < 2 * 10**9:
         return f"{seconds:.9g} s"
-    return datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC).isoformat(" ")[:23]
+    at = datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC).replace(tzinfo=None)
+    return at.isoformat(" ")[:23]

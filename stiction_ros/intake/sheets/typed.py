@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import functools
 import warnings
+import weakref
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -91,15 +93,49 @@ class ParquetSheet(Sheet):
             raise InputError(f"cannot be read ({said})", where=str(self.path)) from None
 
 
+class _Book:
+    """A workbook that its sheets share: what they have in common is read once."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import openpyxl
+        except ImportError:
+            raise InputError("needs openpyxl", where=str(path), fix=INSTALL) from None
+        self.path = path
+        with self.damage_told(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles and the like, which are not read
+            self.book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        weakref.finalize(self, self.book.close)
+
+    @contextlib.contextmanager
+    def damage_told(self) -> Iterator[None]:
+        """Turn what openpyxl raises into an InputError."""
+        try:
+            yield
+        except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"is no workbook ({error})", where=str(self.path)) from None
+
+    @contextlib.contextmanager
+    def rows(self, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
+        """Open a sheet; its rows with their numbers."""
+        with self.damage_told():
+            yield (
+                (line, [_text(value) for value in row])
+                for line, row in enumerate(self.book[title].iter_rows(values_only=True), start=1)
+            )
+
+
 def _workbook(path: Path) -> list[Sheet]:
-    with _opened(path) as book:
-        titles = [sheet.title for sheet in book.worksheets]
+    book = _Book(path)
+    titles = [sheet.title for sheet in book.book.worksheets]
     found: list[Sheet] = []
     refused: list[InputError] = []
     for title in titles:
-        name = stem(path) if len(titles) == 1 else f"{stem(path)}:{title}"
         try:
-            found.append(RowSheet(path, name, _rows_of(path, title), ""))
+            rows = functools.partial(book.rows, title)
+            found.append(RowSheet(path, f"{stem(path)}:{title}", rows, ""))
         except InputError as error:
             refused.append(error)
     if not found:
@@ -107,37 +143,6 @@ def _workbook(path: Path) -> list[Sheet]:
     if len(found) == 1:
         found[0].name = stem(path)
     return found
-
-
-def _rows_of(path: Path, title: str) -> Any:
-    @contextlib.contextmanager
-    def rows() -> Iterator[Iterator[tuple[int, list[str]]]]:
-        with _opened(path) as book:
-            sheet = book[title]
-            yield (
-                (line, [_text(value) for value in row])
-                for line, row in enumerate(sheet.iter_rows(values_only=True), start=1)
-            )
-
-    return rows
-
-
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    try:
-        import openpyxl
-    except ImportError:
-        raise InputError("needs openpyxl", where=str(path), fix=INSTALL) from None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of styles and the like, which are not read
-            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        try:
-            yield book
-        finally:
-            book.close()
-    except (zipfile.BadZipFile, KeyError, OSError) as error:
-        raise InputError(f"is no workbook ({error})", where=str(path)) from None
 
 
 def _text(value: Any) -> str:
