@@ -158,12 +158,20 @@ def _minutes(seconds: float) -> str:
 
 def _write(found: Any, out: Path, trends: Any) -> None:
     from stiction_ros.survey.pages.list_page import list_page
+    from stiction_ros.survey.pages.loop_page import with_trend
     from stiction_ros.survey.tables import write_csv, write_xlsx
 
     try:
         (out / PAGE).write_text(list_page(found, trends), encoding="utf-8")
         write_csv(out / CSV, found.entries)
         write_xlsx(out / XLSX, found.entries)
+        for entry in found.entries:
+            past = trends.get(entry.name)
+            if entry.report is not None and past:
+                now = [] if entry.f_s is None else [entry.f_s + entry.f_d]
+                page = out / entry.report
+                told = with_trend(page.read_text(encoding="utf-8"), [*past, *now])
+                page.write_text(told, encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", where=str(out)) from None
 

@@ -12,7 +12,7 @@ from made import GAIN, entry, identification, record
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
 from stiction_ros.survey.pages.list_page import list_page
-from stiction_ros.survey.pages.loop_page import loop_page
+from stiction_ros.survey.pages.loop_page import loop_page, with_trend
 from stiction_ros.survey.pages.plot import MOST, Curve, over_time
 from stiction_ros.survey.survey import Survey
 
@@ -154,6 +154,16 @@ def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
     points = [tuple(map(float, pair.split(","))) for line in lines for pair in line.split()]
     assert len(points) <= 1.2 * MOST
     assert min(y for _, y in points) < 0.1 * max(y for _, y in points)
+
+
+def test_a_trend_is_put_into_the_page_once(loop_file: Path) -> None:
+    page = loop_file.read_text(encoding="utf-8")
+    once = with_trend(page, [1.0, 2.0])
+    assert "Band f_S + f_D: 1, 2" in once
+    twice = with_trend(once, [1.0, 2.0, 3.5])
+    assert "Band f_S + f_D: 1, 2, 3.5" in twice
+    assert twice.count("Earlier surveys") == 1
+    assert twice.endswith(page[-2000:])
 
 
 def test_an_empty_survey_says_so() -> None:

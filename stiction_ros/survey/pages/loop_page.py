@@ -13,7 +13,7 @@ from stiction_ros.identification import Identification
 from stiction_ros.records.record import Record
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages.frame import card, framed, text
-from stiction_ros.survey.pages.plot import SCRIPT, Curve, against, over_time
+from stiction_ros.survey.pages.plot import SCRIPT, Curve, against, over_time, spark
 from stiction_ros.survey.pages.words import CAUSES, figure, interval, percent, period
 
 HEADLINES = {
@@ -31,8 +31,8 @@ OPTIONS = {
 }
 
 LIST = "../survey.html"
-TREND = "<!-- trend -->"
-"""Where the list puts how the loop did in earlier surveys."""
+TREND = "<!-- trend --><!-- /trend -->"
+"""Where it stands how the loop did in earlier surveys, which no worker knows."""
 
 
 def loop_page(
@@ -81,6 +81,23 @@ def loop_page(
         _notes(entry),
     ]
     return framed(f"{entry.name}: {headline}", parts, f"stiction_ros {__version__}", SCRIPT)
+
+
+def with_trend(page: str, bands: Sequence[float]) -> str:
+    """Return a page with the band of earlier surveys and of this one, the oldest first, in it.
+
+    Args:
+        page: HTML of a loop, with a trend or without.
+        bands: f_S + f_D, in the unit of OP.
+    """
+    begin, end = TREND.split("><")
+    begin, end = f"{begin}>", f"<{end}"
+    before, found, rest = page.partition(begin)
+    if not found:
+        return page
+    told = ", ".join(figure(band) for band in bands)
+    shown = f"<h2>Earlier surveys</h2><p>Band f_S + f_D: {told} {spark(bands)}</p>"
+    return f"{before}{begin}{shown}{end}{rest.partition(end)[2]}"
 
 
 def gain_table(gain: Mapping[str, Any] | None, unit: str) -> str:
