@@ -20,8 +20,10 @@ from stiction_ros.identification.closed_loop.cause import CauseKind
 from stiction_ros.identification.results import Identification, VerdictKind
 from stiction_ros.records.record import Record
 
-EMBEDDING_DRAWS = 3
-"""Draws under the embedding controller, which solves programmes at every sample."""
+HARDER = (1.0, 1.3, 1.6)
+"""Times the identified friction that the valve has under the embedding controller. The worst of these
+is given: a controller that plans every jump by the friction must also do with one that has grown, or
+was underestimated, before anything is promised of it."""
 
 EMBEDDING_SAMPLES = 1000
 """Samples of such a run, the last ones."""
@@ -58,7 +60,7 @@ class Option:
 
     Attributes:
         what: see :class:`What`.
-        measures: medians of the draws that repeat the record; None where it could not be simulated.
+        measures: medians of the draws that repeat the record, of the embedding the worst; None where it could not be simulated.
         interval: 5th and 95th percentile of each measure over the draws.
         note: one sentence.
         settings: weights of the embedding, factors of the retuning.
@@ -163,7 +165,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
     draws = Draws(frictions[kept], draws.tunings[kept])
     options = (
         _service(loop, draws, now),
-        _embedding(loop, draws),
+        _embedding(loop),
         _retune(loop, draws, found),
         left,
     )
@@ -241,17 +243,22 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
     return option_of(What.RETUNE, runs, note, settings)
 
 
-def _embedding(loop: RecordedLoop, draws: Draws) -> Option:
+def _embedding(loop: RecordedLoop) -> Option:
     if not _believed(loop):
         note = "No friction was found: there is nothing to embed."
         return Option(What.EMBEDDING, None, {}, note)
+    estimate = np.array([loop.estimate.static_friction, loop.estimate.dynamic_friction])
     try:
         design = EmbeddingDesign.of(loop)
-        runs = embedded(loop, design, draws.frictions[:EMBEDDING_DRAWS], EMBEDDING_SAMPLES)
+        runs = embedded(loop, design, np.outer(HARDER, estimate), EMBEDDING_SAMPLES)
     except InputError as error:
         return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
-    note = "Predictive control that knows the friction, on the identified process."
-    return option_of(What.EMBEDDING, runs, note, design.weights(loop.pv_scale, loop.op_scale))
+    note = "Predictive control that knows the friction; the worst of frictions up to 1.6 times it."
+    if None in runs:
+        return Option(What.EMBEDDING, None, {}, f"{note} The simulated loop grows without end.")
+    worst = max((run for run in runs if run is not None), key=lambda run: run.iae_per_hour)
+    option = option_of(What.EMBEDDING, runs, note, design.weights(loop.pv_scale, loop.op_scale))
+    return dataclasses.replace(option, measures=worst)
 
 
 def option_of(

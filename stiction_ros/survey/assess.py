@@ -150,7 +150,7 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
         band_share=valve["band_share"],
         travel_per_hour=travel / hours,
         reversals_per_hour=turns / hours,
-        confidence=confidence(valve, kind),
+        confidence=confidence(valve, kind, turns),
         notes=notes,
         beats=_beats(record, outputs.index(output), cycling),
     )

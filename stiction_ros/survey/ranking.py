@@ -11,7 +11,8 @@
    a loop without a figure stands as one that costs as much as most.
 
 *Confidence* in a friction that was found is the product of: how well its size is known (1 for a
-point, .5 for an interval as wide as twice its middle), whether the closed loop agrees (1 where it
+point, .5 for an interval as wide as twice its middle), how often it was seen (n/(n + 3) for a stem
+that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees (1 where it
 says the valve is the cause, .8 where it does not tell, .6 where it names another one), and how
 well the answer held still over variants of the record, where identification says that.
 """
@@ -38,12 +39,17 @@ HEALTHY = 0.9
 """Confidence in a healthy valve: friction that never had to slip is not seen."""
 
 
-def confidence(valve: Mapping[str, Any], cause: str | None) -> float:
+HALF_SEEN = 3.0
+"""Reversals of the stem from which a friction is half believed."""
+
+
+def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> float:
     """Return the confidence in a verdict, 0 to 1.
 
     Args:
         valve: entry of ``valves`` of ``identify --json``.
         cause: of the oscillation of its output.
+        reversals: of the estimated stem in the record.
     """
     stability = valve.get("stability")
     steady = float(stability) if isinstance(stability, int | float) else 1.0
@@ -54,7 +60,8 @@ def confidence(valve: Mapping[str, Any], cause: str | None) -> float:
         return HEALTHY * steady
     low, high = valve["f_s_interval"]
     known = 1.0 / (1.0 + (high - low) / max(high + low, 1e-12))
-    return float(known) * AGREES.get(cause or "unknown", DISAGREES) * steady
+    seen = reversals / (reversals + HALF_SEEN)
+    return float(known) * seen * AGREES.get(cause or "unknown", DISAGREES) * steady
 
 
 def kind(entry: Entry) -> int:

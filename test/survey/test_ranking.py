@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made import entry
@@ -65,9 +66,20 @@ def test_what_was_not_judged_stands_last() -> None:
 
 def test_confidence_falls_with_what_is_not_known() -> None:
     sure = {"verdict": "sticky", "f_s_interval": [1.9, 2.1]}
-    assert 0.9 < confidence(sure, "valve") <= 1.0
+    assert confidence(sure, "valve", 3) == pytest.approx(
+        0.5 * confidence(sure, "valve", 10**6), rel=1e-5
+    )
+    assert 0.9 < confidence(sure, "valve", 10**6) <= 1.0
     wide = {**sure, "f_s_interval": [0.0, 4.0]}
-    assert confidence(wide, "valve") == 0.5
-    assert confidence(sure, "disturbance") < confidence(sure, "none") < confidence(sure, "valve")
-    assert confidence({**sure, "stability": 0.5}, "valve") == 0.5 * confidence(sure, "valve")
-    assert confidence({**sure, "verdict": "undecided"}, "valve") < confidence(wide, "valve")
+    assert confidence(wide, "valve", 10**6) == pytest.approx(0.5, rel=1e-5)
+    assert (
+        confidence(sure, "disturbance", 10**6)
+        < confidence(sure, "none", 10**6)
+        < confidence(sure, "valve", 10**6)
+    )
+    assert confidence({**sure, "stability": 0.5}, "valve", 10**6) == 0.5 * confidence(
+        sure, "valve", 10**6
+    )
+    assert confidence({**sure, "verdict": "undecided"}, "valve", 10**6) < confidence(
+        wide, "valve", 10**6
+    )
