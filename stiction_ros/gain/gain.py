@@ -21,9 +21,9 @@ from stiction_ros.identification.results import Identification, VerdictKind
 from stiction_ros.records.record import Record
 
 HARDER = (1.0, 1.3, 1.6)
-"""Times the identified friction that the valve has under the embedding controller. The worst of these
-is given: a controller that plans every jump by the friction must also do with one that has grown, or
-was underestimated, before anything is promised of it."""
+"""Times the identified friction that the valve has under the embedding controller. The worst of
+these is given: a controller that plans every jump by the friction must also do with one that has
+grown, or was underestimated, before anything is promised of it."""
 
 EMBEDDING_SAMPLES = 1000
 """Samples of such a run, the last ones."""
@@ -60,7 +60,8 @@ class Option:
 
     Attributes:
         what: see :class:`What`.
-        measures: medians of the draws that repeat the record, of the embedding the worst; None where it could not be simulated.
+        measures: medians of the draws that repeat the record, of the embedding the worst; None
+            where it could not be simulated.
         interval: 5th and 95th percentile of each measure over the draws.
         note: one sentence.
         settings: weights of the embedding, factors of the retuning.

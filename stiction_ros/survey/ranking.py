@@ -12,9 +12,10 @@
 
 *Confidence* in a friction that was found is the product of: how well its size is known (1 for a
 point, .5 for an interval as wide as twice its middle), how often it was seen (n/(n + 3) for a stem
-that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees (1 where it
-says the valve is the cause, .8 where it does not tell, .6 where it names another one), and how
-well the answer held still over variants of the record, where identification says that.
+that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees
+(1 where it says the valve is the cause, .8 where it does not tell, .6 where it names another
+one), and how well the answer held still over variants of the record, where identification says
+that.
 """
 
 from __future__ import annotations
