@@ -15,7 +15,7 @@ from stiction_ros.cli.bench_field import FIRST, LAST
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import run_seeds
 from stiction_ros.errors import InputError
-from stiction_ros.field.again import Again, Sampled
+from stiction_ros.field.counterfactual.again import Again, Sampled
 from stiction_ros.gain.embedding import EmbeddingDesign, EmbeddingRun
 from stiction_ros.gain.gain import Gain, What, gain_of
 from stiction_ros.gain.measures import Measures
