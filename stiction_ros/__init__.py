@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from stiction_ros.identification.options import IdentificationOptions as IdentificationOptions
     from stiction_ros.identification.results import Identification as Identification
     from stiction_ros.identification.results import VerdictKind as VerdictKind
+    from stiction_ros.intake.options import CsvColumns as CsvColumns
+    from stiction_ros.intake.record_file import read as read
     from stiction_ros.loop.closed_loop import simulate as simulate
     from stiction_ros.loop.closed_loop import simulate_closed_loop as simulate_closed_loop
     from stiction_ros.loop.excitation import prbs_experiment as prbs_experiment
@@ -53,9 +55,7 @@ if TYPE_CHECKING:
     from stiction_ros.online.session import LiveRun as LiveRun
     from stiction_ros.online.session import Scenario as Scenario
     from stiction_ros.online.session import run_live as run_live
-    from stiction_ros.records.csv_file import CsvColumns as CsvColumns
     from stiction_ros.records.csv_writer import write_csv as write_csv
-    from stiction_ros.records.open_record import read as read
     from stiction_ros.records.record import Record as Record
     from stiction_ros.records.record_to_bag import write_bag as write_bag
     from stiction_ros.report.record_report import report_record as report_record
@@ -67,7 +67,7 @@ _HOMES = {
     "Behaviour": "effects.behaviour",
     "ControlMode": "control.result",
     "ControlSettings": "control.settings",
-    "CsvColumns": "records.csv_file",
+    "CsvColumns": "intake.options",
     "Discrepancy": "discrepancy.results",
     "GapOptions": "discrepancy.options",
     "GapVerdict": "discrepancy.decide",
@@ -91,7 +91,7 @@ _HOMES = {
     "fit_linear": "identification.linear_fit",
     "identify": "identification.methods",
     "prbs_experiment": "loop.excitation",
-    "read": "records.open_record",
+    "read": "intake.record_file",
     "report_record": "report.record_report",
     "run_live": "online.session",
     "simulate": "loop.closed_loop",

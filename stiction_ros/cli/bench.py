@@ -23,6 +23,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "identification": ("repeat", "seed", "longest", "quick"),
     "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
     "field": ("seeds", "method", "jobs"),
+    "gain": ("seeds", "jobs"),
     "stability": ("seeds", "method", "data", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
@@ -35,7 +36,8 @@ def add(commands: Any) -> None:
         help="measure speed, side by side",
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap), how often "
-        "identification is (field), and whether its answers hold still (stability).",
+        "identification is (field), whether its answers hold still (stability), and whether what "
+        "gain promises comes about (gain).",
     )
     parser.add_argument(
         "name",
@@ -162,6 +164,12 @@ def _number(value: float) -> str:
     return f"{value:.3f}" if value < 100.0 else f"{value:.0f}"
 
 
+def _gain(options: argparse.Namespace, machine: str) -> int:
+    from stiction_ros.cli import bench_gain
+
+    return bench_gain.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -171,5 +179,6 @@ BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
 
 COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
+    "gain": _gain,
     "stability": bench_stability.run,
 }

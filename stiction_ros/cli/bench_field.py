@@ -288,7 +288,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that this benchmark shares with ``stability``."""
     from stiction_ros.cli.seeds import seed_range
 
-    group = parser.add_argument_group("field and stability; --jobs also for both")
+    group = parser.add_argument_group("field and stability; --seeds also for gain, --jobs for all")
     group.add_argument(
         "--seeds", type=seed_range, metavar="A:B", help=f"of the field's loops ({FIRST}:{LAST})"
     )

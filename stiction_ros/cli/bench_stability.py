@@ -27,8 +27,7 @@ from stiction_ros.cli.bench_field import (
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import run_each
 from stiction_ros.errors import InputError
-from stiction_ros.records.csv_file import CsvColumns
-from stiction_ros.records.open_record import open_parts
+from stiction_ros.intake.record_file import CsvColumns, open_parts
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 

@@ -7,13 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.identify import add_columns, columns
+from stiction_ros.cli.intake import add_columns, add_intake, intake_options, opened, show_loops
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag_reader import read_bag_parts
-from stiction_ros.records.csv_file import CsvColumns, read_csv_parts
 from stiction_ros.records.csv_writer import write_csv
-from stiction_ros.records.open_record import is_bag
-from stiction_ros.records.record import Record
 from stiction_ros.records.record_to_bag import write_bag
 
 
@@ -30,6 +26,7 @@ def add(commands: Any) -> None:
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     parser.add_argument("out", metavar="OUT", help="F.csv, or the directory of a new bag")
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument(
         "--iso", action="store_true", help="time stamps in ISO 8601 (UTC) in a CSV file"
     )
@@ -42,7 +39,9 @@ def run(options: argparse.Namespace) -> int:
     to_csv = out.suffix.lower() == ".csv"
     if options.iso and not to_csv:
         raise InputError("is for CSV files", where="--iso", fix="let OUT end in .csv")
-    records = _read(options)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    records = opened(options).parts
     for number, record in enumerate(records, start=1):
         target = out if len(records) == 1 else out.with_name(f"{out.stem}_{number}{out.suffix}")
         print(f"{target}: {len(record)} samples of {record.sample_time:g} s", file=sys.stderr)
@@ -53,18 +52,3 @@ def run(options: argparse.Namespace) -> int:
         else:
             write_bag(record, target)
     return 0
-
-
-def _read(options: argparse.Namespace) -> tuple[Record, ...]:
-    chosen = columns(options)
-    if not is_bag(options.record):
-        if options.namespace is not None:
-            raise InputError("is for bags", where="--namespace", fix="leave it out")
-        return read_csv_parts(options.record, chosen)
-    if chosen != CsvColumns():
-        raise InputError(
-            "is a bag, which has no columns",
-            where=str(options.record),
-            fix="leave --op, --pv, --sp, --stem and --time out",
-        )
-    return read_bag_parts(options.record, namespace=options.namespace)

@@ -11,10 +11,18 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli import choices
-from stiction_ros.cli.identify import add_columns, delay_range, opened
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+)
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
+from stiction_ros.records.parts import longest_part
 
 if TYPE_CHECKING:
     from stiction_ros.identification.linear_result import LinearIdentification
@@ -30,6 +38,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument(
         "--kind", default="state_space", choices=choices.LINEAR_KINDS, help="(state_space)"
     )
@@ -57,7 +66,10 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record, _ = opened(options)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    loop = opened(options)
+    record = longest_part(loop.parts)
     from stiction_ros.identification.linear_data import LinearKind, LinearStatus, OrderCriterion
     from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
     from stiction_ros.identification.subspace_projection import SubspaceMethod
@@ -77,6 +89,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json is not None:
         write_json(options.json, {"record": str(options.record)} | found.to_json())
     if options.json != "-":
+        print(f"{loop.name}: {loop.summary}")
         _print(str(options.record), found)
     if found.status in (LinearStatus.NO_MODEL, LinearStatus.UNSTABLE):
         return 1

@@ -10,13 +10,20 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.identify import add_columns, columns, delay_range
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+)
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-from stiction_ros.records.open_record import open_record
+from stiction_ros.records.parts import longest_part, only_part
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
@@ -46,6 +53,7 @@ def add(commands: Any) -> None:
         help="MODEL RECORD…; with --fit-linear RECORD… alone (CSV files or bags)",
     )
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument(
         "--fit-linear",
         action="store_true",
@@ -73,6 +81,9 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    if options.dry_run:
+        records = options.inputs if options.fit_linear else options.inputs[1:]
+        return show_loops([Path(path) for path in records], intake_options(options))
     model, records = _inputs(options)
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 
@@ -91,9 +102,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
-    chosen = columns(options)
     if options.fit_linear:
-        records = [open_record(path, chosen) for path in options.inputs]
+        records = [_record(path, options) for path in options.inputs]
         from stiction_ros.discrepancy.first_model import first_model
 
         return first_model(records, options.delay), records
@@ -104,7 +114,12 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
             fix="write stiction gap MODEL RECORD, or --fit-linear RECORD without a model",
         )
     model = LoopModel.load(options.inputs[0])
-    return model, [open_record(path, chosen) for path in options.inputs[1:]]
+    return model, [_record(path, options) for path in options.inputs[1:]]
+
+
+def _record(path: str, options: argparse.Namespace) -> Record:
+    loop = opened(argparse.Namespace(**{**vars(options), "record": path}))
+    return longest_part([only_part(loop.parts, path)])
 
 
 def _write(found: Discrepancy, directory: Path) -> None:

@@ -12,13 +12,18 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli import choices
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
-from stiction_ros.records.csv_file import CsvColumns
-from stiction_ros.records.open_record import open_parts
 from stiction_ros.records.parts import longest_part
-from stiction_ros.records.record import Record
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification
@@ -34,8 +39,9 @@ def add(commands: Any) -> None:
         "controller output and measurement, and say which valve sticks. Of a record with gaps "
         "or of several runs the longest good part is taken.",
     )
-    parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
+    parser.add_argument("record", metavar="RECORD", help="CSV file, other export, or bag")
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: by BIC)")
     parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
     parser.add_argument(
@@ -61,44 +67,6 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def add_columns(parser: argparse.ArgumentParser) -> None:
-    """Add the options that name the columns of a CSV file, or the loop in a bag."""
-    group = parser.add_argument_group(
-        "columns of a CSV file (default: t, OP, PV[, SP][, STEM])",
-        "A file that stiction wrote needs none of these: its TAG.OP, TAG.PV … are recognised.",
-    )
-    for option, text in (
-        ("op", "controller output of a valve"),
-        ("pv", "process variable"),
-        ("sp", "set-point of a process variable"),
-        ("stem", "true stem position of a valve"),
-    ):
-        group.add_argument(
-            f"--{option}", action="append", type=_pair, default=[], metavar="TAG=COL", help=text
-        )
-    group.add_argument("--time", metavar="COL", help="seconds or ISO time stamps")
-    parser.add_argument(
-        "--namespace", metavar="NS", help="of the loop's topics, for a bag that holds several loops"
-    )
-
-
-def columns(options: argparse.Namespace) -> CsvColumns:
-    """Return the chosen columns."""
-    chosen: dict[str, Any] = {}
-    for key in ("op", "pv", "sp", "stem"):
-        if getattr(options, key):
-            chosen[key] = dict(getattr(options, key))
-    if options.time is not None:
-        chosen["time"] = options.time
-    return CsvColumns(**chosen)
-
-
-def opened(options: argparse.Namespace) -> tuple[Record, tuple[Record, ...]]:
-    """Return the longest good part of the record that the command line names, and all parts."""
-    parts = open_parts(options.record, columns(options), namespace=options.namespace)
-    return longest_part(parts), parts
-
-
 def delay_range(text: str) -> tuple[int, int]:
     """Return ``LO:HI`` (or one number) as a range."""
     low, _, high = text.partition(":")
@@ -110,7 +78,10 @@ def delay_range(text: str) -> tuple[int, int]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    record, parts = opened(options)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    loop = opened(options)
+    record, parts = longest_part(loop.parts), loop.parts
     from stiction_ros.identification import IdentificationOptions, identify
 
     settings = IdentificationOptions(
@@ -127,7 +98,10 @@ def run(options: argparse.Namespace) -> int:
     if options.json is not None:
         write_json(options.json, document)
     if options.json != "-":
+        print(f"{loop.name}: {loop.summary}")
         _print(document, found)
+    else:
+        tell(loop)
     if options.out is not None:
         from stiction_ros.report.record_report import report_record
 
@@ -200,10 +174,3 @@ def _cause(cause: Cause) -> str:
         f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.1f}, "
         f"amplitude {cause.amplitude:.3g}. {cause.sentence}"
     )
-
-
-def _pair(text: str) -> tuple[str, str]:
-    tag, sign, column = text.partition("=")
-    if not sign or not tag or not column:
-        raise argparse.ArgumentTypeError(f"{text!r} is not TAG=COL")
-    return tag, column

@@ -6,9 +6,17 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.identify import add_columns, opened
+from stiction_ros.cli.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
 from stiction_ros.errors import InputError
-from stiction_ros.records.open_record import is_bag
+from stiction_ros.intake.intake import is_bag
+from stiction_ros.records.parts import longest_part
 
 
 def add(commands: Any) -> None:
@@ -20,6 +28,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
     add_columns(parser)
+    add_intake(parser)
     parser.add_argument(
         "--out",
         default="report.html",
@@ -40,13 +49,17 @@ def holds_live_run(path: str) -> bool:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     out = Path(options.out)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
     try:
         if is_bag(options.record) and holds_live_run(options.record):
             from stiction_ros.report.run_report import report_run
 
             print(report_run(options.record, out, namespace=options.namespace).page)
         else:
-            record, parts = opened(options)
+            loop = opened(options)
+            tell(loop)
+            record, parts = longest_part(loop.parts), loop.parts
             from stiction_ros.identification import IdentificationOptions, identify
             from stiction_ros.report.record_report import report_record
 

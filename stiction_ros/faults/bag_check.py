@@ -7,8 +7,8 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.faults.observation import BagFound, Sampled
+from stiction_ros.intake.record_file import open_parts
 from stiction_ros.records.bag_messages import read_messages, stamp_ns
-from stiction_ros.records.open_record import open_parts
 
 COMPARED = ("pv", "op_applied")
 

@@ -81,6 +81,17 @@ def field_loop(seed: int) -> FieldLoop:
     Raises:
         InputError: a negative seed.
     """
+    made, loop = drawn(seed)
+    truth = dataclasses.replace(loop.truth, causes=_causes(made))
+    return dataclasses.replace(loop, truth=truth)
+
+
+def drawn(seed: int) -> tuple[Made, FieldLoop]:
+    """Return what the loop of a seed is made of, and the loop but for what makes it cycle.
+
+    Raises:
+        InputError: a negative seed.
+    """
     if seed < 0:
         raise InputError(f"{seed} is negative", where="seed", fix="use 0 or more")
     circumstances = draw_circumstances(np.random.default_rng([seed, 0]))
@@ -99,9 +110,7 @@ def field_loop(seed: int) -> FieldLoop:
             break
         shrink *= _correction(circumstances, loop)
     assert best is not None, f"no loop of seed {seed} is finite"
-    made, loop = best
-    truth = dataclasses.replace(loop.truth, causes=_causes(made))
-    return dataclasses.replace(loop, truth=truth)
+    return best
 
 
 class Fit(enum.IntEnum):

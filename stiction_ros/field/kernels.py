@@ -315,3 +315,41 @@ def run_loop(
         out[0, k], out[1, k], out[2, k], out[3, k] = op, measured, stem, clean
         plant_step(kind, parameters, state, arriving, load[k], h, work)
     return out
+
+
+@compiled
+def run_held(
+    valve: tuple[int, FloatArray, FloatArray],
+    plant: tuple[int, FloatArray, FloatArray],
+    clock: tuple[float, int],
+    waiting: FloatArray,
+    op: float,
+    load: FloatArray,
+) -> tuple[float, float]:
+    """Run valve and plant under one OP; states of stem and plant and ``waiting`` go on in place.
+
+    Args:
+        valve: law, its parameters, the stem's state.
+        plant: kind, its parameters, its state.
+        clock: step (s), steps before the first of these.
+        waiting: stems on their way through the dead time, in a ring, shape (dead + 1,).
+        op: %.
+        load: at each step, shape (K,).
+
+    Returns:
+        Stem after the first step, and PV without noise after the last one.
+    """
+    law, friction, stem_state = valve
+    kind, parameters, state = plant
+    h, begun = clock
+    work = np.zeros((3, PLANT_STATES))
+    first = stem_state[0]
+    for k in range(len(load)):
+        stem = stem_step(law, friction, stem_state, op, h)
+        if k == 0:
+            first = stem
+        at = (begun + k) % len(waiting)
+        waiting[at] = stem
+        arriving = waiting[(at + 1) % len(waiting)]
+        plant_step(kind, parameters, state, arriving, load[k], h, work)
+    return first, plant_output(kind, state)

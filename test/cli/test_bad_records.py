@@ -56,10 +56,10 @@ def same(rows: Rows) -> Rows:
     ("spoil", "options", "words"),
     [
         (constant_op, (), "op of V1 is constant"),
-        (gap_of_nan, (), "not a finite number in line 102"),
+        (gap_of_nan, ("--strict",), "not a finite number in line 102"),
         (twenty, (), "20 samples are too few"),
-        (irregular, (), "time is irregular"),
-        (text, (), "'Bad', not a number in line 52"),
+        (irregular, ("--strict",), "time is irregular"),
+        (text, ("--strict",), "'Bad', not a number in line 52"),
         (swapped, (), "OP and PV look swapped"),
         (same, ("--delay", "0:390"), "samples are too few"),
     ],

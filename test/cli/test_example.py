@@ -11,7 +11,7 @@ import pytest
 
 from stiction_ros.cli.main import main
 from stiction_ros.examples import example1
-from stiction_ros.records.csv_file import read_csv
+from stiction_ros.intake.record_file import read_csv
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from bag_cutting import cut_bag
 
 from stiction_ros.cli.main import main
-from stiction_ros.records.open_record import open_record
+from stiction_ros.intake.record_file import open_record
 from stiction_ros.records.run_log import read_run
 
 BAGS = Path(__file__).parents[2] / "bags"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.examples import FAMILIES, NOISES, PLANTS, example1, example2, healthy_loop
 from stiction_ros.identification.input_checks import Evidence, SwapRule, swapped_columns
-from stiction_ros.records.csv_file import read_csv
+from stiction_ros.intake.record_file import read_csv
 from stiction_ros.records.record import Record
 
 DATA = pathlib.Path(__file__).resolve().parents[3] / "shared" / "data"

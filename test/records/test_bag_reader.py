@@ -10,10 +10,9 @@ from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stiction_ros.errors import InputError
+from stiction_ros.intake.record_file import CsvColumns, open_record
 from stiction_ros.records.bag_messages import read_messages, read_raw
 from stiction_ros.records.bag_reader import read_bag, read_bag_parts
-from stiction_ros.records.csv_file import CsvColumns
-from stiction_ros.records.open_record import open_record
 
 
 def closed(bag: Bag) -> Path:

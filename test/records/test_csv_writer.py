@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
+from stiction_ros.intake.record_file import read_csv
 from stiction_ros.records import Record
-from stiction_ros.records.csv_file import read_csv
 from stiction_ros.records.csv_writer import write_csv
 
 

@@ -10,7 +10,7 @@ from bag_making import SECOND, Bag, joint_state
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
-from stiction_ros.records.open_record import open_record
+from stiction_ros.intake.record_file import open_record
 from stiction_ros.records.run_log import read_run
 
 

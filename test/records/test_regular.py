@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.csv_file import read_csv, read_csv_parts
+from stiction_ros.intake.record_file import read_csv, read_csv_parts
 from stiction_ros.records.record import Record
 from stiction_ros.records.regular import regular_part, split_at_gaps
 

@@ -1,20 +1,26 @@
-"""Opens a record, whatever it is kept in."""
+"""One record from one file, as it is: nothing is repaired but jitter and short holes in time."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from stiction_ros.errors import InputError
+from stiction_ros.intake.intake import is_bag, one_loop
+from stiction_ros.intake.options import CsvColumns, IntakeOptions
 from stiction_ros.records.bag_reader import read_bag_parts
-from stiction_ros.records.csv_file import CsvColumns, read_csv_parts
 from stiction_ros.records.parts import longest_part, only_part
 from stiction_ros.records.record import Record
 
-
-def is_bag(path: str | Path) -> bool:
-    """Tell whether ``path`` is a bag: a directory or a ``.mcap`` file."""
-    path = Path(path)
-    return path.is_dir() or path.suffix.lower() == ".mcap"
+__all__ = [
+    "CsvColumns",
+    "is_bag",
+    "open_parts",
+    "open_record",
+    "read",
+    "read_csv",
+    "read_csv_parts",
+]
 
 
 def read(
@@ -23,11 +29,11 @@ def read(
     *,
     namespace: str | None = None,
 ) -> Record:
-    """Read a record from a CSV file or a bag: of one with gaps the longest good part.
+    """Read a record from an export or a bag: of one with gaps the longest good part.
 
     Args:
-        path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
-        columns: which column is what, for CSV files only; None of them for t, OP, PV, SP, STEM.
+        path: a CSV file or another export of one loop, a rosbag2 directory or a ``.mcap`` file.
+        columns: which column is what, for files only; None of them for t, OP, PV, SP, STEM.
         namespace: of the loop's topics, for bags that hold several loops.
 
     Returns:
@@ -35,7 +41,7 @@ def read(
         left out or mended stands in its ``notes``.
 
     Raises:
-        InputError: as :func:`open_parts`; no good samples.
+        InputError: no such file or column, columns that cannot be told apart, no good samples.
 
     Examples:
         >>> from stiction_ros import LoopModel, find_config, read, simulate, write_csv
@@ -44,7 +50,57 @@ def read(
         >>> len(record), record.valves, record.sample_time
         (9, ('V1',), 1.0)
     """
-    return longest_part(open_parts(path, columns, namespace=namespace))
+    options = IntakeOptions(columns=columns, namespace=namespace)
+    return longest_part(one_loop(Path(path), options).parts)
+
+
+def read_csv(
+    path: str | Path,
+    *,
+    op: Mapping[str, str] | None = None,
+    pv: Mapping[str, str] | None = None,
+    sp: Mapping[str, str] | None = None,
+    stem: Mapping[str, str] | None = None,
+    time: str | None = None,
+) -> Record:
+    """Read a table with a header: CSV, packed or not, workbook, Parquet.
+
+    Times are taken in seconds or as dates (those without a zone as UTC), OP in its own unit.
+    Other columns are ignored, but for MODE and the qualities that
+    :func:`stiction_ros.records.csv_writer.write_csv` writes. With semicolons or tabs the decimal
+    sign may be a comma.
+
+    Args:
+        path: the file.
+        op: see :class:`CsvColumns`, as the others.
+        pv: …
+        sp: …
+        stem: …
+        time: …
+
+    Raises:
+        InputError: no such file or column; a cell that is empty, not a number or not
+            finite; time that does not increase, is irregular or has gaps; fewer than two
+            rows.
+    """
+    return only_part(read_csv_parts(path, CsvColumns(op, pv, sp, stem, time)), str(path))
+
+
+def read_csv_parts(
+    path: str | Path,
+    columns: CsvColumns = CsvColumns(),  # noqa: B008 (frozen)
+) -> tuple[Record, ...]:
+    """Read a table as :func:`read_csv` does, split where it has gaps.
+
+    A step of more than 5.5 usual ones is a gap. Slightly irregular samples are brought onto a
+    regular grid, see :func:`stiction_ros.records.regular.regular_part`; the notes of each
+    record say what was done.
+
+    Raises:
+        InputError: as :func:`read_csv` but for gaps.
+    """
+    options = IntakeOptions(columns=columns, strict=True, as_given=True)
+    return one_loop(Path(path), options).parts
 
 
 def open_record(
@@ -83,7 +139,7 @@ def open_parts(
         InputError: as :func:`read_csv_parts` and :func:`read_bag_parts`; columns given for a
             bag, a namespace given for a CSV file.
     """
-    if is_bag(path):
+    if is_bag(path) or Path(path).is_dir():
         if columns != CsvColumns():
             raise InputError(
                 "is a bag, which has no columns",

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.csv_file import read_csv
-from stiction_ros.records.open_record import open_record
+from stiction_ros.intake.record_file import open_record, read_csv
 from stiction_ros.records.record import Record
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

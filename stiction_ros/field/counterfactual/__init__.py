@@ -1,0 +1,1 @@
+"""Loops of the field run again with something changed: what would have been."""

@@ -1,0 +1,283 @@
+r"""The loop under the controller that knows the friction, and the one rule for its weights.
+
+All weights follow from the identified loop, in units of OP's and PV's own movement:
+
+- the horizon reaches to where 95 % of a step's response have come, 20 to 60 samples;
+- the output's weight is 1, and on a move of the stem :math:`S = \rho g^2` with g the response soon
+  after a step, see ``ANSWERED``: what the controller waits for longer it need not answer faster;
+- the price of a jump is what the output's noise costs over the samples of ``PRICED``: what is no
+  more than noise is not worth a slip;
+- the observer's variances of noise and of a wandering load are those of the load's own moves:
+  white noise of variance r on a random walk of variance q makes moves of variance q + 2 r of
+  which neighbours have the covariance −r;
+- the jumps' margin comes from the intervals of the frictions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.control import ControlMode, ControlSettings, FrictionSpread, MpcController
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.gain.measures import Measures
+from stiction_ros.gain.recorded_loop import RecordedLoop
+from stiction_ros.loop import LoopModel
+
+MOVE_SHARE = 2.0
+"""ρ: moves of the stem against what they do to PV."""
+
+ANSWERED = 5
+"""Samples, besides the dead time, after which g is read: what the controller gets back soon."""
+
+PRICED = 4.0
+"""Samples of noise that a jump must be worth."""
+
+SHORTEST, LONGEST = 20, 60
+"""Samples of the horizon."""
+
+SETTLED = 0.95
+"""Share of a step's response that the horizon reaches to."""
+
+STARTED = 1e-3
+"""Share of its largest value from which a step's response has begun."""
+
+LEAST_NOISE = 0.02
+"""Standard deviation of the noise that is taken at least, in those of PV."""
+
+LEAST_WALK = 1e-4
+"""Variance of the wandering load over that of the noise, at least."""
+
+STEM_NOISE = 0.1
+"""Standard deviation of the stem's own noise over f_S."""
+
+
+@dataclasses.dataclass(frozen=True)
+class EmbeddingDesign:
+    """What the controller of one loop is built from.
+
+    Attributes:
+        model: of the process, its valve without friction.
+        settings: weights and observer.
+        friction: f_S and f_D.
+        spread: half-widths of their intervals; None where they are known.
+    """
+
+    model: LoopModel
+    settings: ControlSettings
+    friction: HeStiction
+    spread: FrictionSpread | None
+
+    @classmethod
+    def of(cls, loop: RecordedLoop) -> EmbeddingDesign:
+        """Return the design by the rule for a recorded loop, scaled.
+
+        Raises:
+            InputError: the process does not let a controller be designed.
+        """
+        i, j, process = loop.output, loop.valve, loop.process
+        estimate, scale = loop.estimate, loop.op_scale
+        limits = [float(end) for end in loop.law.limits]
+        valve: dict[str, Any] = {"name": "V", "effects": []}
+        if np.isfinite(limits).all():
+            valve["limits"] = limits
+        output = {
+            "name": "Y",
+            "a": process.a[i].tolist(),
+            "b": {"V": process.b[i, j].tolist()},
+            "delay": {"V": int(process.delay[i, j])},
+            "bias": 0.0,
+        }
+        model = LoopModel.from_mapping(
+            {
+                "loop": "identified",
+                "sample_time": loop.record.sample_time,
+                "valves": [valve],
+                "process": {"kind": "arx", "outputs": [output]},
+            },
+            loop.record.name,
+        )
+        friction = HeStiction(estimate.static_friction / scale, estimate.dynamic_friction / scale)
+        spread = FrictionSpread(
+            0.5 * float(np.ptp(estimate.static_interval)) / scale,
+            0.5 * float(np.ptp(estimate.dynamic_interval)) / scale,
+        )
+        noise, walk = _variances(loop.load[:, i])
+        return cls.by_rule(model, friction, spread, (noise, walk))
+
+    @classmethod
+    def by_rule(
+        cls,
+        model: LoopModel,
+        friction: HeStiction,
+        spread: FrictionSpread | None,
+        variances: tuple[float, float],
+    ) -> EmbeddingDesign:
+        """Return the design by the rule; every unit is that of the model.
+
+        Args:
+            model: one valve and one output, the valve without friction.
+            friction: of the valve.
+            spread: half-widths of the intervals of its frictions; None where they are known.
+            variances: of the output's noise, and of a sample's move of its wandering load.
+        """
+        response, soon = _response(model)
+        gain = float(response[soon])
+        noise, walk = variances
+        settings = ControlSettings(
+            horizon=int(np.clip(_settled(response), SHORTEST, LONGEST)),
+            output_weights=(1.0,),
+            move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
+            embedding_move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
+            state_noise=(STEM_NOISE * friction.static_friction) ** 2,
+            disturbance_noise=(walk,),
+            measurement_noise=(noise,),
+            jump_price=PRICED * noise,
+        )
+        return cls(model, settings, friction, spread)
+
+    def controller(self) -> MpcController:
+        """Return a new controller.
+
+        Raises:
+            InputError: it cannot be set up for this process.
+        """
+        design = self.settings.design(self.model)
+        return MpcController(design, ControlMode.EMBEDDING, [self.friction], [self.spread])
+
+    def weights(self, pv_scale: float = 1.0, op_scale: float = 1.0) -> dict[str, float]:
+        """Return the weights as a controller node takes them, in engineering units and %.
+
+        Args:
+            pv_scale: engineering units of a PV of 1 of the model.
+            op_scale: % of an OP of 1 of the model.
+        """
+        settings, pv, op = self.settings, pv_scale**2, op_scale**2
+        return {
+            "horizon": float(settings.horizon),
+            "output_weights": 1.0 / pv,
+            "embedding_move_weights": settings.embedding_move_weights[0] / op,
+            "jump_price": settings.jump_price,
+            "state_noise": settings.state_noise * op,
+            "disturbance_noise": settings.disturbance_noise[0] * pv,
+            "measurement_noise": settings.measurement_noise[0] * pv,
+        }
+
+
+class EmbeddingRun:
+    """One run of a controller that answers sample by sample, scaled."""
+
+    def __init__(self, design: EmbeddingDesign) -> None:
+        """Begin before the first sample."""
+        self.controller = design.controller()
+        self._no_dv: FloatArray = np.zeros(0)
+
+    def __call__(self, pv: float, sp: float, op: float) -> float:
+        """Return OP for PV and SP; ``op`` is what was applied before."""
+        step = self.controller.step(np.array([pv]), np.array([sp]), self._no_dv, np.array([op]))
+        return float(step.op[0])
+
+
+def embedded(
+    loop: RecordedLoop, design: EmbeddingDesign, frictions: FloatArray, samples: int
+) -> list[Measures | None]:
+    """Return the measures under the controller, with each friction of the valve.
+
+    Args:
+        loop: whose process and load act.
+        design: of the controller, which keeps the friction of the estimate.
+        frictions: (f_S, f_D) of the valve, %, shape (R, 2).
+        samples: that are run, the last ones of the loop's rows.
+    """
+    return [_embedded(loop, design, pair / loop.op_scale, samples) for pair in frictions]
+
+
+def _embedded(
+    loop: RecordedLoop, design: EmbeddingDesign, friction: FloatArray, samples: int
+) -> Measures | None:
+    i, j, process = loop.output, loop.valve, loop.process
+    past = loop.past
+    a, b, delay = process.a[i], process.b[i, j], int(process.delay[i, j])
+    begin = max(loop.rows[1] - samples, loop.rows[0])
+    rows = np.arange(begin, loop.rows[1])
+    load = loop.loop.pv[:, i] - loop.simulated[:, i]
+    others = process.bias[i] + _others(loop)
+    sp = loop.set_points[:, i]
+    first = loop.rows[0] - past
+    y = np.empty(past + len(rows))
+    stem = np.empty(past + len(rows))
+    y[:past] = loop.simulated[begin - past : begin, i]
+    stem[:past] = loop.loop.stem[begin - past : begin, j]
+    op, at = float(loop.loop.op[begin - 1, j]), float(stem[past - 1])
+    control = EmbeddingRun(design)
+    errors = np.empty(len(rows))
+    back_a, back_b = a[::-1].copy(), b[::-1].copy()
+    for k, row in enumerate(rows.tolist()):
+        now = past + k
+        late = now - 1 - delay
+        value = others[row] - float(back_a @ y[now - len(a) : now])
+        y[now] = value + float(back_b @ stem[late - len(b) + 1 : late + 1])
+        pv, goal = y[now] + load[row], float(sp[row - first])
+        errors[k] = pv - goal
+        op = control(pv, goal, op)
+        apart = op - at
+        if abs(apart) > friction[0]:
+            at = op - float(np.copysign(friction[1], apart))
+        stem[now] = at
+        if not abs(y[now]) < 1e6:
+            return None
+    moved = dataclasses.replace(
+        loop.yardstick, stretches=_within(loop.yardstick.stretches, begin - loop.rows[0])
+    )
+    return moved.measure(loop.pv_scale * errors, loop.op_scale * stem[past:])
+
+
+def _within(stretches: Any, begin: int) -> list[tuple[int, int]]:
+    """Return stretches from row ``begin`` on, counted from there."""
+    return [(max(a - begin, 0), b - begin) for a, b in stretches if b > begin]
+
+
+def _others(loop: RecordedLoop) -> FloatArray:
+    """Return what the other valves, as recorded, add to equation (9) at each row, shape (N,)."""
+    i, process = loop.output, loop.process
+    added = np.zeros(len(loop.loop.op))
+    for v in range(loop.loop.op.shape[1]):
+        if v == loop.valve:
+            continue
+        stem = loop.loop.stem[:, v]
+        for lag, weight in enumerate(process.b[i, v]):
+            shift = 1 + int(process.delay[i, v]) + lag
+            added[shift:] += weight * stem[:-shift]
+    return added
+
+
+def _response(model: LoopModel) -> tuple[FloatArray, int]:
+    """Return the response to a step of the stem and the sample at which g is read."""
+    linear = model.process.linear(model.sample_time)
+    state = np.zeros(linear.order)
+    response = np.empty(4 * LONGEST)
+    for k in range(len(response)):
+        response[k] = float(linear.c[0] @ state)
+        state = linear.a @ state + linear.b[:, 0]
+    moved = np.abs(response) > STARTED * np.abs(response[:LONGEST]).max()
+    first = int(np.argmax(moved)) if moved.any() else 0
+    return response[first : first + LONGEST + 1], ANSWERED
+
+
+def _settled(response: FloatArray) -> int:
+    """Return after how many samples a response stays within 5 % of its end."""
+    away = np.abs(response - response[-1]) > (1.0 - SETTLED) * np.abs(response[-1])
+    return int(np.flatnonzero(away)[-1]) + 2 if away.any() else 1
+
+
+def _variances(load: FloatArray) -> tuple[float, float]:
+    """Return the variances of white noise and of a random walk that make such a load."""
+    moves = np.diff(load)
+    moves = moves - moves.mean()
+    total = float(moves @ moves) / len(moves)
+    neighbours = float(moves[1:] @ moves[:-1]) / len(moves)
+    noise = max(-neighbours, 0.05 * total, LEAST_NOISE**2)
+    return noise, max(total - 2.0 * noise, LEAST_WALK * noise)

@@ -1,0 +1,290 @@
+"""What would help one loop, with the uncertainty of the identification carried through."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.gain.draws import DRAWS, SEED, drawn_frictions, drawn_tunings
+from stiction_ros.gain.embedding import EmbeddingDesign, embedded
+from stiction_ros.gain.measures import Measures
+from stiction_ros.gain.recorded_loop import RecordedLoop
+from stiction_ros.gain.retuning import UNCHANGED, best_tuning
+from stiction_ros.identification.closed_loop.cause import CauseKind
+from stiction_ros.identification.results import Identification, VerdictKind
+from stiction_ros.records.record import Record
+
+HARDER = (1.0, 1.3, 1.6)
+"""Times the identified friction that the valve has under the embedding controller. The worst of
+these is given: a controller that plans every jump by the friction must also do with one that has
+grown, or was underestimated, before anything is promised of it."""
+
+EMBEDDING_SAMPLES = 1000
+"""Samples of such a run, the last ones."""
+
+ENDS = (5.0, 95.0)
+"""Percentiles of the draws that are given as interval."""
+
+REPEATS = 0.25
+"""Share by which a drawn loop may differ from the record in IAE and amplitude: what does not cycle
+as recorded is not the loop that was recorded."""
+
+FEWEST = 3
+"""Drawn loops that must repeat the record, for anything to be said."""
+
+RETUNED = (CauseKind.VALVE, CauseKind.TUNING)
+"""Causes by which a loop shows its process well enough to be tuned by it: what comes from outside
+and is fed back tells as much of the controller as of the process."""
+
+KEYS = tuple(field.name for field in dataclasses.fields(Measures))
+
+
+class What(enum.StrEnum):
+    """What may be done about a loop."""
+
+    SERVICE = "service"
+    EMBEDDING = "embedding"
+    RETUNE = "retune"
+    LEAVE = "leave"
+
+
+@dataclasses.dataclass(frozen=True)
+class Option:
+    """One thing that may be done, and what the loop then does.
+
+    Attributes:
+        what: see :class:`What`.
+        measures: medians of the draws that repeat the record, of the embedding the worst; None
+            where it could not be simulated.
+        interval: 5th and 95th percentile of each measure over the draws.
+        note: one sentence.
+        settings: weights of the embedding, factors of the retuning.
+    """
+
+    what: What
+    measures: Measures | None
+    interval: dict[str, tuple[float, float]]
+    note: str
+    settings: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def beside(self, now: Measures, left: Measures) -> Option:
+        """Return the option with measures in the ratio to what is recorded.
+
+        What the identified loop does otherwise than the recorded one is in the simulation of
+        every option and in that of leaving the loop as it is: their ratio is what is believed.
+        """
+        if self.measures is None or self.measures is now:
+            return self
+        factors = {key: _ratio(getattr(now, key), getattr(left, key)) for key in KEYS}
+        measures: dict[str, Any] = {
+            key: None if (value := getattr(self.measures, key)) is None else factors[key] * value
+            for key in KEYS
+        }
+        interval = {
+            key: (factors[key] * low, factors[key] * high)
+            for key, (low, high) in self.interval.items()
+        }
+        return dataclasses.replace(self, measures=Measures(**measures), interval=interval)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an entry of ``options`` of ``gain --json``."""
+        measures = dict.fromkeys(KEYS) if self.measures is None else self.measures.to_json()
+        return {
+            "what": self.what.value,
+            **measures,
+            "interval": {key: list(ends) for key, ends in self.interval.items()},
+            "note": self.note,
+            "settings": self.settings,
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class Gain:
+    """What would help a loop.
+
+    Attributes:
+        valve, output: tags of what was looked at.
+        now: of the record.
+        options: in the order of :class:`What`.
+        notes: remarks for people.
+    """
+
+    valve: str
+    output: str
+    now: Measures
+    options: tuple[Option, ...]
+    notes: tuple[str, ...] = ()
+
+    def option(self, what: What) -> Option:
+        """Return one option."""
+        return next(option for option in self.options if option.what is what)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``gain --json``."""
+        return {
+            "valve": self.valve,
+            "output": self.output,
+            "now": self.now.to_json(),
+            "options": [option.to_json() for option in self.options],
+            "notes": list(self.notes),
+        }
+
+
+def gain_of(record: Record, found: Identification, valve: str | None = None) -> Gain:
+    """Simulate what would help one valve of a record.
+
+    Args:
+        record: what was measured, its longest good part.
+        found: what identification made of it.
+        valve: tag; None takes the one whose band is widest for its OP.
+
+    Raises:
+        InputError: there is no model, or no controller can be recovered.
+    """
+    loop = RecordedLoop.of(record, found, valve)
+    random = np.random.default_rng(SEED)
+    frictions = drawn_frictions(loop.estimate, DRAWS, random)
+    if not _believed(loop):
+        frictions = np.zeros_like(frictions)
+    draws = Draws(frictions, drawn_tunings(loop.law, DRAWS, random))
+    now = loop.now()
+    runs = loop.run(*draws)
+    kept = [k for k, run in enumerate(runs) if _repeats(now, run)]
+    if len(kept) < FEWEST:
+        left = option_of(What.LEAVE, runs, "The loop as it is, simulated.")
+        note = f"Not simulated: {_doubt(now, left.measures)}."
+        others = [Option(what, None, {}, note) for what in What if what is not What.LEAVE]
+        return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, left))
+    note = f"The loop as it is: {len(kept)} of {DRAWS} drawn loops repeat the record."
+    left = option_of(What.LEAVE, [runs[k] for k in kept], note)
+    draws = Draws(frictions[kept], draws.tunings[kept])
+    options = (
+        _service(loop, draws, now),
+        _embedding(loop),
+        _retune(loop, draws, found),
+        left,
+    )
+    assert left.measures is not None
+    return Gain(
+        record.valves[loop.valve],
+        record.outputs[loop.output],
+        now,
+        tuple(option.beside(now, left.measures) for option in options),
+    )
+
+
+class Draws(NamedTuple):
+    """Loops that the identification does not tell apart.
+
+    Attributes:
+        frictions: (f_S, f_D), %, shape (R, 2).
+        tunings: (K, K_i, K_d), scaled, shape (R, 3).
+    """
+
+    frictions: FloatArray
+    tunings: FloatArray
+
+
+def _believed(loop: RecordedLoop) -> bool:
+    """Tell whether the valve is taken to have the friction that was identified."""
+    verdict = loop.estimate.verdict
+    return verdict is not VerdictKind.HEALTHY and loop.estimate.static_friction > 0.0
+
+
+def _repeats(now: Measures, run: Measures | None) -> bool:
+    """Tell whether a drawn loop does what was recorded."""
+    if run is None:
+        return False
+    pairs = [(getattr(now, key), getattr(run, key)) for key in ("iae_per_hour", "amplitude")]
+    return all(
+        abs(simulated - recorded) <= REPEATS * recorded
+        for recorded, simulated in pairs
+        if recorded is not None and simulated is not None
+    )
+
+
+def _doubt(now: Measures, left: Measures | None) -> str:
+    """Return why the simulated loop cannot stand for the recorded one."""
+    if left is None:
+        return "the identified loop grows without end"
+    return (
+        "the identified loop does not repeat the record, its IAE is "
+        f"{left.iae_per_hour / max(now.iae_per_hour, 1e-300):.2f} times the recorded one"
+    )
+
+
+def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:
+    if not _believed(loop):
+        note = "No friction was found: a service changes nothing."
+        interval = {key: (value, value) for key in KEYS if (value := getattr(now, key)) is not None}
+        return Option(What.SERVICE, now, interval, note)
+    runs = loop.run(np.zeros_like(draws.frictions), draws.tunings)
+    note = "The valve without friction under the controller that is there."
+    return option_of(What.SERVICE, runs, note)
+
+
+def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
+    tuning = UNCHANGED
+    cause = found.outputs[loop.output].cause
+    if cause is not None and cause.kind in RETUNED:
+        tuning = best_tuning(loop, *draws)
+        note = "No other tuning with enough distance from instability helps."
+    else:
+        note = "Neither valve nor tuning is the cause: another tuning is not looked for."
+    runs = loop.run(draws.frictions, tuning.applied(draws.tunings))
+    if tuning != UNCHANGED:
+        note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
+    settings = {"gain_factor": tuning.gain, "integral_time_factor": tuning.integral_time}
+    return option_of(What.RETUNE, runs, note, settings)
+
+
+def _embedding(loop: RecordedLoop) -> Option:
+    if not _believed(loop):
+        note = "No friction was found: there is nothing to embed."
+        return Option(What.EMBEDDING, None, {}, note)
+    estimate = np.array([loop.estimate.static_friction, loop.estimate.dynamic_friction])
+    try:
+        design = EmbeddingDesign.of(loop)
+        runs = embedded(loop, design, np.outer(HARDER, estimate), EMBEDDING_SAMPLES)
+    except InputError as error:
+        return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
+    note = "Predictive control that knows the friction; the worst of frictions up to 1.6 times it."
+    if None in runs:
+        return Option(What.EMBEDDING, None, {}, f"{note} The simulated loop grows without end.")
+    worst = max((run for run in runs if run is not None), key=lambda run: run.iae_per_hour)
+    option = option_of(What.EMBEDDING, runs, note, design.weights(loop.pv_scale, loop.op_scale))
+    return dataclasses.replace(option, measures=worst)
+
+
+def option_of(
+    what: What,
+    runs: Sequence[Measures | None],
+    note: str,
+    settings: dict[str, float] | None = None,
+) -> Option:
+    """Return the option of its draws; one that grows in half of them is none."""
+    stable = [run for run in runs if run is not None]
+    if 2 * len(stable) <= len(runs):
+        return Option(what, None, {}, f"{note} The simulated loop grows without end.")
+    middle: dict[str, Any] = {}
+    interval = {}
+    for key in KEYS:
+        values = [value for run in stable if (value := getattr(run, key)) is not None]
+        middle[key] = float(np.median(values)) if values else None
+        if values:
+            low, high = np.percentile(values, ENDS)
+            interval[key] = (float(low), float(high))
+    return Option(what, Measures(**middle), interval, note, settings or {})
+
+
+def _ratio(recorded: float | None, simulated: float | None) -> float:
+    """Return recorded over simulated; 1 where there is nothing to compare."""
+    if recorded is None or simulated is None or simulated <= 0.0:
+        return 1.0
+    return recorded / simulated

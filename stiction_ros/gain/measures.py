@@ -1,0 +1,89 @@
+"""What a loop is measured by: now, and under each thing that could be done about it.
+
+- *Amplitude*: √2 × RMS of the spectral line of PV − SP at the period at which the loop cycles
+  now, see :mod:`stiction_ros.identification.closed_loop.oscillation`.
+- *IAE per hour*: ∫|PV − SP| dt per hour with time in hours, which is the mean |PV − SP|.
+- *Travel*: Σ|Δχ|, %; *reversals*: changes of the direction in which the stem moves; both an hour.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.oscillation import (
+    LEAST_LINE,
+    REGULAR,
+    Oscillation,
+    amplitude,
+)
+
+STANDS = 1e-9
+"""Share of the stem's range up to which a move is rounding."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Measures:
+    """How a loop does.
+
+    Attributes:
+        amplitude: engineering units of PV; None where the loop does not cycle now, so that there
+            is no period to look at.
+        iae_per_hour: engineering units of PV.
+        travel_per_hour: of the stem, %.
+        reversals_per_hour: of the stem.
+    """
+
+    amplitude: float | None
+    iae_per_hour: float
+    travel_per_hour: float
+    reversals_per_hour: float
+
+    def to_json(self) -> dict[str, float | None]:
+        """Return the mapping of ``gain --json``."""
+        return dataclasses.asdict(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Yardstick:
+    """How the runs of one loop are measured, all alike.
+
+    Attributes:
+        sample_time: s.
+        period: at which the loop cycles now, samples; None where it does not.
+        stretches: without a move of the set-point, in samples of a run.
+    """
+
+    sample_time: float
+    period: float | None
+    stretches: Sequence[tuple[int, int]]
+
+    def measure(self, error: FloatArray, stem: FloatArray) -> Measures:
+        """Return the measures of one run.
+
+        Args:
+            error: PV − SP, shape (n,), engineering units.
+            stem: shape (n,), %.
+        """
+        hours = len(error) * self.sample_time / 3600.0
+        line = None if self.period is None else amplitude(error, self.stretches, self.period)
+        travel, reversals = work(stem)
+        return Measures(line, float(np.abs(error).mean()), travel / hours, reversals / hours)
+
+
+def work(stem: FloatArray) -> tuple[float, int]:
+    """Return the travel, %, and the reversals of a stem, shape (n,)."""
+    moves = np.diff(stem)
+    moves = moves[np.abs(moves) > STANDS * max(float(np.ptp(stem)), 1e-300)]
+    turns = int(np.count_nonzero(np.diff(np.signbit(moves)))) if len(moves) else 0
+    return float(np.abs(moves).sum()), turns
+
+
+def cycle_period(swing: Oscillation | None) -> float | None:
+    """Return the period of a cycle, samples; None where nothing regular or clear stands out."""
+    if swing is None or (swing.regularity <= REGULAR and swing.share < LEAST_LINE):
+        return None
+    return swing.period

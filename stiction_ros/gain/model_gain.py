@@ -1,0 +1,237 @@
+"""What would help the loop of a loop model, simulated under its own controller as baseline."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from stiction_ros.control import MpcController
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.gain.embedding import EmbeddingDesign
+from stiction_ros.gain.gain import Gain, Option, What, option_of
+from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
+from stiction_ros.gain.retuning import (
+    CALMER,
+    SENSITIVE,
+    UNCHANGED,
+    WORTH,
+    Tuning,
+    candidates,
+    frequencies,
+    peak,
+)
+from stiction_ros.identification.closed_loop.oscillation import oscillation
+from stiction_ros.loop import LoopModel
+from stiction_ros.loop.closed_loop import Controller, PiController, simulate_closed_loop
+from stiction_ros.loop.model import PiTuning
+from stiction_ros.loop.plant import Measurement
+from stiction_ros.loop.set_points import SetPoints, holds
+from stiction_ros.processes.process import NoiseEntry
+
+SAMPLES = 2000
+"""Samples that are simulated."""
+
+SEEDS = (1, 2, 3)
+"""Of the noise; a model is taken as it is, so nothing else is drawn."""
+
+PUSHED = 2.0
+"""Bands of friction by which the set-point moves at the start: a loop at rest shows no cycle."""
+
+LEAST_PUSH = 1.0
+"""%: the same where there is no friction."""
+
+QUIET = 0.02
+"""Noise of a model without any, in what a push makes of PV."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ModelLoop:
+    """One valve, one output, one PI controller, ready to be simulated.
+
+    Attributes:
+        model: as given.
+        tuning: of its controller.
+        friction: of its valve; None without one.
+        set_points: schedule.
+        samples: of a run.
+    """
+
+    model: LoopModel
+    tuning: PiTuning
+    friction: HeStiction | None
+    set_points: SetPoints
+    samples: int
+
+    @classmethod
+    def of(
+        cls, model: LoopModel, set_points: SetPoints | None = None, samples: int = SAMPLES
+    ) -> ModelLoop:
+        """Return the loop of a model.
+
+        Args:
+            model: with a controller.
+            set_points: None moves the set-point once, by what shows the friction.
+            samples: of a run.
+
+        Raises:
+            InputError: no controller, or more than one valve or output.
+        """
+        if model.controller is None:
+            raise InputError(
+                "has no controller, so there is nothing to compare with",
+                where=model.name,
+                fix="add controller: {kind: pi, gain: K, integral_time: T}",
+            )
+        if len(model.valves) != 1 or len(model.outputs) != 1:
+            raise InputError(
+                f"has {len(model.valves)} valves and {len(model.outputs)} outputs",
+                where=model.name,
+                fix="give the model of one loop with one valve",
+            )
+        laws = [effect for effect in model.valves[0].effects if isinstance(effect, HeStiction)]
+        friction = laws[0] if laws else None
+        push = _push(model, friction)
+        if set_points is None:
+            start = float(model.pv0[0])
+            moves = np.array([[start], [start + push]])
+            set_points = SetPoints(model.outputs, np.array([0.0, 20.0 * model.sample_time]), moves)
+        return cls(model, model.controller, friction, set_points, samples)
+
+    def run(self, model: LoopModel, control: Callable[[], Controller]) -> list[_Run]:
+        """Return one run for each seed, each under a new controller."""
+        found = []
+        for seed in SEEDS:
+            out = simulate_closed_loop(model, control(), self.set_points, self.samples, seed)
+            record = out.record
+            assert record.sp is not None
+            assert record.stem is not None
+            error = record.pv[:, 0] - record.sp[:, 0]
+            found.append(_Run(error, record.stem[:, 0], record.sp))
+        return found
+
+    def pi(self, tuning: Tuning = UNCHANGED) -> Callable[[], Controller]:
+        """Return what makes the PI controller with factors on its tuning."""
+        changed = PiTuning(
+            self.tuning.gain * tuning.gain, self.tuning.integral_time * tuning.integral_time
+        )
+        low, high = self.model.limits[0]
+        start = float(self.model.stem_start[0])
+        return lambda: PiController(changed, self.model.sample_time, start, (low, high))
+
+    def sensitivity(self, tuning: Tuning) -> float:
+        """Return the peak of the sensitivity of the loop without friction."""
+        linear = self.model.process.linear(self.model.sample_time)
+        turn = frequencies()
+        gain = self.tuning.gain * tuning.gain
+        time = self.tuning.integral_time * tuning.integral_time
+        control = gain * (1.0 + self.model.sample_time / time / (1.0 - turn))
+        eye = np.eye(linear.order)
+        plant = [linear.c[0] @ np.linalg.solve(eye / q - linear.a, linear.b[:, 0]) for q in turn]
+        return peak(np.asarray(control * np.array(plant)))
+
+
+@dataclasses.dataclass(frozen=True)
+class _Run:
+    error: FloatArray
+    stem: FloatArray
+    sp: FloatArray
+
+
+def gain_of_model(
+    model: LoopModel, set_points: SetPoints | None = None, samples: int = SAMPLES
+) -> Gain:
+    """Simulate what would help the loop of a model; see :meth:`ModelLoop.of`."""
+    loop = ModelLoop.of(model, set_points, samples)
+    first = loop.run(model, loop.pi())
+    stretches = holds(first[0].sp)
+    period = cycle_period(oscillation(first[0].error, stretches))
+    yardstick = Yardstick(model.sample_time, period, stretches)
+
+    def measured(runs: list[_Run]) -> list[Measures | None]:
+        return [
+            yardstick.measure(run.error, run.stem) if np.isfinite(run.error).all() else None
+            for run in runs
+        ]
+
+    left = option_of(What.LEAVE, measured(first), "The loop as it is, simulated.")
+    if left.measures is None:
+        raise InputError("the loop grows without end under its own controller", where=model.name)
+    service = option_of(
+        What.SERVICE,
+        measured(loop.run(model.with_ideal_valves(), loop.pi())),
+        "The valve without friction under the controller that is there.",
+    )
+    return Gain(
+        model.valve_names[0],
+        model.outputs[0],
+        left.measures,
+        (service, _embedding(loop, measured), _retune(loop, measured), left),
+    )
+
+
+Measured = Callable[[list[_Run]], list[Measures | None]]
+
+
+def _retune(loop: ModelLoop, measured: Measured) -> Option:
+    present = loop.sensitivity(UNCHANGED)
+    best, least = UNCHANGED, np.inf
+    kept = measured(loop.run(loop.model, loop.pi()))
+    base = _mean_iae(kept)
+    for tuning in candidates(loop.friction is not None):
+        if loop.sensitivity(tuning) > max(SENSITIVE, CALMER * present):
+            continue
+        runs = measured(loop.run(loop.model, loop.pi(tuning)))
+        mean = _mean_iae(runs)
+        if mean < min(least, (1.0 - WORTH) * base):
+            best, least, kept = tuning, mean, runs
+    note = f"Gain times {best.gain:g}, integral time times {best.integral_time:g}."
+    if best == UNCHANGED:
+        note = "No other tuning with enough distance from instability helps."
+    settings = {"gain_factor": best.gain, "integral_time_factor": best.integral_time}
+    return option_of(What.RETUNE, kept, note, settings)
+
+
+def _mean_iae(runs: Sequence[Measures | None]) -> float:
+    """Return the mean IAE per hour; infinite where a run grows without end."""
+    return float(np.mean([np.inf if run is None else run.iae_per_hour for run in runs]))
+
+
+def _embedding(loop: ModelLoop, measured: Measured) -> Option:
+    if loop.friction is None or loop.friction.static_friction <= 0.0:
+        return Option(What.EMBEDDING, None, {}, "The valve follows no law that can be embedded.")
+    model = loop.model.with_ideal_valves()
+    noise = float(np.max([model.process.noise_std(entry).max() for entry in NoiseEntry]))
+    noise = max(noise, QUIET * abs(_push(model, loop.friction))) ** 2
+    try:
+        design = EmbeddingDesign.by_rule(model, loop.friction, None, (noise, 1e-2 * noise))
+        runs = loop.run(loop.model, lambda: _Mpc(design.controller(), model.stem_start))
+    except InputError as error:
+        return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
+    note = "Predictive control that knows the friction."
+    return option_of(What.EMBEDDING, measured(runs), note, design.weights())
+
+
+class _Mpc:
+    """A predictive controller that answers like the others."""
+
+    def __init__(self, controller: MpcController, op: FloatArray) -> None:
+        self._controller, self._op = controller, np.array(op, dtype=float)
+        self._dv = np.zeros(controller.design.model.e.shape[1])
+
+    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
+        self._op = self._controller.step(measurement.pv, sp, self._dv, self._op).op
+        return self._op
+
+
+def _push(model: LoopModel, friction: HeStiction | None) -> float:
+    """Return by how much PV moves when the stem moves by some bands, within a hundred samples."""
+    band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
+    linear = model.process.linear(model.sample_time)
+    state = np.zeros(linear.order)
+    for _ in range(100):
+        state = linear.a @ state + linear.b[:, 0]
+    return float(linear.c[0] @ state) * max(PUSHED * band, LEAST_PUSH)

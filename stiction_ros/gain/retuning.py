@@ -1,0 +1,118 @@
+"""Other tunings of the controller that is there, tried on the loop with its friction.
+
+Gain and integral time are multiplied by a few factors each. A tuning may be taken where the loop
+without friction keeps its distance from instability, and it is chosen for the least mean IAE over
+some of the loops that the identification does not tell apart.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.gain.recorded_loop import RecordedLoop
+
+ComplexArray = np.ndarray[tuple[int], np.dtype[np.complex128]]
+
+FASTER = (1.0, 1.4, 2.0)
+"""Factors on the gain where the valve has friction: a slower controller lets the valve rest off
+its place, and what that brings depends on loads to come."""
+
+SLOWER = (0.35, 0.5, 0.7, 1.0)
+"""Factors on the gain where the loop rings without friction."""
+
+TIMES = (0.7, 1.0, 1.5, 2.5)
+"""Factors on the integral time."""
+
+SENSITIVE = 1.7
+"""Largest peak of the sensitivity of a tuning that is taken: the upper end of what is usual."""
+
+CALMER = 0.9
+"""Share of the present peak up to which a tuning is taken that is calmer and still above that."""
+
+TRIED = 5
+"""Draws on which tunings are compared."""
+
+WORTH = 0.03
+"""Share of the IAE that another tuning must save to be named."""
+
+FREQUENCIES = 300
+"""Frequencies at which the sensitivity is looked at."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Tuning:
+    """Factors on the controller that is there.
+
+    Attributes:
+        gain: on K.
+        integral_time: on T_i.
+    """
+
+    gain: float = 1.0
+    integral_time: float = 1.0
+
+    def applied(self, tunings: FloatArray) -> FloatArray:
+        """Return (K, K_i, K_d), shape (R, 3), with the factors."""
+        factors = np.array([self.gain, self.gain / self.integral_time, self.gain])
+        return np.asarray(tunings * factors)
+
+
+UNCHANGED = Tuning()
+
+
+def candidates(friction: bool) -> list[Tuning]:
+    """Return the tunings to try besides the present one, of a valve with friction or without."""
+    pairs = itertools.product(FASTER if friction else SLOWER, TIMES)
+    return [tuning for pair in pairs if (tuning := Tuning(*pair)) != UNCHANGED]
+
+
+def best_tuning(loop: RecordedLoop, frictions: FloatArray, tunings: FloatArray) -> Tuning:
+    """Return the tuning of least IAE; unchanged where none saves enough.
+
+    Args:
+        loop: that is tuned.
+        frictions, tunings: draws, shapes (R, 2) and (R, 3).
+    """
+    present = sensitivity(loop, UNCHANGED)
+    frictions, tunings = frictions[:TRIED], tunings[:TRIED]
+    tried = [UNCHANGED]
+    for tuning in candidates(bool(frictions.any())):
+        if sensitivity(loop, tuning) <= max(SENSITIVE, CALMER * present):
+            tried.append(tuning)
+    number = len(frictions)
+    runs = loop.run(
+        np.tile(frictions, (len(tried), 1)),
+        np.concatenate([tuning.applied(tunings) for tuning in tried]),
+    )
+    errors = np.array([np.inf if run is None else run.iae_per_hour for run in runs])
+    means = errors.reshape(len(tried), number).mean(axis=1)
+    best = int(np.argmin(means))
+    return tried[best] if means[best] < (1.0 - WORTH) * means[0] else UNCHANGED
+
+
+def sensitivity(loop: RecordedLoop, tuning: Tuning) -> float:
+    r"""Return the peak of :math:`|1 / (1 + C P)|` of the loop without friction."""
+    law, process = loop.law, loop.process
+    i, j = loop.output, loop.valve
+    turn = frequencies()
+    gain, reset, rate = tuning.applied(law.coefficients[None])[0]
+    share = law.smoothing
+    control = gain + reset / (1.0 - turn) + rate * (1.0 - turn)
+    control = control * (1.0 - share) / (1.0 - share * turn) * turn**law.lag
+    poles = np.polyval(np.concatenate([process.a[i][::-1], [1.0]]), turn)
+    zeros = np.polyval(process.b[i, j][::-1], turn)
+    return peak(control * zeros * turn ** (1 + int(process.delay[i, j])) / poles)
+
+
+def frequencies() -> ComplexArray:
+    """Return the backward shift q on the frequencies that are looked at, shape (F,)."""
+    return np.asarray(np.exp(-1j * np.pi * np.geomspace(1e-4, 1.0, FREQUENCIES)))
+
+
+def peak(open_loop: ComplexArray) -> float:
+    """Return the largest sensitivity of a loop with this open-loop response, shape (F,)."""
+    return float(np.max(1.0 / np.maximum(np.abs(1.0 + open_loop), 1e-12)))

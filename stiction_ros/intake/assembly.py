@@ -1,0 +1,154 @@
+"""The records of one loop from its blocks."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.intake.loop import Loop
+from stiction_ros.intake.modes import manual_marked
+from stiction_ros.intake.options import IntakeOptions, OpUnit
+from stiction_ros.intake.plausible import in_percent, refuse_swapped
+from stiction_ros.intake.repairs import (
+    Rules,
+    checked,
+    filled,
+    in_order,
+    with_times,
+    with_values,
+    without_outliers,
+)
+from stiction_ros.intake.reported import is_reported, on_grid
+from stiction_ros.intake.tables.block import Block, joined
+from stiction_ros.records.record import Record
+from stiction_ros.records.whole import Source, Whole
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """What was read of one loop.
+
+    Attributes:
+        name: of the loop.
+        record: name of its records.
+        blocks: its signals.
+        named: whether a user said which column is what.
+        op_unit: that a tag list says, None when it does not.
+        shared: whether other loops stand in the same rows.
+    """
+
+    name: str
+    record: str
+    blocks: tuple[Block, ...]
+    named: bool = False
+    op_unit: OpUnit | None = None
+    shared: bool = False
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files of the blocks, each once."""
+        return tuple(dict.fromkeys(block.path for block in self.blocks))
+
+
+def loop_of(found: Found, options: IntakeOptions) -> Loop:
+    """Return a loop with its records.
+
+    Raises:
+        InputError: it cannot be made into records, and why.
+    """
+    _refuse_incomplete(found)
+    rules = Rules(options.strict)
+    timed = [with_times(block, rules) for block in found.blocks]
+    if not options.as_given:
+        timed = [with_values(block, rules, shared=found.shared) for block in timed]
+    block = joined([checked(one, rules) for one in timed])
+    notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
+    rules.told.clear()
+    block = without_outliers(block, rules)
+    unit = "OP's own unit"
+    if not options.as_given:
+        block, unit, note = in_percent(block, options.op_unit or found.op_unit)
+        rules.told.extend([note] if note else [])
+        if not found.named:
+            refuse_swapped(block)
+    parts: list[Record] = []
+    for run in in_order(block, rules):
+        parts += _records(manual_marked(run, rules, options.automatic), found, options, rules)
+    notes = list(dict.fromkeys((*notes, *rules.told)))
+    whole = tuple(dataclasses.replace(part, notes=(*notes, *part.notes)) for part in parts)
+    every = tuple(dict.fromkeys(note for part in whole for note in part.notes))
+    columns = {
+        f"{key.signal.upper()} {key.tag}".strip(): column.name
+        for one in found.blocks
+        for key, column in one.columns.items()
+    }
+    return Loop(found.name, found.files, whole, every, None, columns, unit)
+
+
+def _refuse_incomplete(found: Found) -> None:
+    there = {key.signal for block in found.blocks for key in block.columns}
+    missing = [signal.upper() for signal in ("op", "pv") if signal not in there]
+    if missing:
+        names = ", ".join(c.name for block in found.blocks for c in block.columns.values())
+        raise InputError(
+            f"loop {found.name} has no {' and no '.join(missing)}, only {names}",
+            where=str(found.files[0]),
+            fix="say which tags belong to it with --tags FILE",
+        )
+
+
+def _records(run: Block, found: Found, options: IntakeOptions, rules: Rules) -> tuple[Record, ...]:
+    source = Source(found.record, str(run.path), run.place)
+    if is_reported(run) or options.sample_time is not None:
+        return _resampled(run, found, options, rules)
+    told = len(rules.told)
+    try:
+        return _whole(filled(run, rules)).records(source)
+    except InputError:
+        if options.strict or options.as_given or len(run.time) < 3:
+            raise
+        del rules.told[told:]
+        return _resampled(run, found, options, rules)
+
+
+def _resampled(
+    run: Block, found: Found, options: IntakeOptions, rules: Rules
+) -> tuple[Record, ...]:
+    parts: list[Record] = []
+    stretches = on_grid(run, options.sample_time, rules)
+    for stretch in stretches:
+        block = filled(stretch, rules)
+        parts += _whole(block).records(Source(found.record, str(run.path), block.place))
+    if len(stretches) > 1:
+        rules.told.append(f"cut at {len(stretches) - 1} gaps without a report")
+    return tuple(parts)
+
+
+def _whole(block: Block) -> Whole:
+    valves, outputs = block.tags("op"), block.tags("pv")
+
+    def side_by_side(signal: str, tags: Sequence[str]) -> FloatArray | None:
+        columns = {key.tag: column for key, column in block.columns.items() if key.signal == signal}
+        if set(columns) != set(tags):
+            return None
+        return np.column_stack([columns[tag].values for tag in tags])
+
+    op, pv = side_by_side("op", valves), side_by_side("pv", outputs)
+    if op is None or pv is None:
+        raise InputError("has no OP or no PV left", where=str(block.path))
+    return Whole(
+        valves=valves,
+        outputs=outputs,
+        time=block.time - block.time[0],
+        start=block.clock.start + float(block.time[0]),
+        op=op,
+        pv=pv,
+        sp=side_by_side("sp", outputs),
+        stem=side_by_side("stem", valves),
+        mask=block.mask,
+    )

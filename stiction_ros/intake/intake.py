@@ -1,0 +1,183 @@
+"""From paths to loops."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake.assembly import Found, loop_of
+from stiction_ros.intake.loop import Loop
+from stiction_ros.intake.options import IntakeOptions
+from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
+from stiction_ros.intake.sheets.typed import open_sheets
+from stiction_ros.intake.tables.block import Block
+from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
+from stiction_ros.intake.tables.reading import blocks_of
+from stiction_ros.intake.tables.tags import TagList, read_tag_list
+from stiction_ros.records.bag_reader import read_bag_parts
+from stiction_ros.records.storage_files import METADATA
+
+OTHERS = 8
+"""Loops that an error lists."""
+
+
+def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
+    """Yield the loops that files and folders hold, read one after the other.
+
+    A loop that cannot be read comes with its ``problem`` and stops no other. Signals of one
+    loop may stand in several files, which are then read together.
+
+    Args:
+        paths: files and folders, read in their order; folders by the names in them.
+        options: how to read them.
+
+    Raises:
+        InputError: the tag list cannot be read.
+    """
+    tags = None if options.tags is None else read_tag_list(options.tags)
+    tables: list[_Table] = []
+    for file in _files(paths, options):
+        if is_bag(file):
+            yield _bag(file, options)
+            continue
+        try:
+            sheets = open_sheets(file)
+        except InputError as error:
+            yield Loop(stem(file), (file,), (), problem=str(error))
+            continue
+        for sheet in sheets:
+            try:
+                plan = plan_of(sheet, options, tags)
+            except InputError as error:
+                yield Loop(sheet.name, (file,), (), problem=str(error))
+                continue
+            table = _Table(sheet, plan)
+            if plan.shape is Shape.ONE:
+                yield from _read([table], options, tags)
+            else:
+                tables.append(table)
+    for group in _groups(tables):
+        yield from _read(group, options, tags)
+
+
+def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loop:
+    """Return the one loop of a file or a bag.
+
+    Args:
+        path: of the file; a folder that is no bag counts as its files.
+        options: how to read it.
+        name: of the loop, for files that hold several.
+
+    Raises:
+        InputError: the loop cannot be read, there is none, or there are several.
+    """
+    found = []
+    names = []
+    for loop in loops([path], options):
+        names.append(loop.name)
+        if name is None or loop.name.casefold() == name.casefold():
+            found.append(loop)
+        if name is None and len(found) > OTHERS:
+            break
+    if not names:
+        raise InputError("holds no file of a loop", where=str(path), fix="check the path")
+    if len(found) != 1:
+        listed = ", ".join(names[:OTHERS]) + (" and others" if len(names) > OTHERS else "")
+        what = "holds several loops" if name is None else f"has no loop {name}"
+        raise InputError(f"{what}: {listed}", where=str(path), fix="choose one with --loop NAME")
+    if found[0].problem is not None:
+        raise InputError(found[0].problem)
+    return found[0]
+
+
+def is_bag(path: str | Path) -> bool:
+    """Tell whether ``path`` is a bag: a directory of one, or a ``.mcap`` file."""
+    path = Path(path)
+    if path.is_dir():
+        return (path / METADATA).is_file() or any(path.glob("*.mcap"))
+    return path.suffix.lower() == ".mcap"
+
+
+@dataclasses.dataclass(frozen=True)
+class _Table:
+    sheet: Sheet
+    plan: Plan
+
+
+def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
+    """Yield the files of loops; folders give those with a known suffix, the tag list none."""
+    listed = None if options.tags is None else options.tags.resolve()
+    for path in paths:
+        if not path.is_dir() or is_bag(path):
+            yield path
+            continue
+        for inner in sorted(path.iterdir()):
+            if inner.name.startswith((".", "~$")) or inner.resolve() == listed:
+                continue
+            if inner.is_dir():
+                yield from _files([inner], options)
+            elif inner.suffix.lower() in SUFFIXES:
+                yield inner
+
+
+def _bag(path: Path, options: IntakeOptions) -> Loop:
+    try:
+        parts = read_bag_parts(path, namespace=options.namespace)
+    except InputError as error:
+        return Loop(path.stem, (path,), (), problem=str(error))
+    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
+    return Loop(path.stem, (path,), parts, notes)
+
+
+def _groups(tables: Sequence[_Table]) -> Iterator[list[_Table]]:
+    """Yield tables that have loops in common; long ones, whose loops are not known, together."""
+    long = [table for table in tables if table.plan.shape is Shape.LONG]
+    if long:
+        yield long
+    groups: list[tuple[set[str], list[_Table]]] = []
+    owner: dict[str, int] = {}
+    for table in tables:
+        if table.plan.shape is not Shape.WIDE:
+            continue
+        names = set(table.plan.loops)
+        known = sorted({owner[name] for name in names if name in owner})
+        place = known[0] if known else len(groups)
+        if not known:
+            groups.append((set(), []))
+        for other in known[1:]:
+            groups[place][0].update(groups[other][0])
+            groups[place][1].extend(groups[other][1])
+            groups[other][0].clear()
+            groups[other][1].clear()
+        groups[place][0].update(names)
+        groups[place][1].append(table)
+        owner.update(dict.fromkeys(groups[place][0], place))
+    yield from (members for _, members in groups if members)
+
+
+def _read(group: Sequence[_Table], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
+    """Yield the loops of tables that belong together."""
+    blocks: dict[str, list[Block]] = {}
+    for table in group:
+        try:
+            for name, read in blocks_of(table.sheet, table.plan, options, tags).items():
+                blocks.setdefault(name, []).extend(read)
+        except InputError as error:
+            for name in table.plan.loops or [table.sheet.name]:
+                yield Loop(name, (table.sheet.path,), (), problem=str(error))
+    if not blocks and group and group[0].plan.shape is Shape.LONG:
+        sheet = group[0].sheet
+        said = "has no tag such as FIC101.PV or FIC101/OP; say which belong together with --tags F"
+        yield Loop(sheet.name, (sheet.path,), (), problem=f"{sheet.path}: {said}")
+    for name in list(blocks):
+        own = tuple(blocks.pop(name))
+        single = group[0].plan.shape is Shape.ONE
+        unit = None if tags is None else tags.units.get(name)
+        record = own[0].path.name if single else name
+        found = Found(name, record, own, group[0].plan.named, unit, not single)
+        try:
+            yield loop_of(found, options)
+        except InputError as error:
+            yield Loop(name, found.files, (), problem=str(error))

@@ -1,0 +1,48 @@
+"""One loop of a plant, as it was found in exports."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+from stiction_ros.records.parts import span
+from stiction_ros.records.record import Record
+
+
+@dataclasses.dataclass(frozen=True)
+class Loop:
+    """A named loop with its records, or the reason why there are none.
+
+    Attributes:
+        name: of the loop: its tag, or the name of its file.
+        files: that it was read from.
+        parts: its records, one for each stretch without a gap, in their order; a sample's
+            quality says what was held, bad or in manual. Empty when there is a problem.
+        notes: what was masked, held, cut, converted, with its count, one sentence each; the
+            records bear the same.
+        problem: why it cannot be read and what helps, one sentence; None when it can be.
+        columns: signal to the column or tag that it was read from.
+        op_unit: what OP is in; OP of a share or a current has been brought to %.
+    """
+
+    name: str
+    files: tuple[Path, ...]
+    parts: tuple[Record, ...]
+    notes: tuple[str, ...] = ()
+    problem: str | None = None
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    op_unit: str = "%"
+
+    @property
+    def summary(self) -> str:
+        """Samples, sample time, span and unit of OP in one sentence; or the problem."""
+        if self.problem is not None:
+            return self.problem
+        samples = sum(map(len, self.parts))
+        steps = sorted({f"{part.sample_time:.6g} s" for part in self.parts})
+        parts = f" in {len(self.parts)} parts" if len(self.parts) > 1 else ""
+        return (
+            f"{samples} samples{parts}, one each {' or '.join(steps)}, {span(*self.parts)}, "
+            f"OP in {self.op_unit}"
+        )

@@ -1,0 +1,323 @@
+"""What is wrong with the rows of a loop: told, counted, and masked, held or cut by one rule.
+
+Rows without a time are left out. Rows that run backwards are turned, single ones out of order
+sorted; of rows with one stamp the last counts. What is no number, of bad quality, or far outside
+everything else (a sentinel such as −9999) is missing: up to :data:`HELD` samples in a row are
+held (OP, SP) or interpolated (PV), more are bad. Missing set-points are held however long.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.intake.tables.block import Block, FlagArray, Key
+from stiction_ros.records.quality import Quality, QualityArray
+
+HELD = 5
+"""Samples in a row that are held at most; a gap in time is one from 5.5 samples on."""
+
+FAR = 5.0
+"""How many times the range of all other values a value is away that cannot belong to them."""
+
+SENTINEL_FAR = 0.5
+"""The same for numbers that stand for bad values."""
+
+SENTINELS = (
+    *(-99.0, -999.0, -999.25, -999.99, -9999.0, -9999.99, -99999.0, 9999.0, 99999.0, 999999.0),
+    *(-32768.0, 32767.0, 65535.0, -2147483648.0, 2147483647.0, 1e10, -1e10, 1e20, -1e20, 1e30),
+    *(-1e30, 3.4028234663852886e38, -3.4028234663852886e38, 9.96921e36),
+)
+"""Numbers that loggers and controllers write in the place of a bad value."""
+
+RARE = 0.2
+"""Share of a signal that may lie far outside."""
+
+HOUR = 3600.0
+FIX = "correct it, fill it or cut the record there"
+
+
+@dataclasses.dataclass(frozen=True)
+class Rules:
+    """How strict to be.
+
+    Attributes:
+        strict: whether anything wrong is an error.
+        told: sentences on what was done, in their order.
+    """
+
+    strict: bool
+    told: list[str] = dataclasses.field(default_factory=list)
+
+    def tell(self, note: str, where: Block, said: str, fix: str = FIX) -> None:
+        """Note what is repaired, or raise when nothing may be.
+
+        Args:
+            note: for the record.
+            where: what is repaired.
+            said: what is wrong, for the error.
+            fix: how to mend it.
+
+        Raises:
+            InputError: strict.
+        """
+        if self.strict:
+            raise InputError(said, where=str(where.path), fix=fix)
+        self.told.append(note)
+
+
+def plural(count: int, what: str) -> str:
+    """Return ``1 row`` or ``3 rows``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def with_times(block: Block, rules: Rules) -> Block:
+    """Return the rows that have a time."""
+    there = np.isfinite(block.time)
+    lost = len(there) - int(np.count_nonzero(there))
+    if not lost and not block.stray:
+        return block
+    said = block.stray or f"{plural(lost, 'row')} without a time"
+    if lost == len(there):
+        raise InputError(said, where=str(block.path), fix="choose the column with --time COLUMN")
+    rules.tell(f"{plural(lost, 'row')} without a time left out", block, said)
+    return block.rows(there)
+
+
+def with_values(block: Block, rules: Rules, *, shared: bool) -> Block:
+    """Return the rows in which OP, PV, SP or the stem has a value, be it a bad one.
+
+    Args:
+        block: as read.
+        rules: what is left out is noted there.
+        shared: whether other loops stand in the same rows, which then say nothing of this one.
+    """
+    columns = [column for key, column in block.columns.items() if key.signal != "mode"]
+    empty = np.all([column.blank for column in columns], axis=0)
+    if block.mask is not None:
+        empty &= block.mask != Quality.BAD
+    if not empty.any() or empty.all():
+        return block
+    if not shared:
+        row = int(np.argmax(empty))
+        note = f"{plural(int(empty.sum()), 'row')} without any value left out"
+        rules.tell(note, block, f"{block.place(row)} has no value")
+    return block.rows(~empty)
+
+
+def checked(block: Block, rules: Rules) -> Block:
+    """Return the block with what is no number counted; strict, the first such cell is an error."""
+    for key, column in block.columns.items():
+        if key.signal == "mode":
+            continue
+        missing = ~np.isfinite(column.values)
+        if block.mask is not None:
+            missing &= block.mask != Quality.BAD
+        if not missing.any():
+            continue
+        row = int(np.argmax(missing))
+        said = column.said if column.said and column.row == row else "is bad"
+        listed = ", ".join(
+            f"{count} {word!r}" if word else f"{count} empty"
+            for word, count in column.words.most_common(4)
+        )
+        rules.tell(
+            f"{column.name}: {plural(int(missing.sum()), 'value')} of {len(missing)} "
+            f"missing{f' ({listed})' if listed else ''}",
+            block,
+            f"column {column.name} {said} in {block.place(row)}",
+        )
+    return block
+
+
+def in_order(block: Block, rules: Rules) -> list[Block]:
+    """Return the rows with increasing stamps; several blocks when the clock began anew.
+
+    A clock without a zone that was set back by an hour is put right.
+    """
+    time = block.time
+    steps = np.diff(time)
+    if (steps > 0).all():
+        return [block]
+    falls = np.flatnonzero(steps <= 0)
+    row = int(falls[0]) + 1
+    said = (
+        f"time does not increase at {block.place(row)} ({block.clock.start + time[row - 1]:.9g}, "
+        f"then {block.clock.start + time[row]:.9g} s)"
+    )
+    fix = "sort the rows and remove those that are there twice"
+    if rules.strict:
+        raise InputError(said, where=str(block.path), fix=fix)
+    if np.count_nonzero(steps < 0) > 0.9 * np.count_nonzero(steps):
+        rules.told.append("rows stood from the last to the first and are turned")
+        return in_order(block.rows(np.arange(len(time))[::-1]), rules)
+    back = np.flatnonzero(steps < 0)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    if block.clock.dated and not block.clock.zoned and len(back) == 1:
+        fall = -float(steps[back[0]])
+        if abs(fall + usual - HOUR) <= 0.5 * usual or abs(fall - HOUR) <= 0.5 * usual:
+            moved = time.copy()
+            moved[back[0] + 1 :] += HOUR
+            rules.told.append(
+                f"the clock is set back by an hour at {block.place(int(back[0]) + 1)}: what "
+                "follows is moved on"
+            )
+            return in_order(dataclasses.replace(block, time=moved), rules)
+    if len(back) and len(back) <= 0.001 * len(time) + 3:
+        runs = np.split(np.arange(len(time)), back + 1)
+        longest = [run for run in runs if len(run) >= max(10, 0.02 * len(time))]
+        begins = sorted((float(time[run[0]]), float(time[run[-1]])) for run in longest)
+        overlap = any(b[0] <= a[1] for a, b in itertools.pairwise(begins))
+        if len(longest) > 1 and overlap and not block.clock.dated:
+            rules.told.append(f"time begins anew: {len(longest)} runs")
+            return [one for run in longest for one in in_order(block.rows(run), rules)]
+    order = np.argsort(time, kind="stable")
+    if len(back):
+        rules.told.append(f"{plural(len(back), 'row')} out of order sorted")
+    return [_without_repeats(block.rows(order), rules)]
+
+
+def _without_repeats(block: Block, rules: Rules) -> Block:
+    """Return the last row of each stamp, with what earlier ones have where it has nothing."""
+    last = np.append(np.diff(block.time) > 0, True)
+    if last.all():
+        return block
+    differing = 0
+    first = np.flatnonzero(np.insert(last[:-1], 0, True))
+    group = np.cumsum(np.insert(last[:-1], 0, True)) - 1
+    columns = {}
+    for key, column in block.columns.items():
+        here = np.flatnonzero(~column.blank)
+        values = np.full(len(first), np.nan)
+        blank = np.ones(len(first), dtype=np.bool_)
+        values[group[here]] = column.values[here]
+        blank[group[here]] = False
+        differing += int(np.count_nonzero(column.values[here] != values[group[here]]))
+        columns[key] = dataclasses.replace(column, values=values, blank=blank)
+    kept = block.rows(last)
+    repeats = len(last) - len(first)
+    note = f"{plural(repeats, 'row')} with a stamp that was there already"
+    rules.told.append(
+        f"{note}: the last value counts, {differing} differ" if differing else f"{note} left out"
+    )
+    return dataclasses.replace(kept, columns=columns)
+
+
+def without_outliers(block: Block, rules: Rules) -> Block:
+    """Return OP, PV and SP with NaN where a value is far outside everything else."""
+    columns = dict(block.columns)
+    for key, column in block.columns.items():
+        if key.signal == "mode":
+            continue
+        outside = _outside(column.values)
+        if not outside.any():
+            continue
+        row = int(np.argmax(outside))
+        worst = f"{column.values[row]:g}"
+        rules.tell(
+            f"{column.name}: {plural(int(outside.sum()), 'value')} such as {worst} far outside "
+            "all others taken as missing",
+            block,
+            f"column {column.name} is {worst} in {block.place(row)}, far outside all others",
+        )
+        columns[key] = dataclasses.replace(column, values=np.where(outside, np.nan, column.values))
+    return dataclasses.replace(block, columns=columns)
+
+
+def _outside(values: FloatArray) -> FlagArray:
+    """Return which values are sentinels or stray far from all others, shape (N,)."""
+    there = np.isfinite(values)
+    found = np.zeros(len(values), dtype=np.bool_)
+    if np.count_nonzero(there) < 10:
+        return found
+    known = np.isin(values, SENTINELS)
+    rest = values[there & ~known]
+    if known.any() and len(rest) >= 10:
+        low, high = float(rest.min()), float(rest.max())
+        room = SENTINEL_FAR * max(high - low, 1e-3 * abs(high), 1e-12)
+        found |= known & ((values < low - room) | (values > high + room))
+    usual = values[there & ~found]
+    low, high = np.percentile(usual, [1.0, 99.0])
+    room = FAR * max(float(high - low), 1e-3 * abs(float(high)), 1e-12)
+    stray = there & ~found & ((values < low - room) | (values > high + room))
+    if _isolated(stray, there):
+        found |= stray
+    return found if np.count_nonzero(found) <= RARE * len(values) else np.zeros_like(found)
+
+
+def _isolated(stray: FlagArray, there: FlagArray) -> bool:
+    """Return whether stray values come alone, so that no signal was that far out."""
+    if not stray.any():
+        return False
+    edges = np.diff(np.concatenate([[0], stray[there].astype(np.int8), [0]]))
+    lengths = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
+    return bool(lengths.max() <= HELD and stray.sum() <= 0.02 * there.sum())
+
+
+def filled(block: Block, rules: Rules) -> Block:
+    """Return the block without missing values but in rows that are bad.
+
+    Args:
+        block: one row a sample.
+        rules: what was done is noted there.
+    """
+    count = len(block.time)
+    mask: QualityArray = (
+        np.zeros(count, dtype=np.uint8) if block.mask is None else np.array(block.mask)
+    )
+    columns = dict(block.columns)
+    held, bad = np.zeros(count, dtype=np.bool_), mask == Quality.BAD
+    given = bad.copy()
+    for key, column in block.columns.items():
+        if key.signal == "mode":
+            continue
+        missing = ~np.isfinite(column.values) & ~given
+        if not missing.any():
+            continue
+        if key.signal in ("sp", "stem") and missing.mean() > 0.5:
+            rules.told.append(f"{column.name} is missing at more than half of the rows, left out")
+            columns = {k: c for k, c in columns.items() if k.signal != key.signal}
+            continue
+        short = missing if key.signal == "sp" else _short(missing)
+        values = _carried(column.values, short, block.time, key)
+        short = short & np.isfinite(values)
+        held |= short & (key.signal != "sp")
+        bad |= missing & ~short
+        columns[key] = dataclasses.replace(column, values=values)
+    held &= ~bad
+    mask[held & (mask == Quality.GOOD)] = Quality.HELD
+    mask[bad] = Quality.BAD
+    if held.any():
+        rules.told.append(
+            f"{plural(int(held.sum()), 'sample')} held over at most {HELD} in a row (PV between "
+            "its neighbours)"
+        )
+    if (bad & ~given).any():
+        rules.told.append(f"{plural(int((bad & ~given).sum()), 'sample')} bad, cut out")
+    return dataclasses.replace(block, columns=columns, mask=mask if mask.any() else None)
+
+
+def _short(missing: FlagArray) -> FlagArray:
+    """Return which missing values stand in stretches that are held, shape (N,)."""
+    edges = np.diff(np.concatenate([[0], missing.astype(np.int8), [0]]))
+    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    found = np.zeros(len(missing), dtype=np.bool_)
+    for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
+        inside = first > 0 and last < len(missing)
+        found[first:last] = inside and last - first <= HELD
+    return found
+
+
+def _carried(values: FloatArray, wanted: FlagArray, time: FloatArray, key: Key) -> FloatArray:
+    """Return values with the wanted ones held, or of PV and stem interpolated."""
+    there = np.flatnonzero(np.isfinite(values))
+    if not len(there):
+        return values
+    if key.signal in ("pv", "stem"):
+        return np.where(wanted, np.interp(time, time[there], values[there]), values)
+    before = np.searchsorted(there, np.arange(len(values)), side="right") - 1
+    return np.where(wanted, values[there[np.maximum(before, 0)]], values)

@@ -1,0 +1,186 @@
+"""Cells of a column as numbers or as words, a piece at a time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.effects.behaviour import FloatArray
+
+Cells = Sequence[str] | NDArray[np.float64] | NDArray[np.datetime64]
+"""One column of a piece of a table: text, numbers or stamps."""
+
+BAD_WORDS = re.compile(
+    r"bad|bad input|i/?o timeout|(scan )?timeout|no ?data|no good data|no result|pt created|"
+    r"not connect(ed)?|comm (fail|error)|configure|scan off|out of serv|(under|over) range|"
+    r"shutdown|calc failed|error|#n/a|#(value|ref|name|num|div/0)[!?]|n/?a|-?nan|null|<null>|"
+    r"none|nil|[+-]?inf(inity)?|-+|[?*]|invalid|uncertain|unreliable|stale|no sample|missing|"
+    r"(arc )?off-?line|undefined|questionable|equip fail|intf shut|dcs failed|-?1\.#(ind|qnan|inf)",
+    re.IGNORECASE,
+)
+"""What historians write in the place of a number; anything else that is no number counts too."""
+
+SHOWN = 30
+"""Characters of a cell that an error shows."""
+
+_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_STAMP = re.compile(
+    r"\d{1,4}[./-](\d{1,2}|[^\W\d_]{3,9}\.?)[./-]\d{2,4}([ T,].*)?|\d{8}T?\s?\d{4,6}.*|"
+    r"\d{1,2}:\d\d(:\d\d.*)?"
+)
+
+
+class Wrong(NamedTuple):
+    """The first cell of a column that is no number.
+
+    Attributes:
+        row: of it, counted from the first of the data.
+        said: ``is empty``, ``is 'bad', not a number`` …
+    """
+
+    row: int
+    said: str
+
+
+def number(cell: str) -> float | None:
+    """Return the number in a cell with a decimal point; None for text and for ``1_000``."""
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None
+
+
+def is_number(cell: str) -> bool:
+    """Return whether a cell is a number, with a point or a comma."""
+    cell = cell.strip()
+    return number(cell) is not None or _COMMA.fullmatch(cell) is not None
+
+
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell looks like a date or a time of day."""
+    return _STAMP.fullmatch(cell.strip()) is not None
+
+
+@dataclasses.dataclass
+class Numbers:
+    """A column of numbers as it grows.
+
+    Attributes:
+        decimal_comma: whether a comma alone in a number is the decimal one; else it sets
+            thousands apart.
+        wrong: first cell that is no finite number, None for none.
+        words: what stood in the place of numbers, with its count; empty cells as ``''``.
+    """
+
+    decimal_comma: bool
+    wrong: Wrong | None = None
+    words: Counter[str] = dataclasses.field(default_factory=Counter)
+    _pieces: list[FloatArray] = dataclasses.field(default_factory=list)
+    _blank: list[NDArray[np.bool_]] = dataclasses.field(default_factory=list)
+    _rows: int = 0
+
+    def add(self, cells: Cells) -> None:
+        """Add the next piece of the column."""
+        blank = np.zeros(len(cells), dtype=np.bool_)
+        piece = self._fast(cells, blank)
+        self._pieces.append(self._slow(cells, blank) if piece is None else piece)
+        self._blank.append(blank)
+        self._rows += len(cells)
+
+    def values(self) -> FloatArray:
+        """Return the whole column, shape (N,), NaN where there is no finite number."""
+        return np.concatenate(self._pieces) if self._pieces else np.zeros(0)
+
+    def blank(self) -> NDArray[np.bool_]:
+        """Return which cells are empty, shape (N,)."""
+        return np.concatenate(self._blank) if self._blank else np.zeros(0, dtype=np.bool_)
+
+    def _fast(self, cells: Cells, blank: NDArray[np.bool_]) -> FloatArray | None:
+        """Return a piece of which every cell is a finite number; None for any other."""
+        if isinstance(cells, np.ndarray):
+            if cells.dtype.kind == "M":
+                return None
+            values = np.array(cells, dtype=np.float64)
+            missing = ~np.isfinite(values)
+            if missing.any():
+                self._note(int(np.argmax(missing)), "", int(np.count_nonzero(missing)))
+                values[missing] = np.nan
+                blank |= missing
+            return values
+        text = "".join(cells)
+        if "_" in text or "," in text:
+            return None
+        try:
+            values = np.array(cells, dtype=object).astype(np.float64)
+        except ValueError:
+            return None
+        return values if np.isfinite(values).all() else None
+
+    def _slow(self, cells: Cells, blank: NDArray[np.bool_]) -> FloatArray:
+        values = np.empty(len(cells))
+        for row, cell in enumerate(cells):
+            text = str(cell).strip()
+            value = number(text)
+            if value is None and "," in text:
+                value = number(self._with_point(text))
+            if value is None or not math.isfinite(value):
+                self._note(row, text, 1, not_finite=value is not None)
+                value = math.nan
+                blank[row] = not text
+            values[row] = value
+        return values
+
+    def _with_point(self, text: str) -> str:
+        comma, point = text.rfind(","), text.rfind(".")
+        if point >= 0:
+            return (
+                text.replace(",", "") if point > comma else text.replace(".", "").replace(",", ".")
+            )
+        if self.decimal_comma and text.count(",") == 1:
+            return text.replace(",", ".")
+        grouped = re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+", text)
+        return text.replace(",", "") if grouped and not self.decimal_comma else text
+
+    def _note(self, row: int, text: str, count: int, *, not_finite: bool = False) -> None:
+        self.words[text[:SHOWN]] += count
+        if self.wrong is None:
+            said = f"is {text[:SHOWN]!r}, not a number"
+            if not_finite:
+                said = f"is {text[:SHOWN]}, not a finite number"
+            self.wrong = Wrong(self._rows + row, said if text else "is empty")
+
+
+@dataclasses.dataclass
+class Words:
+    """A column of few different words as it grows.
+
+    Attributes:
+        known: word to its code.
+    """
+
+    known: dict[str, int] = dataclasses.field(default_factory=dict)
+    _pieces: list[NDArray[np.int32]] = dataclasses.field(default_factory=list)
+
+    def add(self, cells: Cells) -> None:
+        """Add the next piece of the column."""
+        if isinstance(cells, np.ndarray):
+            cells = ["" if cell != cell else f"{cell:.9g}" for cell in cells.tolist()]
+        known = self.known
+        codes = [known.setdefault(cell, len(known)) for cell in cells]
+        self._pieces.append(np.array(codes, dtype=np.int32))
+
+    def codes(self) -> NDArray[np.int32]:
+        """Return the code of each cell, shape (N,)."""
+        return np.concatenate(self._pieces) if self._pieces else np.zeros(0, dtype=np.int32)
+
+    def where(self, wanted: set[str]) -> NDArray[np.bool_]:
+        """Return which cells hold one of some words, shape (N,)."""
+        listed = [code for word, code in self.known.items() if word in wanted]
+        return np.asarray(np.isin(self.codes(), listed))

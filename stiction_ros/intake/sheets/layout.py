@@ -1,0 +1,131 @@
+"""Where a table begins: delimiter, titles, header, units."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import re
+from collections.abc import Sequence
+
+from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number, is_stamp
+
+DELIMITERS = ("\t", ";", "|", ",")
+"""In the order in which they are tried: commas and bars may stand inside cells."""
+
+LOOKED_AT = 40
+"""Lines at the top of a file that are looked at."""
+
+UNITS = re.compile(
+    r"%|0-1|0\.\.1|4-20 ?ma|other|pct\.?|percent|prozent|[-–]|none|ratio|share|fraction|"
+    r"s|sec|seconds?|ms|msec|milliseconds?|us|µs|ns|min|minutes?|h|hours?|days?|ma|v|bar[ag]?|mbar|k?pa[ag]?|mpa|psi[ag]?|"
+    r"°?[cfk]|deg ?[cfk]|[kmg]?g/[hs]|t/h|kg/h|l/(h|s|min)|m3/h|m³/h|n?m3/h|nm³/h|m|mm|cm|"
+    r"kg|g|l|m3|m³|rpm|ph|ppm|vol%|wt%|eu|unit|utc|datetime|yyyy.*|dd.*|mm.*|float\d*|double|string",
+    re.IGNORECASE,
+)
+"""What may stand in a row of units."""
+
+BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """Where things are in a table.
+
+    Attributes:
+        header: names of the columns, without units in brackets; empty when there is none.
+        given: names as they stand there.
+        units: unit of each column, empty where not known.
+        first: row of cells (not counting blank ones) at which data begin.
+        skipped: rows above the data that are neither header nor units.
+    """
+
+    header: tuple[str, ...]
+    given: tuple[str, ...]
+    units: tuple[str, ...]
+    first: int
+    skipped: int
+
+
+def delimiter_of(lines: Sequence[str]) -> str:
+    """Return what separates the cells: what stands in most lines the same number of times."""
+    bare = [re.sub('"[^"]*"', "", line) for line in lines if line.strip()]
+    if bare and (named := re.fullmatch(r"\s*sep=(.)\s*", bare[0])):
+        return named[1]
+    for delimiter in DELIMITERS:
+        counts = [line.count(delimiter) for line in bare]
+        if sum(count > 0 for count in counts) > 0.5 * len(counts):
+            return delimiter
+    return max(DELIMITERS, key=lambda d: bare[0].count(d) if bare else 0)
+
+
+def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
+    """Return where header, units and data are.
+
+    Args:
+        rows: the first rows that are not blank, :data:`LOOKED_AT` at most.
+    """
+    first = _first_data(rows)
+    above = list(rows[:first])
+    if above and re.fullmatch(r"sep=.?", above[0][0].strip()):
+        above = above[1:]
+    if not above:
+        return Layout((), (), (), first, 0)
+    width = len(rows[first]) if first < len(rows) else max(map(len, above))
+    place = _header_place(above, width)
+    given = tuple(" ".join(cell.split()) for cell in above[place])
+    header, units = [], []
+    for name in given:
+        found = BRACKETS.search(name)
+        bare = BRACKETS.sub("", name) if found else name
+        header.append(bare if bare else name)
+        units.append(found[1].strip() if found and bare else "")
+    below = above[place + 1 :]
+    for row in list(below):
+        if _is_units(row):
+            units = [unit or cell.strip() for unit, cell in _paired(units, row)]
+            below.remove(row)
+            break
+    skipped = place + len(below)
+    return Layout(tuple(header), given, tuple(units), first, skipped)
+
+
+def _paired(units: Sequence[str], row: Sequence[str]) -> list[tuple[str, str]]:
+    return [(unit, row[k] if k < len(row) else "") for k, unit in enumerate(units)]
+
+
+def _first_data(rows: Sequence[Sequence[str]]) -> int:
+    """Return the first row that looks like data; else the second one."""
+    for place, row in enumerate(rows):
+        cells = [cell.strip() for cell in row if cell.strip()]
+        told = sum(is_number(c) or is_stamp(c) for c in cells)
+        silent = sum(bool(BAD_WORDS.fullmatch(c)) for c in cells)
+        if told and told + silent >= 0.5 * len(cells) and not _is_units(row) and len(row) > 1:
+            return place
+    return min(1, len(rows))
+
+
+def _header_place(above: Sequence[Sequence[str]], width: int) -> int:
+    """Return which row holds the names: the one with most of them known, else the fullest."""
+    from stiction_ros.intake.tables.tags import is_name
+
+    def rank(place: int) -> tuple[int, int, int]:
+        row = above[place]
+        full = sum(bool(cell.strip()) for cell in row)
+        known = sum(is_name(BRACKETS.sub("", cell)) for cell in row)
+        return (known, min(full, width), -place)
+
+    return max(range(len(above)), key=rank)
+
+
+def _is_units(row: Sequence[str]) -> bool:
+    cells = [cell.strip().strip("[]()") for cell in row]
+    told = [cell for cell in cells if cell]
+    if not told or all(is_number(cell) for cell in told):
+        return False
+    return all(UNITS.fullmatch(cell) for cell in told)
+
+
+def split_line(lines: Sequence[str], delimiter: str) -> list[list[str]]:
+    """Return the cells of lines, blank ones left out."""
+    rows = csv.reader(lines, delimiter=delimiter)
+    return [row for row in rows if any(cell.strip() for cell in row)]

@@ -1,0 +1,207 @@
+"""A table in a file, read a piece at a time."""
+
+from __future__ import annotations
+
+import abc
+import contextlib
+import csv
+import itertools
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake.sheets import text
+from stiction_ros.intake.sheets.cells import Cells, is_number
+from stiction_ros.intake.sheets.layout import LOOKED_AT, Layout, delimiter_of, layout_of
+
+PIECE = 200_000
+"""Cells that are held as text at one time."""
+
+_POINT, _COMMA = re.compile(r"[+-]?\d+\.\d+"), re.compile(r"[+-]?\d+,\d+")
+
+
+class Piece(NamedTuple):
+    """Some rows of a table.
+
+    Attributes:
+        columns: cells of each column.
+        lines: line of each row in the file, shape (n,).
+    """
+
+    columns: Sequence[Cells]
+    lines: NDArray[np.int64]
+
+
+class Sheet(abc.ABC):
+    """A table with a header.
+
+    Attributes:
+        path: of the file.
+        name: of the table: the file's, and the sheet's of a workbook that has several.
+        layout: header, units, where data begin.
+        decimal_comma: whether a comma alone in a number is the decimal one.
+    """
+
+    path: Path
+    name: str
+    layout: Layout
+    decimal_comma: bool = False
+
+    @abc.abstractmethod
+    def pieces(self) -> Iterator[Piece]:
+        """Yield the rows of data.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+
+    @property
+    def row_word(self) -> str:
+        """What a row is called in errors."""
+        return "line"
+
+    def find(self, name: str) -> int | None:
+        """Return the index of the column ``name``, its exact case first; None if absent.
+
+        Raises:
+            InputError: it is there more than once.
+        """
+        name = " ".join(name.split())
+        folded = name.casefold()
+        for names in (self.layout.given, self.layout.header):
+            exact = [i for i, column in enumerate(names) if column == name]
+            found = exact or [i for i, column in enumerate(names) if column.casefold() == folded]
+            if len(found) > 1:
+                raise InputError(
+                    f"column {name} is there {len(found)} times",
+                    where=str(self.path),
+                    fix="rename one of them",
+                )
+            if found:
+                return found[0]
+        return None
+
+    def column(self, name: str, option: str) -> int:
+        """Return the index of the column ``name``.
+
+        Raises:
+            InputError: there is none; the columns that are there, and how to choose.
+        """
+        index = self.find(name)
+        if index is None:
+            raise InputError(
+                f"has no column {name}",
+                where=str(self.path),
+                fix=f"its columns are {', '.join(self.layout.given)}; choose with {option}",
+            )
+        return index
+
+
+Rows = Callable[[], contextlib.AbstractContextManager[Iterator[tuple[int, list[str]]]]]
+"""Opens a table anew and gives its rows with the numbers of their lines."""
+
+
+class RowSheet(Sheet):
+    """A table of text cells, row by row.
+
+    Args:
+        path: of the file.
+        name: of the table.
+        rows: opens it.
+        delimiter: between the cells, empty for a workbook.
+
+    Raises:
+        InputError: it is empty, has no header, or more cells than names.
+    """
+
+    def __init__(self, path: Path, name: str, rows: Rows, delimiter: str) -> None:
+        self.path, self.name, self._rows = path, name, rows
+        with rows() as opened:
+            filled = (cells for _, cells in opened if any(cell.strip() for cell in cells))
+            top = list(itertools.islice(filled, LOOKED_AT))
+        where = str(path)
+        if not top:
+            raise InputError("is empty", where=where, fix="give a CSV file with a header")
+        self.layout = layout_of(top)
+        if not self.layout.header or all(is_number(cell) for cell in self.layout.header):
+            raise InputError(
+                "has no header, its first line is numbers",
+                where=where,
+                fix="put the names of the columns above them, such as t,OP,PV,SP",
+            )
+        data = top[self.layout.first :]
+        spare = [row for row in data if any(c.strip() for c in row[len(self.layout.header) :])]
+        if data and len(spare) == len(data):
+            raise InputError(
+                f"has {len(data[0])} cells under {len(self.layout.header)} names",
+                where=where,
+                fix="name every column; decimal commas need semicolons or tabs between the cells",
+            )
+        self.decimal_comma = delimiter != "," or _commas(data)
+
+    def pieces(self) -> Iterator[Piece]:
+        width = len(self.layout.header)
+        size = max(PIECE // width, 256)
+        with self._rows() as opened:
+            filled = (
+                (line, cells)
+                for line, cells in opened
+                if (cells and cells[0]) or any(cell.strip() for cell in cells)
+            )
+            data = itertools.islice(filled, self.layout.first, None)
+            while piece := list(itertools.islice(data, size)):
+                lines, rows = zip(*piece, strict=True)
+                padded = [row[:width] + [""] * (width - len(row)) for row in rows]
+                yield Piece(list(zip(*padded, strict=True)), np.array(lines))
+
+
+def _commas(rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether quoted numbers have decimal commas: some have commas and none a point."""
+    cells = [cell.strip() for row in rows for cell in row]
+    return any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
+
+
+def text_sheet(path: Path) -> Sheet:
+    """Open a text file; comma, semicolon, tab or bar between the cells.
+
+    Raises:
+        InputError: as :func:`stiction_ros.intake.sheets.text.open_text` and :class:`RowSheet`.
+    """
+    with text.open_text(path) as opened:
+        lines = [line for line in itertools.islice(opened, LOOKED_AT) if line.strip()]
+    delimiter = delimiter_of(lines)
+
+    @contextlib.contextmanager
+    def rows() -> Iterator[Iterator[tuple[int, list[str]]]]:
+        with text.open_text(path) as opened:
+            reader = csv.reader(opened, delimiter=delimiter)
+            try:
+                yield ((reader.line_num, cells) for cells in reader)
+            except csv.Error as error:
+                raise InputError(
+                    f"line {reader.line_num} is no CSV ({error})", where=str(path)
+                ) from None
+
+    return RowSheet(path, stem(path), rows, delimiter)
+
+
+def stem(path: Path) -> str:
+    """Return the name of a file without what its kind is called: ``a.csv.gz`` → ``a``."""
+    name = path.name
+    for _ in range(2):
+        base, dot, suffix = name.rpartition(".")
+        if not dot or not base or f".{suffix.lower()}" not in SUFFIXES:
+            break
+        name = base
+    return name
+
+
+TEXT = ("csv", "tsv", "txt", "tab", "dat", "gz", "zst", "zstd")
+
+SUFFIXES = frozenset(f".{end}" for end in (*TEXT, "parquet", "pq", "xlsx", "xlsm", "mcap"))
+"""Ends of the names of files that are read from folders."""

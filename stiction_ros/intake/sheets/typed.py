@@ -1,0 +1,153 @@
+"""Workbooks and Parquet files, by packages of the extra ``survey``."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import functools
+import warnings
+import weakref
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake.sheets import text
+from stiction_ros.intake.sheets.cells import Cells
+from stiction_ros.intake.sheets.layout import BRACKETS, Layout
+from stiction_ros.intake.sheets.sheet import PIECE, Piece, RowSheet, Sheet, stem, text_sheet
+
+INSTALL = "install the extra: pip install 'stiction_ros[survey]'"
+
+
+def open_sheets(path: Path) -> list[Sheet]:
+    """Open the tables of a file, whatever kind it is; a workbook may hold several.
+
+    Raises:
+        InputError: it cannot be read, holds no table, or the package for it is missing.
+    """
+    first = text.magic(path)
+    if first.startswith(text.PARQUET):
+        return [ParquetSheet(path)]
+    if first.startswith(text.ZIP) and path.suffix.lower() in (".xlsx", ".xlsm"):
+        return _workbook(path)
+    return [text_sheet(path)]
+
+
+class ParquetSheet(Sheet):
+    """A Parquet file; numbers and stamps come as they are.
+
+    Raises:
+        InputError: pyarrow is missing, or the file is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import pyarrow as arrow
+            import pyarrow.parquet as parquet
+        except ImportError:
+            raise InputError("needs pyarrow", where=str(path), fix=INSTALL) from None
+        self.path, self.name, self._arrow, self._parquet = path, stem(path), arrow, parquet
+        with self._open() as file:
+            names = tuple(" ".join(str(name).split()) for name in file.schema_arrow.names)
+        bare = tuple(BRACKETS.sub("", name) or name for name in names)
+        found = [BRACKETS.search(name) for name in names]
+        units = tuple(hit[1].strip() if hit else "" for hit in found)
+        self.layout = Layout(bare, names, units, 0, 0)
+
+    @property
+    def row_word(self) -> str:
+        return "row"
+
+    def pieces(self) -> Iterator[Piece]:
+        size = max(PIECE // max(len(self.layout.header), 1), 256)
+        first = 1
+        with self._open() as file:
+            for batch in file.iter_batches(batch_size=size):
+                columns = [self._cells(column) for column in batch.columns]
+                yield Piece(columns, np.arange(first, first + batch.num_rows))
+                first += batch.num_rows
+
+    def _cells(self, column: Any) -> Cells:
+        kind = column.type
+        types = self._arrow.types
+        if types.is_timestamp(kind) or types.is_date(kind):
+            stamps = column.cast(self._arrow.timestamp("us", tz=getattr(kind, "tz", None)))
+            whole = stamps.cast(self._arrow.int64()).fill_null(np.iinfo(np.int64).min)
+            return np.asarray(whole.to_numpy(zero_copy_only=False)).view("datetime64[us]")
+        if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
+            values = column.cast(self._arrow.float64()).to_numpy(zero_copy_only=False)
+            return np.asarray(values, dtype=np.float64)
+        return ["" if value is None else str(value) for value in column.to_pylist()]
+
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[Any]:
+        try:
+            with self._parquet.ParquetFile(self.path) as file:
+                yield file
+        except (self._arrow.ArrowException, OSError) as error:
+            said = str(error).splitlines()[0][:80]
+            raise InputError(f"cannot be read ({said})", where=str(self.path)) from None
+
+
+class _Book:
+    """A workbook that its sheets share: what they have in common is read once."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import openpyxl
+        except ImportError:
+            raise InputError("needs openpyxl", where=str(path), fix=INSTALL) from None
+        self.path = path
+        with self.damage_told(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles and the like, which are not read
+            self.book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        weakref.finalize(self, self.book.close)
+
+    @contextlib.contextmanager
+    def damage_told(self) -> Iterator[None]:
+        """Turn what openpyxl raises into an InputError."""
+        try:
+            yield
+        except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"is no workbook ({error})", where=str(self.path)) from None
+
+    @contextlib.contextmanager
+    def rows(self, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
+        """Open a sheet; its rows with their numbers."""
+        with self.damage_told():
+            yield (
+                (line, [_text(value) for value in row])
+                for line, row in enumerate(self.book[title].iter_rows(values_only=True), start=1)
+            )
+
+
+def _workbook(path: Path) -> list[Sheet]:
+    book = _Book(path)
+    titles = [sheet.title for sheet in book.book.worksheets]
+    found: list[Sheet] = []
+    refused: list[InputError] = []
+    for title in titles:
+        try:
+            rows = functools.partial(book.rows, title)
+            found.append(RowSheet(path, f"{stem(path)}:{title}", rows, ""))
+        except InputError as error:
+            refused.append(error)
+    if not found:
+        raise refused[0] if refused else InputError("has no sheet", where=str(path))
+    if len(found) == 1:
+        found[0].name = stem(path)
+    return found
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, datetime.datetime):
+        return value.isoformat(sep=" ")
+    return repr(value) if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""From the cells of tables to blocks of signals, one loop each."""

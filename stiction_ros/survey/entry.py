@@ -1,0 +1,115 @@
+"""What a survey says about one loop."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Mapping
+from typing import Any
+
+Interval = tuple[float, float]
+
+
+class Status(enum.StrEnum):
+    """How far a loop came.
+
+    ``OK``: it was judged. ``SKIPPED``: it was read and there is nothing to judge, as in manual.
+    ``FAILED``: it could not be read, or judging it broke off.
+    """
+
+    OK = "ok"
+    SKIPPED = "skipped"
+    FAILED = "failed"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cycling:
+    """How PV − SP oscillates: period in s, amplitude in engineering units."""
+
+    period: float | None
+    regularity: float
+    amplitude: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """One row of the list; None where there is nothing to say.
+
+    Attributes:
+        name: tag of the loop.
+        files: that it was read from.
+        status, reason: how far it came and why no further; reason is empty when it was judged.
+        samples: of all parts.
+        sample_time: s.
+        auto_share: share of the samples in automatic.
+        saturated_share: share of those with OP at rest at an end of its range.
+        oscillation: of PV − SP.
+        verdict: of the valve.
+        cause: of the oscillation.
+        f_s, f_d: frictions with their intervals, in the unit of OP.
+        band_share: f_S + f_D over the width of OP's movement.
+        travel_per_hour, reversals_per_hour: of the stem, as recorded.
+        gain: measures now and by option, as ``stiction gain`` gives them.
+        confidence: in the verdict, 0 to 1, see :mod:`.ranking`.
+        cost_per_hour: what the cycle costs, where a cost was given.
+        rank: place in the list, from 1.
+        group: number of the group of loops that cycle together, from 1.
+        report: page of the loop, relative to the list.
+        op_unit: what OP, friction and travel are in.
+        notes: what was repaired, left out, found; one sentence each.
+        beats: when cycles begin, s on the clock of the record.
+    """
+
+    name: str
+    files: tuple[str, ...]
+    status: Status
+    reason: str = ""
+    samples: int | None = None
+    sample_time: float | None = None
+    auto_share: float | None = None
+    saturated_share: float | None = None
+    oscillation: Cycling | None = None
+    verdict: str | None = None
+    cause: str | None = None
+    f_s: float | None = None
+    f_s_interval: Interval | None = None
+    f_d: float | None = None
+    f_d_interval: Interval | None = None
+    band_share: float | None = None
+    travel_per_hour: float | None = None
+    reversals_per_hour: float | None = None
+    gain: Mapping[str, Any] | None = None
+    confidence: float | None = None
+    cost_per_hour: float | None = None
+    rank: int | None = None
+    group: int | None = None
+    report: str | None = None
+    op_unit: str = "%"
+    notes: tuple[str, ...] = ()
+    beats: tuple[float, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of ``survey --json``."""
+        row = dataclasses.asdict(self)
+        del row["beats"]
+        return row
+
+    def to_line(self) -> dict[str, Any]:
+        """Return all of it, as :meth:`from_line` takes it."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_line(cls, line: Mapping[str, Any]) -> Entry:
+        """Return the entry of a mapping that :meth:`to_line` made, also through JSON."""
+        row = dict(line)
+        cycle = row["oscillation"]
+        row["oscillation"] = None if cycle is None else Cycling(**cycle)
+        row["status"] = Status(row["status"])
+        for key in ("files", "f_s_interval", "f_d_interval", "notes", "beats"):
+            row[key] = None if row[key] is None else tuple(row[key])
+        return cls(**row)
+
+    @property
+    def found(self) -> bool:
+        """Whether the valve was found to stick or to have backlash."""
+        return self.verdict in ("sticky", "backlash")

@@ -1,0 +1,105 @@
+"""Results as they come, a line each, from which a survey that was broken off goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake.loop import Loop
+from stiction_ros.json_values import json_text
+from stiction_ros.survey.entry import Entry
+
+FILE = "loops.jsonl"
+
+
+class Journal:
+    """One file; its first line says what the options were, each other one holds a loop."""
+
+    def __init__(self, folder: Path, mark: str, *, resume: bool) -> None:
+        """Open the journal of a folder.
+
+        Args:
+            folder: of the survey; it is there.
+            mark: of the options.
+            resume: whether what is there counts; else it is begun anew.
+
+        Raises:
+            InputError: it was written with other options, or by something else.
+        """
+        self.path = folder / FILE
+        self.known: dict[str, Entry] = {}
+        if resume and self.path.exists():
+            whole = self._read(mark)
+            self._file: IO[bytes] = self.path.open("r+b")
+            self._file.seek(whole)
+            self._file.truncate()
+        else:
+            self._file = self.path.open("wb")
+        if not self._file.tell():
+            self._write({"survey": 1, "options": mark})
+
+    def _read(self, mark: str) -> int:
+        """Take in what is there, and return the bytes of its whole lines."""
+        where, whole = str(self.path), 0
+        with self.path.open("rb") as file:
+            for number, text in enumerate(file):
+                if not text.endswith(b"\n"):
+                    break  # broken off while it was written
+                try:
+                    line = json.loads(text)
+                    if number:
+                        self.known[line["key"]] = Entry.from_line(line["entry"])
+                except (json.JSONDecodeError, KeyError, TypeError, ValueError):
+                    raise InputError(
+                        f"line {number + 1} is no result of a survey",
+                        where=where,
+                        fix="leave out --resume, or remove the file",
+                    ) from None
+                if not number:
+                    _check(line, mark, where)
+                whole += len(text)
+        return whole
+
+    def add(self, key: str, entry: Entry) -> None:
+        """Keep a loop."""
+        self.known[key] = entry
+        self._write({"key": key, "entry": entry.to_line()})
+
+    def _write(self, line: Any) -> None:
+        self._file.write(json_text(line, indent=None).encode() + b"\n")
+        self._file.flush()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._file.close()
+
+
+def key_of(loop: Loop) -> str:
+    """Return what tells a loop with its files as they are now from all others."""
+    parts: list[Any] = [loop.name]
+    for file in loop.files:
+        status = file.stat() if file.exists() else None
+        parts.append([str(file), *([status.st_size, status.st_mtime_ns] if status else [])])
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]
+
+
+def _check(line: Any, mark: str, where: str) -> None:
+    if not isinstance(line, dict) or line.get("survey") != 1:
+        raise InputError("was not written by a survey", where=where, fix="name another folder")
+    if line.get("options") != mark:
+        raise InputError(
+            "was written with other options",
+            where=where,
+            fix="use the same ones, or leave out --resume to begin anew",
+        )

@@ -1,0 +1,112 @@
+"""In which order loops are serviced: the one rule, and its reason.
+
+1. *Kind*: valves that stick or have backlash and make their loop cycle; then those found whose
+   cycle has another cause, where a service helps less; then valves that the record does not
+   decide, which are worth a look; then healthy valves in loops that cycle for another reason,
+   which are nobody's work in the valve shop; then the rest; at the end what was not judged.
+2. Among one kind *confidence × worth*, so that a planner who works from the top down finds what
+   is surest and largest first. Worth is the band's share of OP's movement, which is what of the
+   controller's work never reaches the process; where a cost was given it is multiplied by what
+   the cycle costs over the median of what was given, so that money counts where it is known and
+   a loop without a figure stands as one that costs as much as most.
+
+*Confidence* in a friction that was found is the product of: how well its size is known (1 for a
+point, .5 for an interval as wide as twice its middle), how often it was seen (n/(n + 3) for a stem
+that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees
+(1 where it says the valve is the cause, .8 where it does not tell, .6 where it names another
+one), and how well the answer held still over variants of the record, where identification says
+that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.survey.entry import Entry, Status
+
+AGREES = {"valve": 1.0, "none": 0.8, "unknown": 0.8}
+"""Factor by the cause that the closed loop names; for the others :data:`DISAGREES`."""
+
+DISAGREES = 0.6
+
+OPEN = 0.3
+"""Confidence in a verdict that is open."""
+
+HEALTHY = 0.9
+"""Confidence in a healthy valve: friction that never had to slip is not seen."""
+
+
+HALF_SEEN = 3.0
+"""Reversals of the stem from which a friction is half believed."""
+
+
+def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> float:
+    """Return the confidence in a verdict, 0 to 1.
+
+    Args:
+        valve: entry of ``valves`` of ``identify --json``.
+        cause: of the oscillation of its output.
+        reversals: of the estimated stem in the record.
+    """
+    stability = valve.get("stability")
+    steady = float(stability) if isinstance(stability, int | float) else 1.0
+    steady = min(max(steady, 0.0), 1.0)
+    if valve["verdict"] == "undecided":
+        return OPEN * steady
+    if valve["verdict"] == "healthy":
+        return HEALTHY * steady
+    low, high = valve["f_s_interval"]
+    known = 1.0 / (1.0 + (high - low) / max(high + low, 1e-12))
+    seen = reversals / (reversals + HALF_SEEN)
+    return float(known) * seen * AGREES.get(cause or "unknown", DISAGREES) * steady
+
+
+def kind(entry: Entry) -> int:
+    """Return the kind of a loop, 0 first."""
+    if entry.status is not Status.OK:
+        return 5
+    if entry.found:
+        return 0 if entry.cause == "valve" else 1
+    if entry.verdict == "undecided":
+        return 2
+    return 3 if entry.cause not in (None, "none") else 4
+
+
+def ranked(entries: Sequence[Entry], costs: Mapping[str, float]) -> list[Entry]:
+    """Return the entries in their order with rank and what their cycles cost.
+
+    Args:
+        entries: of all loops.
+        costs: by name, money per hour for a |PV − SP| of one engineering unit.
+    """
+    priced = [
+        dataclasses.replace(entry, cost_per_hour=_cost(entry, costs.get(entry.name)))
+        for entry in entries
+    ]
+    known = [entry.cost_per_hour for entry in priced if entry.cost_per_hour]
+    usual = float(np.median(known)) if known else 1.0
+
+    def worth(entry: Entry) -> float:
+        money = 1.0 if entry.cost_per_hour is None else entry.cost_per_hour / usual
+        size = min(entry.band_share or 0.0, 1.0) if entry.found else 1.0
+        return (entry.confidence or 0.0) * size * money
+
+    order = sorted(priced, key=lambda entry: (kind(entry), -worth(entry), entry.name))
+    return [dataclasses.replace(entry, rank=place) for place, entry in enumerate(order, start=1)]
+
+
+def _cost(entry: Entry, cost: float | None) -> float | None:
+    """Return what the cycle costs an hour: what a service saves, else the mean of a sine."""
+    if cost is None or entry.status is not Status.OK:
+        return None
+    if entry.gain:
+        now, service = entry.gain.get("now") or {}, entry.gain.get("service") or {}
+        before, after = now.get("iae_per_hour"), service.get("iae_per_hour")
+        if before is not None and after is not None:
+            return cost * max(float(before) - float(after), 0.0)
+    amplitude = 0.0 if entry.oscillation is None else entry.oscillation.amplitude
+    return float(cost * 2.0 / np.pi * amplitude)

@@ -1,0 +1,182 @@
+"""A whole survey: loops in, results as they come, the list, its pages and tables."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake.loop import Loop
+from stiction_ros.survey.engine import Engine, Task
+from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.groups import Group, grouped
+from stiction_ros.survey.journal import Journal, key_of
+from stiction_ros.survey.options import SurveyOptions
+from stiction_ros.survey.ranking import ranked
+
+Progress = Callable[[int, int, Entry], None]
+"""Loops that are done, loops known of so far, and the last one."""
+
+PAGES = "loops"
+LOG = "survey.log"
+
+
+@dataclasses.dataclass(frozen=True)
+class Survey:
+    """What a survey found.
+
+    Attributes:
+        engine, workers, seconds: how it was done.
+        entries: by rank.
+        groups: of loops that cycle together.
+        date: when it was done, ISO.
+    """
+
+    engine: str
+    workers: int
+    seconds: float
+    entries: tuple[Entry, ...]
+    groups: tuple[Group, ...]
+    date: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``survey --json``."""
+        minutes = max(self.seconds, 1e-9) / 60.0
+        return {
+            "engine": self.engine,
+            "workers": self.workers,
+            "seconds": self.seconds,
+            "loops_per_minute": len(self.entries) / minutes,
+            "date": self.date,
+            "groups": [dataclasses.asdict(group) for group in self.groups],
+            "loops": [entry.to_json() for entry in self.entries],
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """How a survey is done.
+
+    Attributes:
+        options: of each loop.
+        out: folder of journal, log and pages; None keeps nothing.
+        resume: whether what the folder holds already is not done again.
+        costs: by loop, see :func:`.ranking.ranked`.
+    """
+
+    options: SurveyOptions
+    out: Path | None = None
+    resume: bool = False
+    costs: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+def survey(
+    loops: Iterable[Loop], plan: Plan, engine: Engine, progress: Progress | None = None
+) -> Survey:
+    """Judge every loop and rank them.
+
+    Args:
+        loops: drawn one after the other, no faster than the engine takes them.
+        plan: how.
+        engine: where; it is closed at the end, whatever happens.
+        progress: called after each loop.
+
+    Raises:
+        InputError: a folder that cannot be written, or a journal of another survey.
+    """
+    if plan.out is None:
+        if plan.resume:
+            raise InputError("has nothing to go on from", where="--resume", fix="add --out DIR")
+        run = _Run(plan, engine, None, None)
+        return run.done(loops, progress)
+    try:
+        (plan.out / PAGES).mkdir(parents=True, exist_ok=True)
+        with (
+            Journal(plan.out, plan.options.mark(), resume=plan.resume) as journal,
+            (plan.out / LOG).open("a" if plan.resume else "w", encoding="utf-8") as log,
+        ):
+            return _Run(plan, engine, journal, log).done(loops, progress)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror or error})", where=str(plan.out)
+        ) from None
+
+
+class _Run:
+    """One survey on its way."""
+
+    def __init__(
+        self, plan: Plan, engine: Engine, journal: Journal | None, log: IO[str] | None
+    ) -> None:
+        self.plan, self.engine, self.journal, self.log = plan, engine, journal, log
+        self.entries: dict[str, Entry] = {}
+        self.drawn = 0
+        self._pages: set[str] = set()
+
+    def done(self, loops: Iterable[Loop], progress: Progress | None) -> Survey:
+        begun, workers = time.perf_counter(), self.engine.workers
+        tasks = self._tasks(loops, progress)
+        try:
+            for done in self.engine.run(tasks, self.plan.options):
+                entry = self._kept(done.assessed.entry, done.assessed.page)
+                self.entries[done.task.key] = entry
+                if self.journal is not None:
+                    self.journal.add(done.task.key, entry)
+                self._tell(entry.name, done.assessed.log)
+                if progress is not None:
+                    progress(len(self.entries), self.drawn, entry)
+        finally:
+            self.engine.close()
+        rows, groups = grouped(sorted(self.entries.values(), key=lambda entry: entry.name))
+        order = ranked(rows, self.plan.costs)
+        seconds = time.perf_counter() - begun
+        return Survey(self.engine.name, workers, seconds, tuple(order), tuple(groups))
+
+    def _tasks(self, loops: Iterable[Loop], progress: Progress | None) -> Iterator[Task]:
+        """Yield the loops that are not known yet; those that are, are taken as they are."""
+        seen: dict[str, int] = {}
+        for loop in loops:
+            self.drawn += 1
+            number = seen.get(loop.name, 0) + 1
+            seen[loop.name] = number
+            if number > 1:  # two files of one name in two folders are two loops
+                loop = dataclasses.replace(loop, name=f"{loop.name} ({number})")
+            key = key_of(loop)
+            known = None if self.journal is None else self.journal.known.get(key)
+            if known is None:
+                yield Task(key, loop)
+                continue
+            self.entries[key] = known
+            if known.report is not None:
+                self._pages.add(Path(known.report).name)
+            self._tell(known.name, ("taken from the survey before",))
+            if progress is not None:
+                progress(len(self.entries), self.drawn, known)
+
+    def _kept(self, entry: Entry, page: str) -> Entry:
+        """Write the page of a loop and return the entry that names it."""
+        if not page or self.plan.out is None:
+            return entry
+        name = self._page_name(entry.name)
+        (self.plan.out / PAGES / name).write_text(page, encoding="utf-8")
+        return dataclasses.replace(entry, report=f"{PAGES}/{name}")
+
+    def _page_name(self, loop: str) -> str:
+        base = re.sub(r"[^\w.-]+", "_", loop).strip("._")[:80] or "loop"
+        names = itertools.chain([base], (f"{base}-{k}" for k in itertools.count(2)))
+        name = next(f"{n}.html" for n in names if f"{n}.html" not in self._pages)
+        self._pages.add(name)
+        return name
+
+    def _tell(self, name: str, sentences: Sequence[str]) -> None:
+        if self.log is None:
+            return
+        for sentence in sentences:
+            line = " ".join(sentence.split())
+            self.log.write(f"{name}: {line}\n")
+        self.log.flush()

@@ -1,0 +1,171 @@
+"""The list as CSV and XLSX, for the maintenance system."""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from stiction_ros.survey.entry import Entry
+
+Cell = str | float | int | None
+
+HEAD = (
+    "rank",
+    "loop",
+    "status",
+    "verdict",
+    "cause",
+    "confidence",
+    "f_S",
+    "f_S low",
+    "f_S high",
+    "f_D",
+    "band share of OP",
+    "period s",
+    "amplitude",
+    "travel %/h",
+    "reversals/h",
+    "IAE now",
+    "IAE after service",
+    "IAE with embedding",
+    "IAE retuned",
+    "cost per hour",
+    "group",
+    "reason",
+    "page",
+)
+
+STAMP = (1980, 1, 1, 0, 0, 0)
+"""Time of the files inside the XLSX: the same list is the same file."""
+
+_TYPES = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="xml" ContentType="application/xml"/>
+<Override PartName="/xl/workbook.xml" ContentType=\
+"application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/>
+<Override PartName="/xl/worksheets/sheet1.xml" ContentType=\
+"application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"/>
+</Types>"""
+
+_TOP = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="r1" Type=\
+"http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument" \
+Target="xl/workbook.xml"/>
+</Relationships>"""
+
+_BOOK = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+<workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" xmlns:r=\
+"http://schemas.openxmlformats.org/officeDocument/2006/relationships">
+<sheets><sheet name="loops" sheetId="1" r:id="r1"/></sheets></workbook>"""
+
+_BOOK_PARTS = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="r1" Type=\
+"http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" \
+Target="worksheets/sheet1.xml"/>
+</Relationships>"""
+
+_SHEET = """<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main">
+<sheetViews><sheetView workbookViewId="0"><pane xSplit="2" ySplit="1" topLeftCell="C2" \
+state="frozen"/></sheetView></sheetViews>
+<cols><col min="1" max="1" width="7" customWidth="1"/>\
+<col min="2" max="2" width="24" customWidth="1"/></cols>
+<sheetData>{rows}</sheetData><autoFilter ref="A1:{last}"/></worksheet>"""
+
+
+def cells(entry: Entry) -> list[Cell]:
+    """Return the row of a loop under :data:`HEAD`."""
+    cycle, gain = entry.oscillation, entry.gain or {}
+    low, high = entry.f_s_interval or (None, None)
+
+    def iae(what: str) -> Cell:
+        measures = gain.get(what) or {}
+        value = measures.get("iae_per_hour")
+        return None if value is None else float(value)
+
+    return [
+        entry.rank,
+        entry.name,
+        entry.status.value,
+        entry.verdict,
+        entry.cause,
+        entry.confidence,
+        entry.f_s,
+        low,
+        high,
+        entry.f_d,
+        entry.band_share,
+        None if cycle is None else cycle.period,
+        None if cycle is None else cycle.amplitude,
+        entry.travel_per_hour,
+        entry.reversals_per_hour,
+        iae("now"),
+        iae("service"),
+        iae("embedding"),
+        iae("retune"),
+        entry.cost_per_hour,
+        entry.group,
+        entry.reason or None,
+        entry.report,
+    ]
+
+
+def write_csv(path: Path, entries: Sequence[Entry]) -> None:
+    """Write the list as CSV, UTF-8 with a mark that spreadsheets know it by."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(HEAD)
+    for entry in entries:
+        writer.writerow(["" if cell is None else _short(cell) for cell in cells(entry)])
+    path.write_text(text.getvalue(), encoding="utf-8-sig", newline="")
+
+
+def write_xlsx(path: Path, entries: Sequence[Entry]) -> None:
+    """Write the list as a workbook of one sheet (ECMA-376), its head frozen and with filters."""
+    table: list[list[Cell]] = [list(HEAD), *[cells(entry) for entry in entries]]
+    rows = "".join(_row(number, row) for number, row in enumerate(table, start=1))
+    sheet = _SHEET.format(rows=rows, last=f"{_column(len(HEAD))}{len(table)}")
+    parts = {
+        "[Content_Types].xml": _TYPES,
+        "_rels/.rels": _TOP,
+        "xl/workbook.xml": _BOOK,
+        "xl/_rels/workbook.xml.rels": _BOOK_PARTS,
+        "xl/worksheets/sheet1.xml": sheet,
+    }
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
+        for name, content in parts.items():
+            info = zipfile.ZipInfo(name, STAMP)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            book.writestr(info, content)
+
+
+def _row(number: int, row: Sequence[Cell]) -> str:
+    made = []
+    for column, value in enumerate(row, start=1):
+        place = f"{_column(column)}{number}"
+        if isinstance(value, str):
+            text = escape("".join(c for c in value if c >= " " or c in "\t\n"))
+            made.append(f'<c r="{place}" t="inlineStr"><is><t>{text}</t></is></c>')
+        elif value is not None:
+            made.append(f'<c r="{place}"><v>{value!r}</v></c>')
+    return f'<row r="{number}">{"".join(made)}</row>'
+
+
+def _column(number: int) -> str:
+    """Return the letters of a column, from 1."""
+    letters = ""
+    while number:
+        number, rest = divmod(number - 1, 26)
+        letters = chr(ord("A") + rest) + letters
+    return letters
+
+
+def _short(value: Cell) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

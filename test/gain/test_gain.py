@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from stiction_ros.errors import InputError
+from stiction_ros.gain.draws import drawn_frictions
+from stiction_ros.gain.gain import Gain, What, gain_of
+from stiction_ros.gain.model_gain import gain_of_model
+from stiction_ros.gain.stems import stems_of
+from stiction_ros.identification import Identification, VerdictKind, identify
+from stiction_ros.loop import LoopModel
+from stiction_ros.loop.closed_loop import PiController, simulate_closed_loop
+from stiction_ros.loop.set_points import SetPoints
+from stiction_ros.records.record import Record
+
+MODEL = {
+    "loop": "FIC1",
+    "sample_time": 1.0,
+    "valves": [
+        {
+            "name": "V1",
+            "limits": [0.0, 100.0],
+            "effects": [{"effect": "stiction", "law": "he", "f_s": 4.0, "f_d": 1.5}],
+        }
+    ],
+    "process": {
+        "kind": "arx",
+        "outputs": [
+            {
+                "name": "PV1",
+                "a": [-0.8],
+                "b": {"V1": [0.2]},
+                "delay": {"V1": 2},
+                "noise": {"std": 0.05, "enters": "measurement"},
+            }
+        ],
+    },
+    "operating_point": {"op": {"V1": 50.0}, "pv": {"PV1": 50.0}},
+    "controller": {"kind": "pi", "gain": 0.5, "integral_time": 5.0},
+}
+
+
+@pytest.fixture(scope="module")
+def model() -> LoopModel:
+    return LoopModel.from_mapping(MODEL)
+
+
+@pytest.fixture(scope="module")
+def record(model: LoopModel) -> Record:
+    assert model.controller is not None
+    control = PiController(model.controller, 1.0, 50.0, (0.0, 100.0))
+    moves = SetPoints(("PV1",), np.array([0.0, 20.0]), np.array([[50.0], [53.0]]))
+    run = simulate_closed_loop(model, control, moves, 1500, 3)
+    return dataclasses.replace(run.record, stem=None)
+
+
+@pytest.fixture(scope="module")
+def found(record: Record) -> Identification:
+    return identify(record)
+
+
+@pytest.fixture(scope="module")
+def gain(record: Record, found: Identification) -> Gain:
+    return gain_of(record, found)
+
+
+def test_service_is_predicted_as_the_loop_without_friction_does(
+    gain: Gain, model: LoopModel
+) -> None:
+    assert model.controller is not None
+    control = PiController(model.controller, 1.0, 50.0, (0.0, 100.0))
+    moves = SetPoints(("PV1",), np.array([0.0, 20.0]), np.array([[50.0], [53.0]]))
+    run = simulate_closed_loop(model.with_ideal_valves(), control, moves, 1500, 3)
+    assert run.record.sp is not None
+    true = float(np.abs(run.record.pv - run.record.sp).mean())
+    service = gain.option(What.SERVICE).measures
+    assert service is not None
+    assert service.iae_per_hour == pytest.approx(true, rel=0.35)
+    assert service.iae_per_hour < 0.5 * gain.now.iae_per_hour
+    assert gain.now.amplitude is not None
+    assert service.amplitude is not None
+    assert service.amplitude < 0.2 * gain.now.amplitude
+
+
+def test_leaving_the_loop_is_now(gain: Gain) -> None:
+    left = gain.option(What.LEAVE).measures
+    assert left is not None
+    for key, value in left.to_json().items():
+        assert value == pytest.approx(getattr(gain.now, key))
+
+
+def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
+    document = gain.to_json()
+    assert [option["what"] for option in document["options"]] == [
+        "service",
+        "embedding",
+        "retune",
+        "leave",
+    ]
+    for option in document["options"]:
+        assert option["iae_per_hour"] is not None
+        low, high = option["interval"]["iae_per_hour"]
+        assert low <= high
+    assert document["options"][1]["settings"]["embedding_move_weights"] > 0.0
+
+
+def test_the_same_record_gives_the_same_answer(
+    gain: Gain, record: Record, found: Identification
+) -> None:
+    assert gain_of(record, found).to_json() == gain.to_json()
+
+
+def test_a_healthy_valve_gains_nothing_by_service(record: Record, found: Identification) -> None:
+    valves = tuple(
+        dataclasses.replace(
+            valve, verdict=VerdictKind.HEALTHY, static_friction=0.0, dynamic_friction=0.0
+        )
+        for valve in found.valves
+    )
+    stem = record.op
+    gain = gain_of(record, dataclasses.replace(found, valves=valves, stem=stem))
+    service = gain.option(What.SERVICE).measures
+    assert service is None or service == gain.now
+    assert gain.option(What.EMBEDDING).measures is None
+
+
+def test_a_record_without_a_controller_is_refused(record: Record, found: Identification) -> None:
+    random = np.random.default_rng(1)
+    op = 50.0 + 10.0 * np.cumsum(random.standard_normal((len(record), 1)), axis=0)
+    with pytest.raises(InputError, match="controller"):
+        gain_of(dataclasses.replace(record, op=op), dataclasses.replace(found, stem=op))
+
+
+def test_a_model_is_simulated_under_its_own_controller(model: LoopModel) -> None:
+    gain = gain_of_model(model, samples=600)
+    service, embedding = (gain.option(what).measures for what in (What.SERVICE, What.EMBEDDING))
+    assert service is not None
+    assert embedding is not None
+    assert service.iae_per_hour < 0.6 * gain.now.iae_per_hour
+    assert embedding.iae_per_hour < 0.8 * gain.now.iae_per_hour
+    assert gain.option(What.LEAVE).measures == gain.now
+
+
+def test_a_model_without_a_controller_is_refused() -> None:
+    bare = {key: value for key, value in MODEL.items() if key != "controller"}
+    with pytest.raises(InputError, match=r"no controller.*add controller"):
+        gain_of_model(LoopModel.from_mapping(bare))
+
+
+def test_draws_stay_inside_the_intervals_and_keep_their_order(found: Identification) -> None:
+    valve = dataclasses.replace(
+        found.valves[0],
+        static_friction=3.0,
+        static_interval=(2.0, 4.0),
+        dynamic_friction=2.5,
+        dynamic_interval=(1.0, 3.5),
+    )
+    pairs = drawn_frictions(valve, 20, np.random.default_rng(0))
+    assert tuple(pairs[0]) == (3.0, 2.5)
+    assert np.all((pairs[:, 0] >= 2.0) & (pairs[:, 0] <= 4.0))
+    assert np.all((pairs[:, 1] >= 1.0) & (pairs[:, 1] <= pairs[:, 0]))
+
+
+def test_stems_follow_the_law() -> None:
+    op = np.array([[0.0, 3.0, 5.0, 4.0, 1.0]])
+    stems = stems_of(op, np.array([[4.0, 1.0]]), np.zeros(1))
+    assert stems.tolist() == [[0.0, 0.0, 4.0, 4.0, 4.0]]

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stiction_ros.gain.measures import Yardstick, work
+
+
+def test_a_sine_has_its_amplitude_and_its_mean() -> None:
+    error = 3.0 * np.sin(2 * np.pi * np.arange(2000) / 50.0)
+    found = Yardstick(2.0, 50.0, [(0, 2000)]).measure(error, np.zeros(2000))
+    assert found.amplitude == pytest.approx(3.0, rel=1e-3)
+    assert found.iae_per_hour == pytest.approx(6.0 / math.pi, rel=1e-2)
+    assert found.travel_per_hour == found.reversals_per_hour == 0.0
+
+
+def test_travel_and_reversals_are_counted_an_hour() -> None:
+    stem = np.tile([0.0, 1.0, 2.0, 1.0], 900)
+    found = Yardstick(1.0, None, [(0, 3600)]).measure(np.zeros(3600), stem)
+    assert found.amplitude is None
+    assert found.travel_per_hour == pytest.approx(3599.0)
+    assert found.reversals_per_hour == pytest.approx(1799.0)
+
+
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=3, max_size=50),
+    st.floats(0.1, 10.0),
+    st.floats(-9, 9),
+)
+def test_travel_grows_with_the_stem_and_knows_no_zero(
+    path: list[float], factor: float, shift: float
+) -> None:
+    stem = np.array(path)
+    travel, turns = work(stem)
+    scaled, same = work(factor * stem + shift)
+    assert scaled == pytest.approx(factor * travel, rel=1e-6, abs=1e-6 * (1 + abs(shift)))
+    assert turns <= len(path)
+    assert same <= len(path)

@@ -1,0 +1,97 @@
+"""Pages in headless Chromium: what a reader would see of them."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+_BEFORE = """<script>
+window.said = [];
+addEventListener("error", event => said.push(String(event.message)));
+addEventListener("unhandledrejection", event => said.push(String(event.reason)));
+for (const kind of ["error", "warn"]) console[kind] = (...words) => said.push(words.join(" "));
+</script>"""
+
+_AFTER = """<script>
+addEventListener("load", () => {
+  const seen = element => element.getClientRects().length > 0;
+  const scrolled = element => element.closest(".wide") !== null || element.closest("svg svg");
+  const all = [...document.body.querySelectorAll("*")].filter(seen);
+  const wide = all.filter(element => !scrolled(element) &&
+    element.getBoundingClientRect().right > innerWidth + 1).map(element => element.outerHTML);
+  const texts = [...document.querySelectorAll("h1, h2, .card, figcaption, td.name, th button")];
+  const channel = value => { value /= 255;
+    return value <= 0.04045 ? value / 12.92 : Math.pow((value + 0.055) / 1.055, 2.4); };
+  const light = colour => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number);
+    return 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b); };
+  const paper = light(getComputedStyle(document.body).backgroundColor);
+  const contrast = element => { const style = getComputedStyle(element);
+    const own = light(element.ownerSVGElement && element.tagName !== "text" ? style.stroke
+      : element.ownerSVGElement ? style.fill : style.color);
+    return (Math.max(own, paper) + 0.05) / (Math.min(own, paper) + 0.05); };
+  const told = [...document.querySelectorAll("h1, p, td, th, text, polyline")].filter(seen);
+  const pale = told.filter(element => contrast(element) < 3).map(element => element.outerHTML);
+  let acted = {};
+  try { acted = (() => { ACT })() || {}; } catch (error) { said.push(String(error)); }
+  parent.postMessage(JSON.stringify({
+    width: innerWidth, scroll: document.documentElement.scrollWidth,
+    dark: matchMedia("(prefers-color-scheme: dark)").matches, wide: wide.slice(0, 3),
+    empty: texts.filter(element => seen(element) && !element.innerText.trim()).length,
+    pale: pale.slice(0, 3), paper, said, acted,
+    fetched: performance.getEntriesByType("resource").map(one => one.name),
+    text: document.body.innerText }), "*");
+});
+</script>"""
+
+# A window is never narrower than 500 pixels, a frame may be; media queries go by the frame.
+_OUTER = """<!DOCTYPE html><html><body style="margin:0"><script>
+addEventListener("message", event => { document.documentElement.dataset.probe = event.data; });
+</script><iframe src="PAGE" style="border:0;width:WIDTHpx;height:900px"></iframe></body></html>"""
+
+
+def chromium() -> str | None:
+    """Return the browser; None where there is none."""
+    return next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+def probe(page: Path, width: int, *, dark: bool, act: str = "") -> dict[str, Any]:
+    """Return what a page shows at a width; ``act`` is script whose value comes as ``acted``."""
+    browser = chromium()
+    assert browser is not None
+    source = page.read_text(encoding="utf-8")
+    source = source.replace("<head>", "<head>" + _BEFORE, 1)
+    source = source.replace("</body>", _AFTER.replace("ACT", act) + "</body>", 1)
+    copy = page.with_name(f"probe-{page.stem}.html")
+    copy.write_text(source, encoding="utf-8")
+    outer = page.with_name(f"frame-{page.stem}.html")
+    outer.write_text(_OUTER.replace("PAGE", copy.name).replace("WIDTH", str(width)))
+    done = subprocess.run(
+        [
+            browser,
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--hide-scrollbars",
+            f"--user-data-dir={page.parent / 'browser'}",
+            f"--window-size={max(width, 500) + 50},1000",
+            f"--blink-settings=preferredColorScheme={0 if dark else 1}",
+            "--virtual-time-budget=4000",
+            "--dump-dom",
+            outer.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    found = re.search(r'data-probe="([^"]*)"', done.stdout)
+    assert found is not None, done.stderr[-2000:]
+    seen: dict[str, Any] = json.loads(html.unescape(found[1]))
+    return seen

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made import entry
+
+from stiction_ros.survey.entry import Entry, Status
+from stiction_ros.survey.ranking import confidence, ranked
+
+SHARES = st.floats(0.0, 1.0)
+
+
+@st.composite
+def entries(draw: st.DrawFn) -> list[Entry]:
+    count = draw(st.integers(1, 12))
+    return [
+        entry(
+            f"L{k}",
+            draw(st.sampled_from(["sticky", "backlash", "undecided", "healthy"])),
+            draw(st.sampled_from(["valve", "tuning", "disturbance", "none"])),
+            confidence=draw(SHARES),
+            band_share=draw(SHARES),
+        )
+        for k in range(count)
+    ]
+
+
+@given(entries(), st.randoms())
+def test_the_order_in_which_loops_come_does_not_matter(rows: list[Entry], random: object) -> None:
+    mixed = list(rows)
+    random.shuffle(mixed)  # type: ignore[attr-defined]
+    assert ranked(rows, {}) == ranked(mixed, {})
+    assert [row.rank for row in ranked(rows, {})] == list(range(1, len(rows) + 1))
+
+
+@given(entries())
+def test_what_is_found_stands_above_what_is_not(rows: list[Entry]) -> None:
+    found = [row.found for row in ranked(rows, {})]
+    assert found == sorted(found, reverse=True)
+
+
+@given(st.floats(0.01, 0.98), st.floats(0.001, 0.01))
+def test_more_confidence_or_a_wider_band_stands_higher(share: float, more: float) -> None:
+    one, other = entry("A", confidence=share), entry("B", confidence=share + more)
+    assert [row.name for row in ranked([one, other], {})] == ["B", "A"]
+    one, other = entry("A", band_share=share), entry("B", band_share=share + more)
+    assert [row.name for row in ranked([one, other], {})] == ["B", "A"]
+
+
+def test_money_counts_where_it_is_known() -> None:
+    rows = [entry("A", confidence=0.9), entry("B", confidence=0.8), entry("C", confidence=0.7)]
+    order = ranked(rows, {"C": 100.0, "B": 1.0})
+    assert order[0].name == "C"
+    costs = {row.name: row.cost_per_hour for row in order}
+    assert costs["A"] is None
+    assert costs["C"] == 100.0 * costs["B"]
+
+
+def test_what_was_not_judged_stands_last() -> None:
+    lost = dataclasses.replace(entry("A"), status=Status.FAILED)
+    assert [row.name for row in ranked([lost, entry("B", "healthy", "none")], {})] == ["B", "A"]
+
+
+def test_confidence_falls_with_what_is_not_known() -> None:
+    sure = {"verdict": "sticky", "f_s_interval": [1.9, 2.1]}
+    assert confidence(sure, "valve", 3) == pytest.approx(
+        0.5 * confidence(sure, "valve", 10**6), rel=1e-5
+    )
+    assert 0.9 < confidence(sure, "valve", 10**6) <= 1.0
+    wide = {**sure, "f_s_interval": [0.0, 4.0]}
+    assert confidence(wide, "valve", 10**6) == pytest.approx(0.5, rel=1e-5)
+    assert (
+        confidence(sure, "disturbance", 10**6)
+        < confidence(sure, "none", 10**6)
+        < confidence(sure, "valve", 10**6)
+    )
+    assert confidence({**sure, "stability": 0.5}, "valve", 10**6) == 0.5 * confidence(
+        sure, "valve", 10**6
+    )
+    assert confidence({**sure, "verdict": "undecided"}, "valve", 10**6) < confidence(
+        wide, "valve", 10**6
+    )

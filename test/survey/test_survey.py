@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from made import entry, identification, record, unreadable
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake.loop import Loop
+from stiction_ros.survey.assess import Assessed
+from stiction_ros.survey.engine import Done, Task
+from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.options import SurveyOptions
+from stiction_ros.survey.survey import Plan, survey
+from stiction_ros.survey.tables import HEAD, write_csv, write_xlsx
+
+KEYS = {
+    *("name", "files", "status", "reason", "samples", "sample_time", "auto_share"),
+    *("saturated_share", "oscillation", "verdict", "cause", "f_s", "f_s_interval", "f_d"),
+    *("f_d_interval", "band_share", "travel_per_hour", "reversals_per_hour", "gain", "rank"),
+    *("confidence", "group", "report"),
+}
+
+
+class Counting:
+    """An engine that judges nothing and counts what it was given."""
+
+    name = "counting"
+    workers = 1
+
+    def __init__(self, stop_after: int | None = None) -> None:
+        self.given: list[str] = []
+        self.closed = False
+        self._stop = stop_after
+
+    def run(self, tasks: Iterator[Task], options: SurveyOptions) -> Iterator[Done]:
+        for task in tasks:
+            if self._stop is not None and len(self.given) == self._stop:
+                raise KeyboardInterrupt
+            self.given.append(task.loop.name)
+            found = dataclasses.replace(entry(task.loop.name), files=())
+            yield Done(task, Assessed(found, f"<p>{task.loop.name}</p>", ("a decision",)))
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def _loops(count: int) -> list[Loop]:
+    return [unreadable(k) for k in range(count)]
+
+
+def test_the_json_has_the_keys_of_the_contract(tmp_path: Path) -> None:
+    found = survey(_loops(3), Plan(SurveyOptions(), tmp_path), Counting())
+    document = json.loads(json.dumps(found.to_json()))
+    assert {"engine", "workers", "seconds", "loops_per_minute", "loops"} <= set(document)
+    for row in document["loops"]:
+        assert set(row) >= KEYS
+    assert [row["rank"] for row in document["loops"]] == [1, 2, 3]
+    for row in document["loops"]:
+        assert (tmp_path / row["report"]).read_text() == f"<p>{row['name']}</p>"
+    assert (tmp_path / "survey.log").read_text().count("a decision") == 3
+
+
+def test_a_survey_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
+    plan = Plan(SurveyOptions(), tmp_path)
+    first = Counting(stop_after=4)
+    with pytest.raises(KeyboardInterrupt):
+        survey(_loops(10), plan, first)
+    assert first.closed
+    with (tmp_path / "loops.jsonl").open("a") as journal:
+        journal.write('{"key": "half a li')
+    second = Counting()
+    found = survey(_loops(10), dataclasses.replace(plan, resume=True), second)
+    assert len(found.entries) == 10
+    assert len(second.given) == 6
+    assert not set(first.given) & set(second.given)
+    third = Counting()
+    again = survey(_loops(10), dataclasses.replace(plan, resume=True), third)
+    assert third.given == []
+    assert again.entries == found.entries
+
+
+def test_other_options_do_not_go_on_with_it(tmp_path: Path) -> None:
+    survey(_loops(1), Plan(SurveyOptions(), tmp_path), Counting())
+    other = Plan(SurveyOptions(gain=False), tmp_path, resume=True)
+    with pytest.raises(InputError, match="other options"):
+        survey(_loops(1), other, Counting())
+    with pytest.raises(InputError, match="--out"):
+        survey(_loops(1), Plan(SurveyOptions(), resume=True), Counting())
+
+
+def test_loops_of_one_name_stay_two(tmp_path: Path) -> None:
+    twice = [unreadable(1), dataclasses.replace(unreadable(1), files=(Path("other/1.csv"),))]
+    found = survey(twice, Plan(SurveyOptions(), tmp_path), Counting())
+    assert sorted(e.name for e in found.entries) == ["FIC001", "FIC001 (2)"]
+    assert len({e.report for e in found.entries}) == 2
+
+
+def test_names_of_loops_make_names_of_files(tmp_path: Path) -> None:
+    names = ["../../etc/x", "A/B", "A B", "…"]
+    loops = [dataclasses.replace(unreadable(1), name=name) for name in names]
+    found = survey(loops, Plan(SurveyOptions(), tmp_path), Counting())
+    pages = [(tmp_path / (e.report or "")).resolve() for e in found.entries]
+    assert len(set(pages)) == 4
+    assert all(page.parent == (tmp_path / "loops").resolve() for page in pages)
+
+
+def test_an_entry_survives_json() -> None:
+    one = entry("FIC1", beats=(1.0, 2.5), notes=("a", "b"), gain={"now": {"amplitude": None}})
+    assert Entry.from_line(json.loads(json.dumps(one.to_line()))) == one
+
+
+def test_the_tables_hold_the_list(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    rows = [
+        entry('FIC "1", ü', rank=1, gain={"now": {"iae_per_hour": 2.0}}),
+        dataclasses.replace(entry("B<&>"), verdict=None, reason="=1+1", f_s_interval=None, rank=2),
+    ]
+    write_csv(tmp_path / "l.csv", rows)
+    write_xlsx(tmp_path / "l.xlsx", rows)
+    with (tmp_path / "l.csv").open(encoding="utf-8-sig", newline="") as file:
+        read = list(csv.reader(file))
+    assert tuple(read[0]) == HEAD
+    assert read[1][HEAD.index("loop")] == 'FIC "1", ü'
+    assert float(read[1][HEAD.index("IAE now")]) == 2.0
+    sheet = openpyxl.load_workbook(tmp_path / "l.xlsx")["loops"]
+    values = list(sheet.values)
+    assert tuple(values[0]) == HEAD
+    assert values[2][HEAD.index("loop")] == "B<&>"
+    assert values[2][HEAD.index("reason")] == "=1+1"
+    assert sheet.cell(3, HEAD.index("reason") + 1).data_type != "f"
+    assert values[1][HEAD.index("f_S low")] == 1.8
+    assert values[2][HEAD.index("f_S low")] is None
+
+
+def test_identification_and_record_of_the_tests_fit() -> None:
+    of = record()
+    assert identification(of).to_json()["valves"][0]["verdict"] == "sticky"
