@@ -14,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from stiction_ros import __version__
 from stiction_ros.cli import (
     bench,
+    certificates,
     convert,
     demo,
     example,
@@ -52,6 +53,7 @@ COMMANDS = (
     study_monitor,
     faults,
     soak,
+    certificates,
     bench,
 )
 

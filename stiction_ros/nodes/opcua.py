@@ -48,6 +48,7 @@ class OpcuaNode(ManagedNode):
         require_asyncua()
         if not settings.tags:
             raise InputError("no tag map", where="opcua: tags", fix="set it to a *.tags.yaml")
+        self._writes = tuple(name for name in settings.write if name)
         told = TagMap.load(find_config(settings.tags))
         self._loops = self._chosen(told)
         self._url = settings.url or told.server
@@ -61,7 +62,7 @@ class OpcuaNode(ManagedNode):
             settings.password_file,
             settings.password_variable,
         )
-        self._credentials.check(bool(settings.write))
+        self._credentials.check(bool(self._writes))
         self._said = "not connected yet"
         self._losses = 0
         self._graph_looks = 0
@@ -76,26 +77,27 @@ class OpcuaNode(ManagedNode):
     def _chosen(self, told: TagMap) -> tuple[LoopTags, ...]:
         """Return the loops that are bridged; those to be written must be able to."""
         known = {tags.loop: tags for tags in told.loops}
-        for key in ("loops", "write"):
-            for name in getattr(self.settings, key):
+        chosen = tuple(name for name in self.settings.loops if name)
+        for key, names in (("loops", chosen), ("write", self._writes)):
+            for name in names:
                 if name not in known:
                     raise InputError(
                         f"no loop {name!r} in the tag map",
                         where=f"opcua: {key}",
                         fix=f"use {', '.join(known)}",
                     )
-        for name in self.settings.write:
+        for name in self._writes:
             if known[name].grant is None:
                 raise InputError(
                     f"loop {name!r} has no section write in the tag map", where="opcua: write"
                 )
-        wanted = self.settings.loops or tuple(known)
+        wanted = dict.fromkeys((*chosen, *self._writes)) if chosen else known
         return tuple(known[name] for name in wanted)
 
     def _add(self, tags: LoopTags, identity: int) -> None:
         """Build bridge, topics and services of one loop."""
         settings, name = self.settings, tags.loop
-        writes = name in settings.write
+        writes = name in self._writes
         prefix = f"{tags.namespace}/" if tags.namespace else ""
         rules = BridgeRules(
             settings.speed,
@@ -146,10 +148,7 @@ class OpcuaNode(ManagedNode):
     def activate(self) -> None:
         read = [tag for tags in self._loops for tag in tags.read_tags()]
         written = [
-            tag
-            for tags in self._loops
-            if tags.loop in self.settings.write
-            for tag in tags.written_tags()
+            tag for tags in self._loops if tags.loop in self._writes for tag in tags.written_tags()
         ]
         publishing = self.settings.publishing
         tags = tuple(dict.fromkeys(read))
@@ -199,7 +198,7 @@ class OpcuaNode(ManagedNode):
         self._graph_looks += 1
         if self._graph_looks % GRAPH_LOOKS:
             return
-        for name in self.settings.write:
+        for name in self._writes:
             topic = self._topics[name].pv.publisher.topic_name.removesuffix("pv") + "op"
             names = publishers_of(self, topic)
             if len(names) > 1:
@@ -255,7 +254,7 @@ class OpcuaNode(ManagedNode):
 
     def _tell_grants(self) -> None:
         """Publish every grant that has changed."""
-        for name in self.settings.write:
+        for name in self._writes:
             grant = self._topics[name].changed_grant(self.bridges[name])
             if grant is not None:
                 self.get_logger().info(f"loop {name}: {grant.state.value}, {grant.reason}")

@@ -98,7 +98,7 @@ class LoopBridge:
         self._alive = False
         self._alive_since = self._command_at = self._beat_at = now
         self._told = 0.0  # what the request says, as far as we wrote it
-        self._request_at: float | None = None
+        self._tried: tuple[float, float] | None = None  # a request that is under way, and when
         self._bad = 0  # samples of bad quality in succession
         self._stamp: int | None = None
         self._writing: FloatArray | None = None  # an OP that is under way
@@ -244,9 +244,9 @@ class LoopBridge:
         if not wanted and self._foreign_beats(now):
             self._told = 0.0  # the request is another one's by now
             return []
-        if self._request_at is not None and now - self._request_at < AGAIN:
+        if self._tried is not None and self._tried[0] == wanted and now - self._tried[1] < AGAIN:
             return []
-        self._request_at = now
+        self._tried = wanted, now
         values = ((told.request, wanted),)
         return [WriteOrder(self.tags.loop, OrderKind.REQUEST, values, now + told.watchdog)]
 

@@ -108,15 +108,33 @@ class PlantProcess:
         identity = Identity(uri, ("127.0.0.1",), server, start, days)
         make_certificate(identity, self.folder / f"{name}.der", self.folder / f"{name}.pem")
 
+    def word(self, user: str) -> str:
+        """Return the file of a user's password."""
+        return str(self.folder / f"{user}.password")
+
     def credentials(self, user: str = "bridge", **changes: str) -> Credentials:
         told = {
             "certificate": str(self.folder / "trusted" / "client.der"),
             "private_key": str(self.folder / "client.pem"),
             "server_certificate": str(self.folder / "server.der"),
             "user": user,
-            "password_file": str(self.folder / f"{user}.password"),
+            "password_file": self.word(user),
         }
         return Credentials(**{**told, **changes})
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the parameters of a node that bridges the plant, without writing."""
+        told = self.credentials()
+        return {
+            "tags": str(self.map_file),
+            "certificate": told.certificate,
+            "private_key": told.private_key,
+            "server_certificate": told.server_certificate,
+            "user": told.user,
+            "password_file": told.password_file,
+            "publishing": 0.02,
+            "speed": self.speed,
+        }
 
     def start(self) -> None:
         path = self.folder / "plant.yaml"
