@@ -20,6 +20,7 @@ from stiction_ros.cli import (
     example,
     experiment,
     faults,
+    fetch_history,
     fit_linear,
     gap,
     identify,
@@ -54,6 +55,7 @@ COMMANDS = (
     faults,
     soak,
     certificates,
+    fetch_history,
     bench,
 )
 
