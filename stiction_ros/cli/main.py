@@ -24,6 +24,7 @@ from stiction_ros.cli import (
     fit_linear,
     gap,
     identify,
+    listen,
     repair,
     replay,
     report,
@@ -56,6 +57,7 @@ COMMANDS = (
     soak,
     certificates,
     fetch_history,
+    listen,
     bench,
 )
 

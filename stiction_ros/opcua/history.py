@@ -223,9 +223,10 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
     jitter, half = tags.step // JITTER, tags.step // 2
     pv = [files[output.pv].read() for output in tags.outputs]
     op = [files[valve.op_read].read() for valve in tags.valves]
-    for told, name in zip((*pv, *op), (*tags.outputs, *tags.valves), strict=True):
+    names = [one.name for one in tags.outputs] + [one.name for one in tags.valves]
+    for told, name in zip((*pv, *op), names, strict=True):
         if not len(told.stamps):
-            raise InputError(f"no history of {name.name}", where=f"loop {tags.loop}")
+            raise InputError(f"no history of {name}", where=f"loop {tags.loop}")
     first = max(int(one.stamps[0]) for one in pv)
     first += max(-(-(span.begin - first) // tags.step), 0) * tags.step
     end = min(span.end, max(int(one.stamps[-1]) for one in (*pv, *op)))

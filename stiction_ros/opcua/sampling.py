@@ -17,6 +17,7 @@ JITTER = 10  # a part of a sample: scans of a control system are that regular
 SETTLE = 2  # a part of a sample: so late may a change come
 FAR = 3  # samples: a stamp that much ahead of the plant's time is another clock
 LOST = 100  # samples: no more of them are told again after the plant's clock has jumped
+DOUBTED = 3  # refused stamps of a tag in succession: what it said before holds no more
 SUCCESSION = 10  # refused stamps, or scans beside the grid, in succession are believed
 SCAN = 0.75  # samples from one scan to the next at least
 FOLLOWED = 8  # samples after which most of a shift of the scans is followed
@@ -89,8 +90,9 @@ class LoopSampler:
       stamp heard). The grid follows slow shifts of the PV's stamps, and moves when ten
       in succession lie beside it by the same amount.
     - A stamp before the last one of its tag is of the past, one more than 3 samples ahead of the
-      plant's time of the future: refused and counted; ten in succession begin a new run. The
-      first report of a subscription tells the present, whatever its stamp.
+      plant's time of the future: refused and counted. After three in succession the tag has no
+      value; the tenth is believed, and begins a new run when it is that of a PV. The first
+      report of a subscription tells the present, whatever its stamp.
     - A value that is not good, or of a server that is silent, is NaN.
 
     Attributes:
@@ -111,7 +113,8 @@ class LoopSampler:
         self._next: int | None = None
         self._closed: int | None = None  # stamp of the last sample
         self._heard_at: float | None = None
-        self._strays = self._beside = 0
+        self._strays: Counter[str] = Counter()  # in succession, by tag
+        self._beside = 0
         self._phase = self._followed = 0
         self.counts: Counter[str] = Counter()
 
@@ -123,7 +126,8 @@ class LoopSampler:
         last = changes[-1] if changes else NOTHING
         if reading.first:
             reading = dataclasses.replace(reading, stamp=max(reading.stamp, last.stamp))
-        elif self._is_stray(reading, last, now):
+            del self._strays[tag]
+        elif self._is_stray(tag, reading, last, now):
             return
         if reading.quality is not TagQuality.GOOD:
             self.counts["bad"] += 1
@@ -154,9 +158,8 @@ class LoopSampler:
         return found
 
     def latest(self, tag: str) -> TagReading:
-        """Return the newest report of a tag; one without a value before the first."""
-        changes = self._changes[tag]
-        return changes[-1] if changes else NOTHING
+        """Return the newest report of a tag; one without a value where there is none."""
+        return self._unless_doubted(tag, self._changes[tag][-1] if self._changes[tag] else NOTHING)
 
     def number(self, tag: str) -> float:
         """Return the newest value of a tag if it counts, else NaN."""
@@ -168,18 +171,21 @@ class LoopSampler:
 
     # ---- stamps ----------------------------------------------------------------------------
 
-    def _is_stray(self, reading: TagReading, last: TagReading, now: float) -> bool:
+    def _is_stray(self, tag: str, reading: TagReading, last: TagReading, now: float) -> bool:
         present = self._clock.now(now)
         past = reading.stamp < last.stamp
         ahead = present is not None and reading.stamp > present + FAR * self.tags.step
         if not past and not ahead:
-            self._strays = 0
+            del self._strays[tag]
             return False
         self.counts["past" if past else "ahead"] += 1
-        self._strays += 1
-        if self._strays < SUCCESSION:
+        self._strays[tag] += 1
+        if self._strays[tag] < SUCCESSION:
             return True
-        self._begin_anew()
+        del self._strays[tag]
+        if tag in self._pv:
+            self._begin_anew()
+        self._changes[tag].clear()
         return False
 
     def _begin_anew(self) -> None:
@@ -189,7 +195,8 @@ class LoopSampler:
             self._changes[tag] = deque(kept, maxlen=KEPT)
         self._clock.forget()
         self._next = self._closed = None
-        self._strays = self._followed = 0
+        self._strays.clear()
+        self._followed = 0
         self.counts["new_runs"] += 1
 
     def _begin_without_change(self, now: float) -> None:
@@ -263,7 +270,13 @@ class LoopSampler:
         changes = self._changes[tag]
         while len(changes) > 1 and changes[1].stamp <= cut:
             changes.popleft()
-        return changes[0] if changes and changes[0].stamp <= cut else NOTHING
+        found = changes[0] if changes and changes[0].stamp <= cut else NOTHING
+        return self._unless_doubted(tag, found)
+
+    def _unless_doubted(self, tag: str, reading: TagReading) -> TagReading:
+        if self._strays[tag] < DOUBTED:
+            return reading
+        return dataclasses.replace(reading, quality=TagQuality.BAD)
 
     def _value(self, reading: TagReading, alive: bool) -> float:
         usable = reading.quality is TagQuality.GOOD or (

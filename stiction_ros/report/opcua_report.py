@@ -11,6 +11,7 @@ import numpy as np
 
 from stiction_ros import __version__
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.json_values import finite
 from stiction_ros.records.bag_messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.bag_metadata import BagTopic
 from stiction_ros.records.run_log import RunLog, read_run
@@ -30,7 +31,7 @@ from stiction_ros.report.drawing import (
 )
 from stiction_ros.report.page import card, duration, embedded, number, page, table
 from stiction_ros.report.scoring import Phases, phases
-from stiction_ros.report.summary import finite, messages, scores, write_json
+from stiction_ros.report.summary import messages, scores, write_json
 
 SMOOTH = 1.0  # %: what OP may step by at a transfer of control
 GONE = 0.2  # share of the amplitude before that a cycle that is gone may still have
@@ -249,7 +250,7 @@ def draw_bridged(run: BridgedRun, transfers: Sequence[Transfer]) -> Drawing:
         swap = run.log.swap
         if swap is not None:
             axes[0].axvline(time(run.log.seconds(swap.stamp)), color=GREY, linestyle=":")
-        legend(axes[0])
+        legend(axes[1])
         axes[-1].set_xlabel(time.label)
         axes[-1].set_xlim(0.0, float(time(end)))
     caption = (

@@ -20,14 +20,16 @@ class Scans:
     def __init__(self, sampler: LoopSampler | None = None) -> None:
         self.sampler = sampler or LoopSampler(loop_tags())
         self.found: list[PlantSample] = []
+        self.now = 0.0
 
     def first(self, pv: float = 0.0, op: float = 40.0) -> None:
         for tag, value in ((PV, pv), (SP, 1.0), (OP, op)):
             self.sampler.hear(tag, good(value, -0.5, first=True), 0.0)
 
     def scan(self, k: float, pv: float | None = None, delay: float = 0.02) -> None:
-        self.sampler.hear(PV, good(10.0 + k if pv is None else pv, k), 1.0 + k + delay)
-        self.look(1.0 + k + delay)
+        now = self.now = max(self.now + 1.0, 1.0 + k) if k >= 0 else self.now + 1.0
+        self.sampler.hear(PV, good(10.0 + k if pv is None else pv, k), now + delay)
+        self.look(now + delay)
 
     def look(self, now: float, alive: bool = True) -> list[PlantSample]:
         found = self.sampler.due(now, alive)
@@ -122,12 +124,25 @@ def test_stamps_of_the_past_are_refused_and_ten_in_succession_begin_anew() -> No
         scans.look(6.0 + k)
     assert scans.sampler.counts["past"] == 9
     assert all(s.pv[0] != -1.0 for s in scans.found)
+    assert np.isnan([s.pv[0] for s in scans.found[-5:]]).all()  # what was said before is doubted
     for k in range(9, 30):
         scans.sampler.hear(PV, good(-1.0, -500.0 + k), 6.0 + k)
         scans.look(6.0 + k)
     assert scans.sampler.counts["new_runs"] == 1
     assert scans.found[-1].pv[0] == -1.0
     assert scans.found[-1].stamp == at(-500.0 + 29)
+
+
+def test_a_tag_whose_clock_differs_from_the_others_is_not_paired() -> None:
+    scans = Scans()
+    scans.first()
+    for k in range(60):
+        scans.sampler.hear(OP, good(40.0 + k, k), 1.0 + k)
+        scans.scan(k if k < 5 else k - 900.0)
+        scans.look(1.02 + k)
+    assert scans.sampler.counts["new_runs"] == 1
+    assert scans.found[-1].pv[0] == 10.0 + 59 - 900
+    assert math.isnan(scans.found[-1].op_before[0])
 
 
 def test_a_stamp_of_the_future_is_refused() -> None:

@@ -49,6 +49,7 @@ class ControlSystem:
         self.mode = AUTO
         self.alarm = ""
         self.request = False
+        self._took_over = False
         self._beat: float | None = None
         self._beat_at = float("-inf")
 
@@ -65,6 +66,8 @@ class ControlSystem:
         self.watch(now)
         error = self.sp - self.pv
         if self.mode == AUTO:
+            if self._took_over:  # the first scan integrates only
+                self._error, self._took_over = error, False
             self.out = self._pi(error)
         self._error = error
         self._acting = self.out.copy()
@@ -114,7 +117,7 @@ class ControlSystem:
         return True
 
     def _end(self, alarm: str) -> None:
-        self.mode, self.alarm = AUTO, alarm
+        self.mode, self.alarm, self._took_over = AUTO, alarm, True
 
     def _pi(self, error: FloatArray) -> FloatArray:
         step = self.model.sample_time

@@ -152,12 +152,22 @@ class PlantServer:
             await self._rest(due - self._period / 2, stop)
             self.system.half_over()
             await self._rest(due, stop)
+            await self._burst(int(self._faults["FAULT.BURST"]))
             now = time.monotonic()
             self.system.scan(now)
             self._tick_at = now
             await self._show()
             missed = max(int((now - due) / self._period), 0)
             due += (missed + 1) * self._period
+
+    async def _burst(self, count: int) -> None:
+        """Let each PV change ``count`` times more within the sample that ends."""
+        step = round(self.system.model.sample_time * 1e9)
+        begin = self.settings.start + self.system.sample * step
+        for i in range(1, count + 1):
+            stamp = begin + i * step // (count + 1)
+            for name, value in zip(self.tags.pv, self.system.pv, strict=True):
+                await self._put(name, float(value) + 1e-6 * i, stamp)
 
     async def _rest(self, until: float, stop: asyncio.Event) -> None:
         seconds = until - time.monotonic()

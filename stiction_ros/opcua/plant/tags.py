@@ -37,7 +37,8 @@ class PlantTags:
 
     Attributes:
         pv, sp, out, mode, remote: names by controller; ``remote`` is the remote OP.
-        faults: by which tests disturb the server.
+        faults: by which tests disturb the server: bad quality of PV, stamps s in the past, the
+            heartbeat standing still, s that answers take, extra changes of PV a sample.
         all, by_name: every tag.
     """
 
@@ -47,7 +48,7 @@ class PlantTags:
         self.pv, self.sp, self.out, self.mode, self.remote = (
             [f"{name}.{key}" for name in names] for key in ("PV", "SP", "OUT", "MODE", "ROUT_IN")
         )
-        self.faults = ("FAULT.QUALITY", "FAULT.PAST", "FAULT.ALIVE", "FAULT.DELAY")
+        self.faults = ("FAULT.QUALITY", "FAULT.PAST", "FAULT.ALIVE", "FAULT.DELAY", "FAULT.BURST")
         remote = frozenset({REMOTE_USE})
         found = [PlantTag(name, "Double", 0.0, history=True) for name in (*self.pv, *self.sp)]
         found += [PlantTag(name, "Double", 0.0, history=True) for name in self.out]
