@@ -14,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from stiction_ros import __version__
 from stiction_ros.cli import (
     bench,
+    browse_tags,
     certificates,
     convert,
     demo,
@@ -56,6 +57,7 @@ COMMANDS = (
     faults,
     soak,
     certificates,
+    browse_tags,
     fetch_history,
     listen,
     bench,

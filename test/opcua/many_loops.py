@@ -32,10 +32,10 @@ async def serve(port: int, count: int, file: Path) -> None:
         row = []
         for key in ("PV", "SP", "OUT"):
             name = f"L{i}.{key}"
-            node = ua.NodeId(name, space)
+            made = ua.NodeId(name, space)
             title = ua.QualifiedName(name, space)
-            await server.nodes.objects.add_variable(node, title, 0.0, ua.VariantType.Double)
-            row.append(node)
+            await server.nodes.objects.add_variable(made, title, 0.0, ua.VariantType.Double)
+            row.append(made)
         nodes.append(row)
     loops = [
         {
