@@ -41,8 +41,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("is not positive", where="--sample-time")
     from asyncua import ua
 
-    from stiction_ros.opcua.browsing import TagNames, browse, loops_of
-    from stiction_ros.opcua.plant_link import describe
+    from stiction_ros.opcua.intake.browsing import TagNames, browse, loops_of
+    from stiction_ros.opcua.session import describe
 
     names = TagNames(options.pv, options.op, options.sp, options.mode)
     try:

@@ -110,7 +110,7 @@ async def _certificate_of(url: str) -> x509.Certificate:
     from asyncua import Client, ua
     from asyncua.crypto.uacrypto import x509_from_der
 
-    from stiction_ros.opcua.plant_link import ANSWER, describe
+    from stiction_ros.opcua.session import ANSWER, describe
 
     try:
         points = await Client(url, timeout=ANSWER).connect_and_get_server_endpoints()

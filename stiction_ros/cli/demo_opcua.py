@@ -207,7 +207,7 @@ async def _operate(plant: _Plant, processes: NodeProcesses, show: Bar) -> None:
     """Play the operator: grant it once the friction is found, take it back, watch the PIs."""
     from asyncua import ua
 
-    from stiction_ros.opcua.plant_link import describe, open_client
+    from stiction_ros.opcua.session import describe, open_client
 
     client = await open_client(plant.url, plant.credentials["operator"])
     try:
@@ -235,7 +235,7 @@ class _Operator:
     async def prepare(self) -> None:
         """Find the tags."""
         from stiction_ros.opcua.plant.tags import NAMESPACE
-        from stiction_ros.opcua.plant_link import node_ids
+        from stiction_ros.opcua.session import node_ids
 
         tags = [f"nsu={NAMESPACE};s={name}" for name in ("LOOP.ALIVE", "LOOP.TARGET")]
         found = await node_ids(self._client, tags)

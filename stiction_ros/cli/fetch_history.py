@@ -37,7 +37,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    from stiction_ros.opcua.history import HistoryFile, Span, fetch, record_of
+    from stiction_ros.opcua.intake.history import HistoryFile, Span, fetch, record_of
 
     require_asyncua()
     check_address(options.url, "URL")

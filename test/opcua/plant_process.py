@@ -21,7 +21,6 @@ from asyncua import ua
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel
 from stiction_ros.opcua.plant.tags import NAMESPACE, SERVER_URI, tag_map_of
-from stiction_ros.opcua.plant_link import node_ids, open_client
 from stiction_ros.opcua.security import (
     CLIENT_URI,
     Credentials,
@@ -29,6 +28,7 @@ from stiction_ros.opcua.security import (
     make_certificate,
     write_secret,
 )
+from stiction_ros.opcua.session import node_ids, open_client
 from stiction_ros.orphans import DIE_WITH_PARENT
 
 BUDGET = 60.0  # s for anything to happen, on a busy machine

@@ -13,8 +13,8 @@ from small_maps import OP, PV, SP, loop_tags
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
-from stiction_ros.opcua import history
-from stiction_ros.opcua.history import HistoryFile, Span, record_of
+from stiction_ros.opcua.intake import history
+from stiction_ros.opcua.intake.history import HistoryFile, Span, record_of
 from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.records.csv_file import read_csv_parts
 from stiction_ros.records.quality import Quality

@@ -21,7 +21,9 @@ from bridge_runner import BridgeProcess, BridgeRunner
 from plant_process import PlantProcess, wait_until
 from relay import Relay
 
+from stiction_ros.cli.main import main
 from stiction_ros.opcua.grant import GrantState
+from stiction_ros.opcua.security import fingerprint, load_certificate
 
 WATCHDOG = 1.5  # s
 RATE = 0.1 * 60.0  # % a sample, as the tag map says
@@ -314,3 +316,22 @@ def test_the_server_is_killed_and_starts_again(tmp_path: Path) -> None:
     finally:
         trial.close()
         plant.stop()
+
+
+def test_the_servers_certificate_is_pinned_by_its_fingerprint(
+    plant: PlantProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "pinned.der"
+    shown = fingerprint(load_certificate(plant.folder / "server.der"))
+    assert main(["certificates", "pin", plant.url]) == 0
+    assert shown in capsys.readouterr().out
+    wrong = shown.replace(shown[:2], "00" if shown[:2] != "00" else "11", 1)
+    assert (
+        main(["certificates", "pin", plant.url, "--to", str(target), "--fingerprint", wrong]) == 2
+    )
+    assert not target.exists()
+    assert (
+        main(["certificates", "pin", plant.url, "--to", str(target), "--fingerprint", shown]) == 0
+    )
+    assert target.read_bytes() == (plant.folder / "server.der").read_bytes()
+    assert main(["certificates", "pin", "opc.tcp://127.0.0.1:1"]) == 2

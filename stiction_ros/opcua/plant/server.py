@@ -23,7 +23,7 @@ from asyncua.crypto.validator import CertificateValidator, CertificateValidatorO
 
 from stiction_ros.opcua.plant.control_system import ControlSystem
 from stiction_ros.opcua.plant.tags import NAMESPACE, SERVER_URI, PlantTags
-from stiction_ros.opcua.plant_link import EPOCH
+from stiction_ros.opcua.session import EPOCH
 
 PAGE = 5000  # values of history in one answer
 

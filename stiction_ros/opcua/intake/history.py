@@ -13,10 +13,10 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.opcua.plant_link import ANSWER, EPOCH, node_ids, open_client, reading_of
 from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.sampling import JITTER
 from stiction_ros.opcua.security import Credentials
+from stiction_ros.opcua.session import ANSWER, EPOCH, node_ids, open_client, reading_of
 from stiction_ros.opcua.tag_map import LoopTags
 from stiction_ros.records import Record
 from stiction_ros.records.quality import Quality
@@ -139,7 +139,7 @@ async def _fetch(
 ) -> None:
     from asyncua import ua
 
-    from stiction_ros.opcua.plant_link import describe
+    from stiction_ros.opcua.session import describe
 
     try:
         client = await open_client(url, credentials)

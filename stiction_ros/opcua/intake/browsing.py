@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
-from stiction_ros.opcua.plant_link import node_ids, open_client
 from stiction_ros.opcua.security import Credentials
+from stiction_ros.opcua.session import node_ids, open_client
 
 if TYPE_CHECKING:
     from asyncua import Client
