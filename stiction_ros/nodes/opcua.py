@@ -259,6 +259,8 @@ class OpcuaNode(ManagedNode):
             if grant is not None:
                 self.get_logger().info(f"loop {name}: {grant.state.value}, {grant.reason}")
                 self.report([(f"grant {name}", grant.state.value, grant_keys(grant))])
+                if grant.lost:
+                    self.notice(f"grant {name}", "warn", f"loop {name}: {grant.reason}")
 
     # ---- the loop --------------------------------------------------------------------------
 

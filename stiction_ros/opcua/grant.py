@@ -45,12 +45,14 @@ class Grant:
         since: s on our clock.
         reason: why it stands there.
         wanted: whether it is to be asked for as soon as nothing speaks against it.
+        lost: whether it was asked for or granted before and is so no longer.
     """
 
     state: GrantState
     since: float
     reason: str
     wanted: bool = False
+    lost: bool = False
 
     @property
     def requesting(self) -> bool:
@@ -66,13 +68,13 @@ class Grant:
         """Want the grant; nothing changes where nothing is ever written."""
         if self.state is not GrantState.IDLE:
             return self
-        return dataclasses.replace(self, wanted=True)
+        return dataclasses.replace(self, wanted=True, lost=False)
 
     def give_back(self, now: float, reason: str) -> Grant:
         """Return to idle, and stay there until it is asked for again."""
         if self.state is GrantState.LISTENING:
             return self
-        return Grant(GrantState.IDLE, now, reason)
+        return Grant(GrantState.IDLE, now, reason, lost=self.requesting)
 
     def follow(self, facts: Facts) -> Grant:
         """Return what becomes of it.
@@ -94,13 +96,13 @@ class Grant:
                 return dataclasses.replace(self, reason=f"waits: {why}")
             return Grant(GrantState.ASKED, facts.now, "waits for the operator")
         if facts.fault:
-            return Grant(GrantState.IDLE, facts.now, facts.fault)
+            return self.give_back(facts.now, facts.fault)
         if facts.foreign:
-            return Grant(GrantState.IDLE, facts.now, "another one lets the heartbeat rise")
+            return self.give_back(facts.now, "another one lets the heartbeat rise")
         if self.state is GrantState.ASKED and facts.granted:
             return Grant(GrantState.GRANTED, facts.now, "granted by the mode")
         if self.state is GrantState.GRANTED and not facts.granted:
-            return Grant(GrantState.IDLE, facts.now, "taken back by the mode")
+            return self.give_back(facts.now, "taken back by the mode")
         return self
 
 

@@ -36,6 +36,7 @@ def test_asked_and_granted() -> None:
 
 def test_nothing_is_asked_for_unasked() -> None:
     grant = begin(0.0, True)
+    assert not grant.give_back(1.0, "the node stops").lost
     assert grant.follow(WELL) == grant
     assert grant.follow(GRANTED) == grant
 
@@ -52,6 +53,8 @@ def test_a_grant_is_lost_at_once_and_not_asked_for_again(facts: Facts) -> None:
     lost = granted().follow(facts)
     assert lost.state is GrantState.IDLE
     assert lost.reason
+    assert lost.lost
+    assert not lost.ask().lost
     assert lost.follow(dataclasses.replace(GRANTED, now=4.0)).state is GrantState.IDLE
     assert lost.follow(dataclasses.replace(WELL, now=4.0)).state is GrantState.IDLE
 

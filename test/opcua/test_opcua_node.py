@@ -18,6 +18,7 @@ pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "nodes"))
 from graph import Graph
+from open_sockets import listening_of
 from plant_process import BUDGET, USERS, PlantProcess
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
@@ -188,24 +189,6 @@ def test_secrets_are_nowhere(loop: Loop, capfd: pytest.CaptureFixture[str]) -> N
     assert "PRIVATE KEY" not in told
 
 
-def sockets_of(process: int) -> list[tuple[str, str]]:
-    """Return local addresses (hexadecimal) and states of the TCP sockets of a process."""
-    owned = set()
-    for entry in Path(f"/proc/{process}/fd").iterdir():
-        if entry.is_symlink() and (target := str(entry.readlink())).startswith("socket:["):
-            owned.add(target[8:-1])
-    found = []
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:
-            cells = line.split()
-            if cells[9] in owned:
-                found.append((cells[1], cells[3]))
-    return found
-
-
-LISTEN = "0A"
-
-
 def test_the_bridge_opens_no_port_and_the_plant_one_of_this_machine(
     loop: Loop, tmp_path: Path
 ) -> None:
@@ -225,13 +208,10 @@ def test_the_bridge_opens_no_port_and_the_plant_one_of_this_machine(
     assert node.stdout is not None
     try:
         assert any("connected to" in line for line in node.stdout)
-        own = sockets_of(node.pid)
-        assert own
-        assert [address for address, state in own if state == LISTEN] == []
+        assert listening_of(node.pid) == []
     finally:
         node.send_signal(signal.SIGTERM)
         assert node.wait(BUDGET) == 0
         node.stdout.close()
     assert loop.plant.process is not None
-    listening = [a for a, state in sockets_of(loop.plant.process.pid) if state == LISTEN]
-    assert listening == [f"0100007F:{loop.plant.port:04X}"]
+    assert listening_of(loop.plant.process.pid) == [f"0100007F:{loop.plant.port:04X}"]
