@@ -37,6 +37,10 @@ COMMANDS = {
     "survey": "every loop of a plant, ranked by what to service first",
     "faults": "put faults into a running graph and judge what becomes of it",
     "soak": "a long run with the real nodes: missed samples, growth of memory",
+    "certificates": "certificates of the link to a control system (OPC UA)",
+    "browse-tags": "make a tag map by browsing a control system (OPC UA)",
+    "fetch-history": "read history from a control system (OPC UA) into CSV records",
+    "listen": "fill the windows of all loops in the graph, in one process",
     "bench": "measure speed, side by side",
 }
 """What ``stiction --help`` says of each command; its module is loaded when it is called."""
