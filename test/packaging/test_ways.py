@@ -28,7 +28,7 @@ def ways() -> ModuleType:
 def test_doors_are_counted_where_another_package_calls(ways: ModuleType) -> None:
     model = st.LoopModel.load(st.find_config("flow.loop.yaml"))
     found = ways.ways_of(lambda: st.simulate(model, samples=20))
-    assert list(found)[0] == "loop"
+    assert next(iter(found)) == "loop"
     assert found["loop"] == ["simulate"]  # what it calls of its own package is no door
     assert "HeStiction.step" in found["effects"]
     assert found["records"][0].startswith("Record.")
