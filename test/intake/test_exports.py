@@ -6,6 +6,7 @@ import csv
 import gzip
 import io
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -454,3 +455,26 @@ def test_gaps_make_parts(tmp_path: Path) -> None:
     loop = one(write(tmp_path / "a.csv", text(rows)))
     assert [len(part) for part in loop.parts] == [50, 40]
     assert "split at 1 gap" in loop.notes
+
+
+def peak_memory(path: Path, rows: int) -> int:
+    """Bytes that reading a file of so many rows takes at most."""
+    with path.open("w") as file:
+        file.write("t,OP,PV,SP,MODE,comment\n")
+        file.writelines(
+            f"{k},{50 + k % 7}.25,{200 + k % 11}.125,200,AUTO,nobody needs this column\n"
+            for k in range(rows)
+        )
+    tracemalloc.start()
+    try:
+        loop = one(path)
+        assert [len(part) for part in loop.parts] == [rows]
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_memory_grows_with_the_numbers_and_not_with_the_text(tmp_path: Path) -> None:
+    few, many = (peak_memory(tmp_path / "long.csv", rows) for rows in (50_000, 110_000))
+    # Four columns and their copies; the cells as text would take 400 bytes a row and more.
+    assert (many - few) / 60_000 < 200
