@@ -44,8 +44,8 @@ def test_every_sub_package_stands_in_a_contract() -> None:
 def test_an_import_that_runs_up_is_noticed(tmp_path: Path, module: str, line: str) -> None:
     """A tree of the same names, in which one module imports what it must not."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    # The two imports that are left out of the contract are not in this small tree.
-    lines = [row for row in text.splitlines() if "fault_probe" not in row]
+    # The imports that are left out of the contracts are not in this small tree.
+    lines = [row for row in text.splitlines() if " -> stiction_ros" not in row]
     (tmp_path / "pyproject.toml").write_text("\n".join(lines), encoding="utf-8")
     names = [*(path.parent.name for path in (ROOT / "stiction_ros").glob("*/__init__.py"))]
     files = [path.stem for path in (ROOT / "stiction_ros").glob("[!_]*.py")]
