@@ -16,7 +16,8 @@ from stiction_ros.intake.tables.block import Block
 from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
 from stiction_ros.intake.tables.tags import TagList, read_tag_list
-from stiction_ros.records.bag_reader import read_bag_parts
+from stiction_ros.records.bag_reader import read_bag_loops, read_bag_parts
+from stiction_ros.records.record import Record
 from stiction_ros.records.storage_files import METADATA
 
 OTHERS = 8
@@ -27,20 +28,26 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
     """Yield the loops that files and folders hold, read one after the other.
 
     A loop that cannot be read comes with its ``problem`` and stops no other. Signals of one
-    loop may stand in several files, which are then read together.
+    loop may stand in several files, which are then read together. No name comes twice: a
+    later loop of one name gets its folder's as well.
 
     Args:
-        paths: files and folders, read in their order; folders by the names in them.
+        paths: files and folders, folders by the names in them; files of one loop come first, in
+            their order, then those of several.
         options: how to read them.
 
     Raises:
         InputError: the tag list cannot be read.
     """
     tags = None if options.tags is None else read_tag_list(options.tags)
+    yield from _with_names_of_their_own(_loops(paths, options, tags))
+
+
+def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
     tables: list[_Table] = []
     for file in _files(paths, options):
         if is_bag(file):
-            yield _bag(file, options)
+            yield from _bags(file, options)
             continue
         try:
             sheets = open_sheets(file)
@@ -83,6 +90,8 @@ def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loo
             break
     if not names:
         raise InputError("holds no file of a loop", where=str(path), fix="check the path")
+    if len(found) != 1 and name is None and is_bag(path):
+        read_bag_parts(path)  # tells how to choose one
     if len(found) != 1:
         listed = ", ".join(names[:OTHERS]) + (" and others" if len(names) > OTHERS else "")
         what = "holds several loops" if name is None else f"has no loop {name}"
@@ -122,13 +131,37 @@ def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
                 yield inner
 
 
-def _bag(path: Path, options: IntakeOptions) -> Loop:
+def _bags(path: Path, options: IntakeOptions) -> Iterator[Loop]:
+    """Yield the loops of a bag: all, or the one of the namespace that was chosen."""
     try:
-        parts = read_bag_parts(path, namespace=options.namespace)
+        if options.namespace is not None:
+            parts = read_bag_parts(path, namespace=options.namespace)
+            found: dict[str, tuple[Record, ...] | InputError] = {"": parts}
+        else:
+            found = read_bag_loops(path)
     except InputError as error:
-        return Loop(path.stem, (path,), (), problem=str(error))
-    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
-    return Loop(path.stem, (path,), parts, notes)
+        found = {"": error}
+    for space, read in found.items():
+        name = path.stem + (space if len(found) > 1 else "")
+        if isinstance(read, InputError):
+            yield Loop(name, (path,), (), problem=str(read))
+            continue
+        notes = tuple(dict.fromkeys(note for part in read for note in part.notes))
+        yield Loop(name, (path,), read, notes)
+
+
+def _with_names_of_their_own(found: Iterator[Loop]) -> Iterator[Loop]:
+    """Yield loops; a name that was there already gets its folder, and if need be a number."""
+    seen: set[str] = set()
+    for loop in found:
+        name = loop.name
+        if name in seen:
+            name = f"{loop.name} ({loop.files[0].parent.name})"
+        number = 2
+        while name in seen:
+            name, number = f"{loop.name} ({loop.files[0].parent.name} {number})", number + 1
+        seen.add(name)
+        yield loop if name == loop.name else dataclasses.replace(loop, name=name)
 
 
 def _groups(tables: Sequence[_Table]) -> Iterator[list[_Table]]:

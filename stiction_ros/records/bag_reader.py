@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from stiction_ros.errors import InputError
 from stiction_ros.records.bag_messages import BagMessage, read_messages, read_raw
 from stiction_ros.records.loop_runs import LoopRun, loop_runs
 from stiction_ros.records.loop_signals import JOINT_STATE, LoopSignals, is_signal
@@ -19,6 +20,7 @@ __all__ = [
     "bag_source",
     "is_signal",
     "read_bag",
+    "read_bag_loops",
     "read_bag_parts",
     "read_messages",
     "read_raw",
@@ -57,6 +59,35 @@ def read_bag_parts(path: str | Path, *, namespace: str | None = None) -> tuple[R
         signals.add(message, number)
     runs = loop_runs(signals, bag_source(path), namespace, notes)
     return tuple(part for run in runs for part in run.parts)
+
+
+def read_bag_loops(path: str | Path) -> dict[str, tuple[Record, ...] | InputError]:
+    """Read the records of every loop in a bag.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+
+    Returns:
+        Namespace of each loop, such as ``/unit1``, to its records as :func:`read_bag_parts` has
+        them, or to the reason why there are none.
+
+    Raises:
+        InputError: as :func:`read_messages`.
+    """
+    notes: list[str] = []
+    signals = LoopSignals(str(path))
+    for number, message in enumerate(read_messages(path, wanted=is_signal, notes=notes)):
+        signals.add(message, number)
+    found: dict[str, tuple[Record, ...] | InputError] = {}
+    for space in signals.loops or ("",):
+        chosen = (space or "/") if signals.loops else None
+        try:
+            runs = loop_runs(signals, bag_source(path), chosen, notes)
+        except InputError as error:
+            found[space] = error
+            continue
+        found[space] = tuple(part for run in runs for part in run.parts)
+    return found
 
 
 def bag_source(path: str | Path) -> Source:

@@ -16,3 +16,11 @@ def test_a_loop_that_cannot_be_read_stops_no_other(tmp_path: Path) -> None:
     assert found[1].parts == ()
     assert [len(part) for part in found[2].parts] == [3]
     assert found[0].files == (tmp_path / "a.csv",)
+
+
+def test_no_name_comes_twice(tmp_path: Path) -> None:
+    for folder in ("north", "south", "x/south"):
+        (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+        (tmp_path / folder / "FIC1.csv").write_text("t,OP,PV\n0,1,2\n1,1,3\n2,2,3\n")
+    found = [loop.name for loop in loops([tmp_path], IntakeOptions())]
+    assert found == ["FIC1", "FIC1 (south)", "FIC1 (south 2)"]

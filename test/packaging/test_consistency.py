@@ -22,7 +22,7 @@ DISTRIBUTION = {
     "yaml": "pyyaml",
 }
 # Imported where it is there; the package runs without.
-OPTIONAL = {"do_mpc"}
+OPTIONAL = {"do_mpc", "openpyxl", "pyarrow"}
 # Distribution in setup.cfg → rosdep key in package.xml; the others are installed with pip.
 ROSDEP = {
     "matplotlib": "python3-matplotlib",

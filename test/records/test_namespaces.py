@@ -10,6 +10,7 @@ from bag_making import SECOND, Bag, joint_state
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
+from stiction_ros.intake import IntakeOptions, loops
 from stiction_ros.intake.record_file import open_record
 from stiction_ros.records.run_log import read_run
 
@@ -60,6 +61,16 @@ def test_one_loop_in_a_namespace_needs_no_choice(bag: Bag) -> None:
     bag.writer.close()
     run = read_run(bag.writer.directory)
     assert [change.mode for change in run.modes] == ["hold", "unaware"]
+
+
+def test_of_many_files_every_loop_of_a_bag_is_read(two: Path) -> None:
+    found = list(loops([two.parent], IntakeOptions()))
+    assert [(loop.name, [len(part) for part in loop.parts]) for loop in found] == [
+        (f"{two.stem}/a", [12]),
+        (f"{two.stem}/b/c", [15]),
+    ]
+    (chosen,) = loops([two], IntakeOptions(namespace="/a"))
+    assert (chosen.name, len(chosen.parts[0])) == (two.stem, 12)
 
 
 @pytest.mark.parametrize("command", ["identify", "fit-linear", "report"])

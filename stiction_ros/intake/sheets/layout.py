@@ -5,12 +5,16 @@ from __future__ import annotations
 import csv
 import dataclasses
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number, is_stamp
 
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
+
+WHOLE = 0.6
+"""Share of the usual number of cells that a row of data has at least."""
 
 LOOKED_AT = 40
 """Lines at the top of a file that are looked at."""
@@ -95,7 +99,10 @@ def _paired(units: Sequence[str], row: Sequence[str]) -> list[tuple[str, str]]:
 
 def _first_data(rows: Sequence[Sequence[str]]) -> int:
     """Return the first row that looks like data; else the second one."""
+    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
     for place, row in enumerate(rows):
+        if len(row) < WHOLE * width:
+            continue
         cells = [cell.strip() for cell in row if cell.strip()]
         told = sum(is_number(c) or is_stamp(c) for c in cells)
         silent = sum(bool(BAD_WORDS.fullmatch(c)) for c in cells)

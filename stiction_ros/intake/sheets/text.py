@@ -9,7 +9,7 @@ import io
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import Any, BinaryIO, cast
 
 import zstandard
 
@@ -24,7 +24,7 @@ HEAD = 4096
 SHORTEST = 16
 """Bytes from which UTF-16 without its mark is told."""
 
-NULLS = 0.3
+NULLS = 0.7
 """Share of zero bytes on one side of the pairs from which text is UTF-16 without its mark."""
 
 
@@ -94,11 +94,43 @@ def _unpacked(path: Path, first: bytes) -> BinaryIO:
     if first.startswith(GZIP):
         return cast(BinaryIO, gzip.open(path, "rb"))
     if first.startswith(ZSTD):
-        reader = zstandard.ZstdDecompressor().stream_reader(
-            path.open("rb"), read_across_frames=True, closefd=True
-        )
-        return cast(BinaryIO, reader)
+        return cast(BinaryIO, _Zstd(path))
     return path.open("rb")
+
+
+class _Zstd(io.RawIOBase):
+    """Bytes of a file packed with Zstandard; one that is cut off is an EOFError."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = path.open("rb")
+        self.frame = zstandard.ZstdDecompressor().decompressobj()
+        self.ready, self.begun = b"", False
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        view = memoryview(buffer)
+        while not self.ready:
+            packed = b""
+            if self.frame.eof:
+                packed = self.frame.unused_data
+                self.frame, self.begun = zstandard.ZstdDecompressor().decompressobj(), False
+            packed = packed or self.file.read(1 << 16)
+            if not packed:
+                if self.begun:
+                    raise EOFError
+                return 0
+            self.begun = True
+            self.ready = self.frame.decompress(packed)
+        count = min(len(view), len(self.ready))
+        view[:count] = self.ready[:count]
+        self.ready = self.ready[count:]
+        return count
+
+    def close(self) -> None:
+        self.file.close()
+        super().close()
 
 
 def _encoding(head: bytes, where: str) -> str:
