@@ -34,7 +34,7 @@ $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@rm -f $@
 	@echo "setup: installing"
 	@$(PIP) install -c constraints.txt "setuptools<80" wheel && \
-	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,opcua,docs,test]" && \
+	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,opcua,survey,dask,docs,test]" && \
 	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || \
 	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
 	  exit 1; }

@@ -38,6 +38,9 @@ as recorded is not the loop that was recorded."""
 FEWEST = 3
 """Drawn loops that must repeat the record, for anything to be said."""
 
+FOUND = ("sticky", "backlash")
+"""Verdicts by which a friction is known well enough to plan jumps by it."""
+
 RETUNED = (CauseKind.VALVE, CauseKind.TUNING)
 """Causes by which a loop shows its process well enough to be tuned by it: what comes from outside
 and is fed back tells as much of the controller as of the process."""
@@ -166,7 +169,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
     draws = Draws(frictions[kept], draws.tunings[kept])
     options = (
         _service(loop, draws, now),
-        _embedding(loop),
+        _embedding(loop, found),
         _retune(loop, draws, found),
         left,
     )
@@ -244,10 +247,12 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
     return option_of(What.RETUNE, runs, note, settings)
 
 
-def _embedding(loop: RecordedLoop) -> Option:
-    if not _believed(loop):
-        note = "No friction was found: there is nothing to embed."
-        return Option(What.EMBEDDING, None, {}, note)
+def _embedding(loop: RecordedLoop, found: Identification) -> Option:
+    cause = found.outputs[loop.output].cause
+    known = loop.estimate.to_json()["verdict"] in FOUND
+    if not known or cause is None or cause.kind is not CauseKind.VALVE:
+        note = "The record does not show a valve whose friction makes the loop cycle."
+        return Option(What.EMBEDDING, None, {}, f"{note} Nothing is promised of embedding it.")
     estimate = np.array([loop.estimate.static_friction, loop.estimate.dynamic_friction])
     try:
         design = EmbeddingDesign.of(loop)
