@@ -35,7 +35,7 @@ PUBLISHING = 0.02  # s
 ROUND = 620  # samples of a round of the set-points
 GRANTED = ROUND + 560  # in the last hold of the second round
 LATEST = 3 * ROUND  # when the friction must have been found
-TAKEN_BACK = 2 * ROUND  # from the end of the round of the grant to the end of the next
+HOLD = 80  # samples into a round: within a hold, where no move of a set-point moves OP
 WATCHED = 186  # samples for which the plant's PIs are watched afterwards
 SILENCE = 60.0  # s without a scan after which the run is given up
 READY = 60.0  # s for the server to start
@@ -215,7 +215,7 @@ async def _operate(plant: _Plant, processes: NodeProcesses, show: Bar) -> None:
         await operator.prepare()
         found = await operator.until(GRANTED, "the plant's PIs cycle", operator.identified)
         await operator.choose("ROUT")
-        end = -(-found // ROUND) * ROUND + ROUND
+        end = -(-found // ROUND) * ROUND + ROUND + HOLD
         await operator.until(end, "the operator has granted it")
         await operator.choose("AUTO")
         await operator.until(end + WATCHED, "the operator has taken it back")
@@ -266,7 +266,7 @@ class _Operator:
                 raise NodeError(f"no friction was found in {LATEST} samples")
             if time.monotonic() - moved > SILENCE:
                 raise NodeError(f"the plant stands still at scan {now}")
-            share = now / (GRANTED + TAKEN_BACK + WATCHED)
+            share = now / (3 * ROUND + HOLD + WATCHED)
             self._show(min(0.94, share), f"{NAME}: {what}")
             await asyncio.sleep(0.2)
 

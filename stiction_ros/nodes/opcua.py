@@ -239,10 +239,13 @@ class OpcuaNode(ManagedNode):
     def _on_linked(self, event: Linked) -> None:
         before, self._said = self._said, event.reason
         self._losses += not event.connected
-        if event.reason != before:
-            say = self.get_logger().info if event.connected else self.get_logger().warning
-            say(event.reason)
-            self.report()
+        if event.reason == before:
+            return
+        if event.connected:  # rclpy wants one severity a line
+            self.get_logger().info(event.reason)
+        else:
+            self.get_logger().warning(event.reason)
+        self.report()
 
     def _on_written(self, event: Written) -> None:
         bridge, now = self.bridges[event.order.loop], time.monotonic()

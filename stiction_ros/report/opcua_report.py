@@ -54,7 +54,7 @@ class Transfer:
         time: s since the first sample.
         to: ``remote`` or ``plant``.
         reason: as the bridge told it.
-        step: largest step of OP from the sample before to the first of the new one, %.
+        step: largest step of OP from the last sample of the one to the first of the other, %.
     """
 
     time: float
@@ -89,8 +89,9 @@ class BridgedRun:
                 continue
             held = granted
             k = int(np.searchsorted(self.stamps, change.stamp))
-            first = self.applied[max(k - 1, 0) : k + 2]
-            step = float(np.abs(np.diff(first[:2], axis=0)).max()) if len(first) > 1 else 0.0
+            first = k - granted  # the first OP written is that in force; the PIs begin a scan later
+            pair = self.applied[max(first, 0) : first + 2]
+            step = float(np.abs(np.diff(pair, axis=0)).max()) if len(pair) > 1 else 0.0
             to = "remote" if granted else "plant"
             found.append(Transfer(self.log.seconds(change.stamp), to, change.reason, step))
         return found

@@ -21,6 +21,7 @@ from graph import Graph
 from open_sockets import listening_of
 from plant_process import BUDGET, USERS, PlantProcess
 from rclpy.parameter import Parameter
+from relay import Relay
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -53,8 +54,8 @@ class Loop:
     def bridge(self, **changes: Any) -> OpcuaNode:
         values = self.plant.parameters() | changes
         overrides = [Parameter(key, value=value) for key, value in values.items()]
-        node = OpcuaNode(context=self.graph.context, parameter_overrides=overrides)
-        return self.graph.adopt(node)
+        self.node = OpcuaNode(context=self.graph.context, parameter_overrides=overrides)
+        return self.graph.adopt(self.node)
 
     def answer(self, pv: JointState) -> None:
         if self.wanted is not None:
@@ -63,7 +64,10 @@ class Loop:
             self.op.publish(message)
 
     def operate(self, mode: str) -> None:
-        """Let the operator choose a mode, while the loop goes on."""
+        """Let the operator choose a mode, while the loop goes on; remote needs a beat first."""
+        if mode == "ROUT":
+            counts = self.node.bridges["tank"].counts
+            self.graph.spin_until(lambda: counts["beat_written"], "a beat")
         operator = threading.Thread(target=self.plant.grant, args=(mode,))
         operator.start()
         self.graph.spin_until(lambda: not operator.is_alive(), "the operator")
@@ -156,6 +160,38 @@ def test_give_back_by_service_and_by_ending(loop: Loop) -> None:
     assert node.bridges["tank"].grant.state is GrantState.IDLE
     last = loop.news("mode")[-1]
     assert (last["mode"], last["alarm"]) == ("AUTO", "request taken back")
+
+
+def test_a_lost_connection_is_told_and_mended(loop: Loop) -> None:
+    relay = Relay(loop.plant.port)
+    try:
+        node = loop.bridge(
+            url=f"opc.tcp://127.0.0.1:{relay.port}/plant", write=["tank"], ask="start"
+        )
+        node.start()
+        loop.graph.spin_until(lambda: "asked" in loop.grants, "the request")
+        loop.operate("ROUT")
+        loop.graph.spin_until(lambda: "granted" in loop.grants, "the grant")
+        relay.cut()
+        loop.graph.spin_until(lambda: loop.grants[-1] == "idle", "the end of the grant")
+        loop.graph.spin_until(lambda: np.isnan(loop.seen("pv")[-1].position).all(), "no values")
+        assert list(loop.seen("pv")[-1].effort) == [3.0, 3.0]
+        loop.graph.spin_until(
+            lambda: "nothing is heard of the server" in loop.texts(), "the reason"
+        )
+        levels = [s.level for m in loop.seen("/diagnostics")[-3:] for s in m.status]
+        assert max(levels) == b"\x02"
+        loop.graph.spin_until(lambda: loop.news("mode")[-1]["mode"] == "AUTO", "the watchdog")
+        relay.mend()
+        loop.graph.spin_until(
+            lambda: np.isfinite(loop.seen("pv")[-1].position).all(), "values again"
+        )
+        stamps = [to_ns(message.header.stamp) for message in loop.seen("pv")]
+        assert set(np.diff(stamps)) == {60_000_000_000}
+        assert loop.grants[-1] == "idle"
+        node.trigger_deactivate()
+    finally:
+        relay.close()
 
 
 @pytest.mark.parametrize(

@@ -26,10 +26,12 @@ def run(*grants: GrantChange, applied: Any = None) -> BridgedRun:
 def test_transfers_are_told_with_their_step() -> None:
     applied = np.full((12, 1), 50.0)
     applied[5:] = 50.4
+    applied[7:] = 60.0  # the controller's own move, before it is taken back
+    applied[9:] = 60.3
     found = run(ASKED, GRANTED, BACK, applied=applied).transfers()
     assert [(one.time, one.to) for one in found] == [(5.0, "remote"), (8.0, "plant")]
     assert found[0].step == pytest.approx(0.4)
-    assert found[1].step == 0.0
+    assert found[1].step == pytest.approx(0.3)
 
 
 def test_a_reason_that_changes_is_no_transfer() -> None:
