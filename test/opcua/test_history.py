@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from plant_process import START, PlantProcess, wait_until
 from small_maps import OP, PV, SP, loop_tags
-from stiction_ros.records.csv_file import read_csv_parts
+from stiction_ros.intake.record_file import read_csv_parts
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
