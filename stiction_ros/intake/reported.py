@@ -37,12 +37,14 @@ def is_reported(block: Block) -> bool:
     there = (
         np.ones(len(block.time), dtype=bool) if block.mask is None else block.mask != Quality.BAD
     )
+    if not there.any():
+        return False
     shares = [
         float(np.mean(~column.blank[there]))
         for key, column in block.columns.items()
         if key.signal in ("op", "pv")
     ]
-    return bool(there.any()) and min(shares) < COVERED
+    return min(shares) < COVERED
 
 
 def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block]:

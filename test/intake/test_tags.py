@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parent))
 from exports import one
 
-from stiction_ros.intake.tables.tags import Tag, read_tag
+from stiction_ros.intake.sheets.names import Tag, read_tag
 from stiction_ros.records.quality import Quality
 
 

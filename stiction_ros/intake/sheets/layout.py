@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number, is_stamp
+from stiction_ros.intake.sheets.names import is_name
 
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
@@ -113,7 +114,6 @@ def _first_data(rows: Sequence[Sequence[str]]) -> int:
 
 def _header_place(above: Sequence[Sequence[str]], width: int) -> int:
     """Return which row holds the names: the one with most of them known, else the fullest."""
-    from stiction_ros.intake.tables.tags import is_name
 
     def rank(place: int) -> tuple[int, int, int]:
         row = above[place]

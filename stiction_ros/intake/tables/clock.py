@@ -11,10 +11,10 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
 from stiction_ros.intake.sheets.cells import is_stamp
+from stiction_ros.intake.sheets.names import TIME_NAMES
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Times
 from stiction_ros.intake.tables.block import Clock
-from stiction_ros.intake.tables.tags import TIME_NAMES
 
 EPOCHS = {
     TimeUnit.MILLISECONDS: (3e11, 4e12),

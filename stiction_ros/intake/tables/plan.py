@@ -8,18 +8,18 @@ from collections.abc import Mapping
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.options import CsvColumns, IntakeOptions
-from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.tables.block import Key
-from stiction_ros.intake.tables.clock import TimeColumn, time_column
-from stiction_ros.intake.tables.tags import (
+from stiction_ros.intake.sheets.names import (
     QUALITY_NAMES,
     TAG_NAMES,
     UNIT_NAMES,
     VALUE_NAMES,
     Tag,
-    TagList,
     read_tag,
 )
+from stiction_ros.intake.sheets.sheet import Sheet
+from stiction_ros.intake.tables.block import Key
+from stiction_ros.intake.tables.clock import TimeColumn, time_column
+from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
 OPTIONS = {"op": "--op TAG=COLUMN", "pv": "--pv TAG=COLUMN", "sp": "--sp TAG=COLUMN"}

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.options import IntakeOptions
 from stiction_ros.intake.sheets.cells import BAD_WORDS, Cells, Numbers, Words, number
+from stiction_ros.intake.sheets.names import read_tag
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Stamps
 from stiction_ros.intake.tables.block import Block, Clock, Column, FlagArray, Key
 from stiction_ros.intake.tables.clock import in_seconds
 from stiction_ros.intake.tables.plan import Plan, Shape
-from stiction_ros.intake.tables.tags import TagList, read_tag
+from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 

@@ -1,0 +1,80 @@
+"""Names of tags and columns: which loop they belong to, and which of its signals they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+SIGNAL_WORDS: Mapping[str, tuple[str, ...]] = {
+    "pv": ("pv", "meas", "process_value", "processvalue", "pv_in", "me"),
+    "sp": ("sp", "sv", "spt", "setpoint", "set_point", "set point", "wsp"),
+    "op": ("op", "out", "mv", "co", "output", "opout", "lmn", "cout"),
+    "stem": ("stem", "zt", "pos", "position", "travel"),
+    "mode": ("mode", "md", "mode_act", "modeact", "a/m", "am", "auto"),
+}
+"""Last part of a tag, in the words of the makers of control systems, by signal."""
+
+TIME_NAMES = (
+    *("t", "time", "timestamp", "time stamp", "datetime", "date time", "date/time", "stamp", "ts"),
+    *("_time", "utc", "local time", "zeit", "zeitstempel", "date", "datum", "record time"),
+)
+TAG_NAMES = (
+    *("tag", "tagname", "tag name", "point", "pointname", "point name", "name", "sensor", "item"),
+    *("itemid", "item id", "variable", "signal", "id", "point id", "pointid"),
+)
+VALUE_NAMES = ("value", "val", "_value", "reading", "wert", "numeric value", "messwert")
+QUALITY_NAMES = ("quality", "status", "qual", "opc quality", "quality code", "opcquality", "q")
+UNIT_NAMES = ("unit", "units", "uom", "eu", "engunits", "eng units", "einheit")
+
+SIGNALS = {word: signal for signal, words in SIGNAL_WORDS.items() for word in words}
+"""Word to signal."""
+
+_ATTRIBUTE = re.compile(r"(?i)[./](cv|f_cv|val|value|act|actual|target|measured)$")
+_BLOCK = re.compile(r"(?i)[./](pid\w*|regctl\w*|daca\w*|pic|fic_block|pidx|ctrl)$")
+_QUALITY = re.compile(r"(?i)[ ._:/-](quality|status|qual|q)$")
+_WORDS = "|".join(sorted(map(re.escape, SIGNALS), key=len, reverse=True))
+_TAG = re.compile(rf"(?i)(.+?)\s*(?:[._:/\\ -]|::)\s*({_WORDS})")
+
+
+class Tag(NamedTuple):
+    """What a name says.
+
+    Attributes:
+        loop: name of the loop; empty for a bare ``PV``.
+        signal: ``pv``, ``sp``, ``op``, ``stem`` or ``mode``.
+        quality: whether it is the quality of that signal.
+    """
+
+    loop: str
+    signal: str
+    quality: bool = False
+
+
+def read_tag(name: str) -> Tag | None:
+    """Return what a tag or a column's name says; None when it says nothing.
+
+    ``FIC101.PV``, ``FIC101/PID1/OUT.CV``, ``FIC101_SP``, ``FIC101.PIDA.MODE``, ``PV``.
+    """
+    bare = " ".join(name.split())
+    quality = _QUALITY.search(bare)
+    if quality:
+        bare = bare[: quality.start()]
+    attribute = _ATTRIBUTE.search(bare)
+    if attribute:
+        bare = bare[: attribute.start()]
+    signal = SIGNALS.get(bare.casefold())
+    if signal is not None:
+        return Tag("", signal, quality is not None)
+    found = _TAG.fullmatch(bare)
+    if found is None:
+        return None
+    loop = _BLOCK.sub("", found[1])
+    return Tag(loop, SIGNALS[found[2].casefold()], quality is not None)
+
+
+def is_name(name: str) -> bool:
+    """Return whether a cell looks like the name of a column."""
+    folded = " ".join(name.split()).casefold()
+    known = (*TIME_NAMES, *TAG_NAMES, *VALUE_NAMES, *QUALITY_NAMES, *UNIT_NAMES)
+    return folded in known or read_tag(name) is not None
