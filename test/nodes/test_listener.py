@@ -17,8 +17,8 @@ pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 from rclpy.context import Context
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from stiction_ros.intake.record_file import read_csv_parts
 
+from stiction_ros.intake.record_file import read_csv_parts
 from stiction_ros.nodes.managed import SIGNAL_QOS
 from stiction_ros.nodes.messages import joint_state
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from plant_process import START, PlantProcess, wait_until
 from small_maps import OP, PV, SP, loop_tags
-from stiction_ros.intake.record_file import read_csv_parts
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
+from stiction_ros.intake.record_file import read_csv_parts
 from stiction_ros.opcua.intake import history
 from stiction_ros.opcua.intake.history import HistoryFile, Span, record_of
 from stiction_ros.opcua.reading import TagQuality, TagReading

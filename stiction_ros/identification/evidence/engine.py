@@ -9,7 +9,13 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.explanation import LINE, OPEN, RIVAL, explained
+from stiction_ros.identification.closed_loop.explanation import (
+    ENDLESS,
+    LINE,
+    OPEN,
+    RIVAL,
+    explained,
+)
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.kernels import whitened
@@ -35,6 +41,9 @@ PRICE = 15.0
 """−2 log likelihood that friction must gain at two neighbouring rates: what the best of so many
 frictions gains on quiet loops without any."""
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
+SURE = 40.0
+"""What a friction gains beyond :data:`PRICE` from which on it is not doubted for being idle, unless
+the closed loop grows without end: the linear process that is fitted at last is less certain."""
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 HARMLESS = 0.12  # of the range of OP: a valve is healthy when larger bands are rejected
 UNHEARD = 12.0  # gain of friction at any rate from which on a valve is not called healthy
@@ -81,14 +90,16 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
 
     A wave of one period that explains the record nearly as well comes from outside, and a
     friction without which OP would move all the same is not what moves it; the latter holds where
-    the controller is known.
+    the controller is known and the evidence not overwhelming.
     """
     if valve.verdict is not VerdictKind.STICKY:
         return valve
     told = valve.evidence
     wave = told.get("line_rivalry", 0.0) > RIVAL and told.get("outside_line", 0.0) > LINE
     known = told.get("controller_fit", 0.0) > OPEN
+    endless = told.get("moved_with", 0.0) >= ENDLESS
     idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
+    idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
     if not (wave or idle):
         return valve
     return dataclasses.replace(
