@@ -33,7 +33,7 @@ $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@rm -f $@
 	@echo "setup: installing"
 	@$(PIP) install -c constraints.txt "setuptools<80" wheel && \
-	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,survey,dask,test]" && \
+	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,test]" && \
 	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || \
 	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
 	  exit 1; }

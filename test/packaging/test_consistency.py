@@ -22,7 +22,7 @@ DISTRIBUTION = {
     "yaml": "pyyaml",
 }
 # Imported where it is there; the package runs without.
-OPTIONAL = {"do_mpc", "openpyxl", "pyarrow"}
+OPTIONAL = {"dask", "distributed", "do_mpc", "openpyxl", "pyarrow"}
 # Distribution in setup.cfg → rosdep key in package.xml; the others are installed with pip.
 ROSDEP = {
     "matplotlib": "python3-matplotlib",
@@ -100,7 +100,7 @@ def test_every_rosdep_key_is_in_the_manifest() -> None:
 def test_every_requirement_is_pinned_and_explained() -> None:
     extras = config()["options.extras_require"]
     wanted = requirements(config()["options"]["install_requires"])
-    wanted |= requirements("\n".join(extras[name] for name in ("ros", "test", "bench")))
+    wanted |= requirements("\n".join(extras[name] for name in extras))
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     assert all("==" in line for line in lines if line and not line.startswith("#"))
     assert wanted <= requirements("\n".join(line for line in lines if "==" in line))
