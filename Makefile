@@ -1,14 +1,15 @@
 # make setup   install everything into .venv (needs Python 3.11 or newer, no root)
 # make demo    the live demonstration; options in ARGS, such as ARGS="siso --out out/siso"
 # make test    linters, types and tests; pytest's options in ARGS
-# make lint    linters and types alone
+# make lint    linters, types and import contracts alone
+# make docs    the documentation site, in out/site; any warning fails
 # make clean   remove .venv and all that was built
 #
 # PYTHON=... names the interpreter of a new .venv; without it python3.12, python3.11 and
 # python3 are tried.
 
 .SUFFIXES:
-.PHONY: setup demo test lint clean
+.PHONY: setup demo test lint docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -33,7 +34,7 @@ $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@rm -f $@
 	@echo "setup: installing"
 	@$(PIP) install -c constraints.txt "setuptools<80" wheel && \
-	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,test]" && \
+	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,opcua,survey,dask,docs,test]" && \
 	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || \
 	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
 	  exit 1; }
@@ -67,10 +68,15 @@ lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
 
 test: lint
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
+docs: setup
+	$(BIN)/mkdocs build --strict --clean
+	@echo "docs: out/site/index.html"
+
 clean:
-	rm -rf $(VENV) build dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
-	find stiction_ros test -name __pycache__ -prune -exec rm -rf {} +
+	rm -rf $(VENV) build dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find stiction_ros test examples tools -name __pycache__ -prune -exec rm -rf {} +

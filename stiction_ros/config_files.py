@@ -25,6 +25,14 @@ def find_config(name: str | Path) -> Path:
 
     Raises:
         InputError: neither exists.
+
+    Args:
+        name: a path, or the name of a file that comes with the package.
+
+    Examples:
+        >>> from stiction_ros import find_config
+        >>> find_config("flow.loop.yaml").name
+        'flow.loop.yaml'
     """
     path = Path(name)
     if path.is_file():

@@ -20,6 +20,11 @@ class InputError(ValueError):
 
     ``str(error)`` is one line, ``where: what; fix``, which the command prints before it
     ends with exit code 2.
+
+    Examples:
+        >>> from stiction_ros import InputError
+        >>> print(InputError("no such file", where="loop.csv", fix="check the path"))
+        loop.csv: no such file; check the path
     """
 
     def __init__(self, what: str, *, where: str = "", fix: str = "") -> None:

@@ -12,16 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli import (
-    bench_control,
-    bench_field,
-    bench_gain,
-    bench_gap,
-    bench_graph,
-    bench_identification,
-    bench_record,
-    bench_stability,
-)
+from stiction_ros.cli import bench_field, bench_gap, bench_stability
 from stiction_ros.cli.bench_row import Row
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import Bar, bar
@@ -117,14 +108,20 @@ def machine() -> str:
 
 
 def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_graph
+
     return bench_graph.graph(show)
 
 
 def _record(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_record
+
     return bench_record.record(show)
 
 
 def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_identification
+
     plan = bench_identification.QUICK if options.quick else bench_identification.FULL
     chosen = {
         key: value
@@ -135,6 +132,8 @@ def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
 
 
 def _control(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_ros.cli import bench_control
+
     plan = bench_control.QUICK if options.quick else bench_control.FULL
     if options.seed is not None:
         plan = dataclasses.replace(plan, seed=options.seed)
@@ -165,6 +164,12 @@ def _number(value: float) -> str:
     return f"{value:.3f}" if value < 100.0 else f"{value:.0f}"
 
 
+def _gain(options: argparse.Namespace, machine: str) -> int:
+    from stiction_ros.cli import bench_gain
+
+    return bench_gain.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -174,6 +179,6 @@ BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
 
 COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
-    "gain": bench_gain.run,
+    "gain": _gain,
     "stability": bench_stability.run,
 }

@@ -14,12 +14,10 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import run_seeds
 from stiction_ros.errors import InputError
-from stiction_ros.field import MANY, ValveKind, field_loop
-from stiction_ros.identification import IdentificationOptions, identify
-from stiction_ros.identification.options import METHOD_NAMES
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 
@@ -32,7 +30,7 @@ METHOD = "exact"
 FOUND = ("sticky", "backlash")
 """Verdicts that find friction."""
 
-MANY_SLIPS = f"{MANY} slips or more"
+MANY_SLIPS = f"{choices.MANY} slips or more"
 FEW_SLIPS = "fewer slips"
 OTHERS = "no friction"
 GROUPS = (MANY_SLIPS, FEW_SLIPS, OTHERS)
@@ -94,6 +92,8 @@ def _interval(values: Sequence[float]) -> Interval:
 
 def identified(method: str, record: Record) -> Mapping[str, Any]:
     """Return the mapping of ``identify --json`` by a method, else with default options."""
+    from stiction_ros.identification import IdentificationOptions, identify
+
     return identify(record, IdentificationOptions(method=method)).to_json()
 
 
@@ -125,9 +125,9 @@ class Judged:
     @property
     def group(self) -> str:
         """One of :data:`GROUPS`."""
-        if self.valve == ValveKind.HEALTHY.value:
+        if self.valve == "healthy":
             return OTHERS
-        return MANY_SLIPS if self.slips >= MANY else FEW_SLIPS
+        return MANY_SLIPS if self.slips >= choices.MANY else FEW_SLIPS
 
     @property
     def verdict(self) -> str:
@@ -167,6 +167,8 @@ class Judged:
 
 def judge(method: str, seed: int) -> Judged:
     """Identify one loop of the field by a method, else with default options."""
+    from stiction_ros.field import field_loop
+
     loop = field_loop(seed)
     truth = loop.truth
     return Judged(
@@ -290,7 +292,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--seeds", type=seed_range, metavar="A:B", help=f"of the field's loops ({FIRST}:{LAST})"
     )
-    group.add_argument("--method", choices=METHOD_NAMES, help=f"search ({METHOD})")
+    group.add_argument("--method", choices=choices.METHODS, help=f"search ({METHOD})")
 
 
 def run(options: argparse.Namespace, machine: str) -> int:

@@ -11,22 +11,20 @@ import multiprocessing
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.blind.calibration import chance_scores
-from stiction_ros.blind.generator import blind_loop, write_blind_loop
-from stiction_ros.blind.scoring import Scored, score
-from stiction_ros.blind.tally import Rate, coverage, matrix, median_closed, rates, report
-from stiction_ros.blind.testable import gains_beyond_margin
-from stiction_ros.blind.truth import FAMILIES
+from stiction_ros.cli import choices
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
-from stiction_ros.discrepancy import GapOptions, find_discrepancy
-from stiction_ros.discrepancy.chance import stored_threshold
 from stiction_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from stiction_ros.blind.scoring import Scored
+    from stiction_ros.blind.tally import Rate
 
 FIRST_SEED = 10_000  # seeds below 1000 are for tuning
 LOOPS = 20
@@ -68,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--family",
         action="append",
-        choices=FAMILIES,
+        choices=choices.BLIND_FAMILIES,
         help="of blind loops; may be repeated (single)",
     )
     group.add_argument("--first", type=int, metavar="SEED", help=f"first seed ({FIRST_SEED})")
@@ -94,6 +92,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the benchmark."""
+    from stiction_ros.blind.tally import report
+
     chosen = {
         "families": tuple(dict.fromkeys(options.family)) if options.family else None,
         "first": options.first,
@@ -123,6 +123,11 @@ def run(options: argparse.Namespace) -> int:
 
 def judge(family: str, seed: int, full: bool) -> Scored:
     """Run the workflow on one blind loop and compare; it sees model and record alone."""
+    from stiction_ros.blind.generator import blind_loop
+    from stiction_ros.blind.scoring import score
+    from stiction_ros.blind.testable import gains_beyond_margin
+    from stiction_ros.discrepancy import GapOptions, find_discrepancy
+
     seen, truth = blind_loop(seed, family)
     found = find_discrepancy(seen.model, [seen.record], GapOptions(quick=not full))
     return score(truth, seen.model, found.to_json(), gains_beyond_margin(seen, truth))
@@ -151,6 +156,9 @@ def judge_all(
 
 def _show_chance(bench: GapBench) -> None:
     """Print how large scores of noise alone become, by the number of candidates."""
+    from stiction_ros.blind.calibration import chance_scores
+    from stiction_ros.discrepancy.chance import stored_threshold
+
     scores: dict[int, list[float]] = {}
     with bar(f"noise of {bench.loops} loops") as show_share:
         for k in range(bench.loops):
@@ -178,6 +186,8 @@ def read_log(path: Path, bench: GapBench) -> dict[tuple[str, int], Scored]:
     Raises:
         InputError: a line that is no row.
     """
+    from stiction_ros.blind.scoring import Scored
+
     if not path.exists():
         return {}
     wanted, rows = set(bench.cases), {}
@@ -198,6 +208,8 @@ def read_log(path: Path, bench: GapBench) -> dict[tuple[str, int], Scored]:
 
 def write_loops(bench: GapBench, folder: Path) -> None:
     """Write every loop to ``folder/loops/FAMILY_SEED`` and its answer to ``folder/answers``."""
+    from stiction_ros.blind.generator import write_blind_loop
+
     for family, seed in bench.cases:
         seen = folder / "loops" / f"{family}_{seed}"
         write_blind_loop(seed, family, seen, folder / "answers")
@@ -205,6 +217,8 @@ def write_loops(bench: GapBench, folder: Path) -> None:
 
 def show(rows: Iterable[Scored]) -> None:
     """Print the matrix and the rates."""
+    from stiction_ros.blind.tally import coverage, matrix, median_closed, rates
+
     rows = list(rows)
     console = Console()
     console.print(_matrix_table(matrix(rows)))

@@ -27,8 +27,6 @@ from stiction_ros.cli.bench_field import (
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import run_each
 from stiction_ros.errors import InputError
-from stiction_ros.field import field_loop
-from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.intake.record_file import CsvColumns, open_parts
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
@@ -122,6 +120,8 @@ class Source:
 
     def read(self) -> Record:
         """Return the longest good part, without a stem."""
+        from stiction_ros.field import field_loop
+
         if self.seed is not None:
             record = longest_part([field_loop(self.seed).record])
         else:
@@ -191,6 +191,8 @@ def hold(method: str, source: Source) -> Held:
 
 def varied(method: str, record: Record, variant: Variant) -> Answer:
     """Return what is said of one variant, frictions in the unit of the record as it is."""
+    from stiction_ros.identification import IdentificationOptions, identify
+
     options = IdentificationOptions(method=method)
     if variant.delay is not None:
         options = dataclasses.replace(options, delay=variant.delay)

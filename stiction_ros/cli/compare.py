@@ -7,18 +7,19 @@ import functools
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import run_seeds, seed_range
-from stiction_ros.control.paper_weights import WarmStart, WeightPreset
 from stiction_ros.errors import InputError
-from stiction_ros.examples.control_study import SCHEDULES, StudyOptions, Trial, run_trial
-from stiction_ros.examples.paper import PLANTS
+
+if TYPE_CHECKING:
+    from stiction_ros.examples.control_study import StudyOptions, Trial
 
 SEEDS = (101, 103)
 OPTIONS = ("plant", "seeds", "preset", "warm_start", "schedule", "hold", "jobs", "json")
@@ -35,20 +36,20 @@ def add_options(parser: Any) -> None:
         action="store_true",
         help="Figure 6: unaware, inversion and embedding as printed, exact, no friction",
     )
-    group.add_argument("--plant", choices=PLANTS, help="linear is (A.3) (default: both)")
+    group.add_argument("--plant", choices=choices.PLANTS, help="linear is (A.3) (default: both)")
     group.add_argument("--seeds", type=seed_range, metavar="A:B", help="inclusive (101:103)")
     group.add_argument(
         "--preset",
-        choices=[preset.value for preset in WeightPreset],
+        choices=choices.PRESETS,
         help="weights of SU, SI and the loop without friction (own)",
     )
     group.add_argument(
         "--warm-start",
-        choices=[start.value for start in WarmStart],
+        choices=choices.WARM_STARTS,
         help="of the embedding as printed (compensation)",
     )
     group.add_argument(
-        "--schedule", choices=SCHEDULES, help="set-points drawn for each seed (held-out)"
+        "--schedule", choices=choices.SCHEDULES, help="set-points drawn for each seed (held-out)"
     )
     group.add_argument("--hold", type=int, metavar="MIN", help="minutes between moves (120)")
     group.add_argument("--jobs", type=int, metavar="N", help="processes; times need 1 (all cores)")
@@ -68,9 +69,11 @@ def refuse_options(options: argparse.Namespace) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the comparison."""
+    _check(options)
+    from stiction_ros.examples.control_study import run_trial
+    from stiction_ros.examples.paper import PLANTS
     from stiction_ros.report.control_report import PlantStudy, report_study
 
-    _check(options)
     directory = Path(options.out) / FOLDER
     _make(directory)
     studies = []
@@ -91,6 +94,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _study(options: argparse.Namespace, plant: str) -> StudyOptions:
+    from stiction_ros.control.paper_weights import WarmStart, WeightPreset
+    from stiction_ros.examples.control_study import StudyOptions
+
     chosen: dict[str, Any] = {
         "preset": WeightPreset(options.preset or WeightPreset.OWN),
         "warm_start": WarmStart(options.warm_start or WarmStart.COMPENSATION),

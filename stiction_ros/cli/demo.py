@@ -9,14 +9,16 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli import compare
+from stiction_ros.cli import compare, demo_opcua
 from stiction_ros.cli.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.progress import Bar, bar
 from stiction_ros.cli.scenarios import SCENARIOS, find, loop_nodes
 from stiction_ros.errors import InputError
-from stiction_ros.online.session import Scenario
+
+if TYPE_CHECKING:
+    from stiction_ros.online.session import Scenario
 
 
 def add(commands: Any) -> None:
@@ -31,7 +33,7 @@ def add(commands: Any) -> None:
         "scenario",
         nargs="*",
         metavar="SCENARIO",
-        help="tank, siso, or a file (default: both)",
+        help="tank, siso, or a file (default: both); opcua: the tank behind a control system",
     )
     parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
@@ -51,10 +53,20 @@ def run(options: argparse.Namespace) -> int:
     if options.compare:
         return compare.run(options)
     compare.refuse_options(options)
-    scenarios = [Scenario.load(find(name)) for name in options.scenario or SCENARIOS]
+    names = options.scenario or SCENARIOS
+    paths = [find(name) for name in names if name != demo_opcua.NAME]
+    from stiction_ros.online.session import Scenario
+
+    scenarios = [Scenario.load(path) for path in paths]
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)
     good = True
+    if demo_opcua.NAME in names:
+        directory = Path(options.out) / demo_opcua.NAME
+        demo_opcua.require()
+        _make_empty(directory)
+        with bar(f"{demo_opcua.NAME}: starting") as show:
+            good = demo_opcua.run(directory, options.seed, options.speed, show)
     for scenario in scenarios:
         directory = Path(options.out) / scenario.name
         _make_empty(directory)

@@ -6,31 +6,24 @@ import argparse
 import dataclasses
 import functools
 import sys
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.example_tables import print_outcome, print_study
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError
-from stiction_ros.examples import (
-    FAMILIES,
-    NOISES,
-    PLANTS,
-    Comparison,
-    Example,
-    compare,
-    example1,
-    example2,
-    healthy_loop,
-    tally,
-)
-from stiction_ros.identification import Identification, IdentificationOptions, identify
 from stiction_ros.records.csv_writer import write_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from stiction_ros.examples import Comparison, Example
+    from stiction_ros.identification import Identification
 
 NAMES = {
     "1": "example1",
@@ -42,14 +35,9 @@ NAMES = {
 METHODS = ("exact", "nlp", "grid")
 # Name of the example: the option that chooses its variant, and what may be chosen.
 VARIANTS = {
-    "example1": ("noise", NOISES),
-    "example2": ("plant", PLANTS),
-    "healthy": ("family", FAMILIES),
-}
-MAKERS: Mapping[str, Callable[..., Example]] = {
-    "example1": example1,
-    "example2": example2,
-    "healthy": healthy_loop,
+    "example1": ("noise", choices.NOISES),
+    "example2": ("plant", choices.PLANTS),
+    "healthy": ("family", choices.HEALTHY),
 }
 
 
@@ -73,8 +61,16 @@ class Choice:
 
     def make(self, seed: int) -> Example:
         """Return the example of one seed with the orders and the method chosen."""
+        from stiction_ros.examples import example1, example2, healthy_loop
+        from stiction_ros.identification import IdentificationOptions
+
+        makers: dict[str, Callable[..., Example]] = {
+            "example1": example1,
+            "example2": example2,
+            "healthy": healthy_loop,
+        }
         length = {} if self.samples is None else {"samples": self.samples}
-        example = MAKERS[self.name](seed, self.variant, **length)
+        example = makers[self.name](seed, self.variant, **length)
         changes: dict[str, Any] = {}
         if self.output_order is not None:
             changes |= {"output_order": self.output_order, "input_order": self.input_order}
@@ -147,6 +143,9 @@ def run(options: argparse.Namespace) -> int:
 
 def solve(choice: Choice, seed: int) -> Outcome:
     """Make, identify and compare one seed; a worker process can run it."""
+    from stiction_ros.examples import compare
+    from stiction_ros.identification import identify
+
     example = choice.make(seed)
     found = identify(example.record, example.options)
     return Outcome(example, found, compare(example, found))
@@ -169,6 +168,9 @@ def _choice(options: argparse.Namespace) -> Choice:
 
 
 def _run_one(choice: Choice, options: argparse.Namespace) -> int:
+    from stiction_ros.examples import compare
+    from stiction_ros.identification import identify
+
     with bar(f"{choice.name}: simulating") as show:
         example = choice.make(options.seed)
         show(0.1, f"{choice.name}: identifying")
@@ -184,6 +186,8 @@ def _run_one(choice: Choice, options: argparse.Namespace) -> int:
 
 
 def _run_many(choice: Choice, options: argparse.Namespace) -> int:
+    from stiction_ros.examples import tally
+
     work = functools.partial(solve, choice)
     title = f"{choice.name}, {choice.variant}"
     outcomes = run_seeds(work, options.seeds, options.jobs, title)

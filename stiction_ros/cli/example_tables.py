@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.examples import Comparison, Example, Finding
-from stiction_ros.examples.comparison import Against
-from stiction_ros.identification import Identification
 from stiction_ros.processes import ArxProcess
+
+if TYPE_CHECKING:
+    from stiction_ros.examples import Comparison, Example, Finding
+    from stiction_ros.examples.comparison import Against
+    from stiction_ros.identification import Identification
 
 
 def print_outcome(

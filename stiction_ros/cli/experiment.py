@@ -7,7 +7,6 @@ import shlex
 import sys
 from typing import Any
 
-from stiction_ros.cli.experiment_plant import run_plant
 from stiction_ros.cli.fit_linear import limits_range
 from stiction_ros.cli.seeds import add_jobs
 from stiction_ros.config_files import find_config
@@ -56,6 +55,8 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.name == "plant":
+        from stiction_ros.cli.experiment_plant import run_plant
+
         return run_plant(options)
     if options.samples < 2:
         raise InputError(f"{options.samples} is too few", where="--samples", fix="use 2 or more")

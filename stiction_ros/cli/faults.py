@@ -11,15 +11,16 @@ import signal
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.node_processes import require_ros, ros_environment
 from stiction_ros.cli.seeds import run_each
 from stiction_ros.errors import InputError
-from stiction_ros.faults.catalogue import FAULTS, find, table
 from stiction_ros.faults.fault import Fault, Pace, Phase
-from stiction_ros.faults.judge import Outcome
+
+if TYPE_CHECKING:
+    from stiction_ros.faults.judge import Outcome
 
 DOMAINS = 101  # of ROS whose ports lie below those that systems give away by themselves
 Case = tuple[Fault, Pace, Phase]
@@ -60,6 +61,8 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    from stiction_ros.faults.catalogue import FAULTS, find, table
+
     if options.list:
         print(table(), end="")
         return 0
@@ -114,6 +117,7 @@ class _Asked:
 
 def _run(kept: Path, seed: int, speed: float, asked: _Asked) -> Outcome:
     from stiction_ros.faults.case import Options, run_case
+    from stiction_ros.faults.catalogue import find
 
     os.environ["ROS_DOMAIN_ID"] = str(asked.domain % DOMAINS)
     with tempfile.TemporaryDirectory(prefix="stiction_fault_") as folder:

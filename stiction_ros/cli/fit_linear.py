@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.identify import delay_range
 from stiction_ros.cli.intake import (
     add_columns,
@@ -21,12 +22,10 @@ from stiction_ros.cli.intake import (
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear_data import LinearKind, LinearStatus, OrderCriterion
-from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
-from stiction_ros.identification.linear_result import LinearIdentification
-from stiction_ros.identification.subspace import StateSpaceFit
-from stiction_ros.identification.subspace_projection import SubspaceMethod
 from stiction_ros.records.parts import longest_part
+
+if TYPE_CHECKING:
+    from stiction_ros.identification.linear_result import LinearIdentification
 
 
 def add(commands: Any) -> None:
@@ -40,21 +39,20 @@ def add(commands: Any) -> None:
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
     add_columns(parser)
     add_intake(parser)
-    kinds = [kind.value for kind in LinearKind]
-    parser.add_argument("--kind", default="state_space", choices=kinds, help="(state_space)")
+    parser.add_argument(
+        "--kind", default="state_space", choices=choices.LINEAR_KINDS, help="(state_space)"
+    )
     parser.add_argument("--order", type=int, metavar="N", help="states (default: by BIC)")
     parser.add_argument(
         "--method",
         default="cva",
-        choices=[method.value for method in SubspaceMethod],
+        choices=choices.SUBSPACE_METHODS,
         help="projection of state_space; predictor for records of a closed loop (cva)",
     )
     parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: 1 to 3)")
     parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
     parser.add_argument("--nc", type=int, metavar="N", help="order n_c of armax (default: n_a)")
-    parser.add_argument(
-        "--criterion", default="bic", choices=[c.value for c in OrderCriterion], help="(bic)"
-    )
+    parser.add_argument("--criterion", default="bic", choices=choices.CRITERIA, help="(bic)")
     parser.add_argument(
         "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
     )
@@ -72,6 +70,10 @@ def run(options: argparse.Namespace) -> int:
         return show_loops([Path(options.record)], intake_options(options))
     loop = opened(options)
     record = longest_part(loop.parts)
+    from stiction_ros.identification.linear_data import LinearKind, LinearStatus, OrderCriterion
+    from stiction_ros.identification.linear_fit import LinearOptions, fit_linear
+    from stiction_ros.identification.subspace_projection import SubspaceMethod
+
     settings = LinearOptions(
         kind=LinearKind(options.kind),
         order=options.order,
@@ -133,6 +135,8 @@ def _number(value: complex) -> str:
 
 def _rivals(found: LinearIdentification) -> Table:
     """Return the table of the orders that were tried; the one taken is marked."""
+    from stiction_ros.identification.subspace import StateSpaceFit
+
     heads = ["output", "order", "delay", "AIC", "BIC", "one step %", "free run %", "taken"]
     table = Table(*heads, title="orders, AIC and BIC of the one-step error", title_justify="left")
     if isinstance(found.detail, StateSpaceFit):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -20,18 +20,20 @@ from stiction_ros.cli.intake import (
 )
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
-from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.records.parts import longest_part, only_part
 
+if TYPE_CHECKING:
+    from stiction_ros.discrepancy import Discrepancy
+
 EXIT_CODES = {
-    GapVerdict.NAMED: 0,
-    GapVerdict.NONE: 0,
-    GapVerdict.AMBIGUOUS: 3,
-    GapVerdict.UNKNOWN: 4,
-    GapVerdict.UNTESTABLE: 5,
+    "named": 0,
+    "none": 0,
+    "ambiguous": 3,
+    "unknown": 4,
+    "untestable": 5,
 }
 
 
@@ -83,6 +85,8 @@ def run(options: argparse.Namespace) -> int:
         records = options.inputs if options.fit_linear else options.inputs[1:]
         return show_loops([Path(path) for path in records], intake_options(options))
     model, records = _inputs(options)
+    from stiction_ros.discrepancy import GapOptions, find_discrepancy
+
     settings = GapOptions(
         quick=options.quick, seed=options.seed, free_process=bool(options.fit_linear)
     )
@@ -99,9 +103,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
     if options.fit_linear:
+        records = [_record(path, options) for path in options.inputs]
         from stiction_ros.discrepancy.first_model import first_model
 
-        records = [_record(path, options) for path in options.inputs]
         return first_model(records, options.delay), records
     if len(options.inputs) < 2:
         raise InputError(

@@ -6,11 +6,12 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.intake import (
     add_columns,
     add_intake,
@@ -22,10 +23,11 @@ from stiction_ros.cli.intake import (
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
 from stiction_ros.errors import InputError
-from stiction_ros.identification import METHODS, Identification, IdentificationOptions, identify
-from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
-from stiction_ros.identification.friction_grid import LAWS
 from stiction_ros.records.parts import longest_part
+
+if TYPE_CHECKING:
+    from stiction_ros.identification import Identification
+    from stiction_ros.identification.closed_loop.cause import Cause
 
 
 def add(commands: Any) -> None:
@@ -49,10 +51,10 @@ def add(commands: Any) -> None:
         "--law",
         default="he",
         metavar="LAW",
-        help=f"friction law of method exact: {' | '.join(LAWS)} (default: he)",
+        help=f"friction law of method exact: {' | '.join(choices.laws())} (default: he)",
     )
     parser.add_argument(
-        "--method", default="exact", choices=tuple(METHODS), help="search (default: exact)"
+        "--method", default="exact", choices=choices.METHODS, help="search (default: exact)"
     )
     parser.add_argument(
         "--starts", type=int, metavar="M", help="first guesses of method nlp (default: 7)"
@@ -80,6 +82,8 @@ def run(options: argparse.Namespace) -> int:
         return show_loops([Path(options.record)], intake_options(options))
     loop = opened(options)
     record, parts = longest_part(loop.parts), loop.parts
+    from stiction_ros.identification import IdentificationOptions, identify
+
     settings = IdentificationOptions(
         method=options.method,
         output_order=options.na,
@@ -162,6 +166,8 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
 
 def _cause(cause: Cause) -> str:
     """Return why an output oscillates, in words."""
+    from stiction_ros.identification.closed_loop.cause import CauseKind
+
     if cause.kind is CauseKind.NONE or cause.period is None:
         return f"cause {cause.kind}. {cause.sentence}"
     return (

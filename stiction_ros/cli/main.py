@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import sys
 from collections.abc import Sequence
@@ -12,64 +13,57 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from stiction_ros import __version__
-from stiction_ros.cli import (
-    bench,
-    convert,
-    demo,
-    example,
-    experiment,
-    faults,
-    fit_linear,
-    gain,
-    gap,
-    identify,
-    repair,
-    replay,
-    report,
-    soak,
-    study,
-    study_change,
-    study_control,
-    study_monitor,
-    survey,
-)
 from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = (
-    demo,
-    identify,
-    fit_linear,
-    gain,
-    gap,
-    example,
-    experiment,
-    convert,
-    replay,
-    report,
-    repair,
-    study,
-    study_change,
-    study_control,
-    study_monitor,
-    survey,
-    faults,
-    soak,
-    bench,
-)
+COMMANDS = {
+    "demo": "run a live loop: cycle, identify, swap, record, report",
+    "identify": "identify friction and process from a record",
+    "fit-linear": "fit a linear model, for a controller that knows no friction",
+    "gain": "what service, embedding or retuning would bring",
+    "gap": "find, name and add the effect that a simulation misses",
+    "simulate": "simulate a loop model under its own controller",
+    "example": "identify a loop whose truth is known, and compare",
+    "experiment": "simulate an identification experiment, or the exports of a plant",
+    "convert": "convert a record between CSV and bag",
+    "replay": "run estimator and controller over a bag as they ran live",
+    "report": "make the report of a bag or a record",
+    "repair": "finish a bag whose recorder was killed, or salvage a damaged one",
+    "study": "run a scenario over many seeds, without ROS",
+    "study-change": "run a scenario whose sticky valve changes after the swap, without ROS",
+    "study-control": "the exact embedding on the tank when friction or inputs are not as known",
+    "study-monitor": "the estimator's monitor over loops in which an effect sets in half-way",
+    "survey": "every loop of a plant, ranked by what to service first",
+    "faults": "put faults into a running graph and judge what becomes of it",
+    "soak": "a long run with the real nodes: missed samples, growth of memory",
+    "certificates": "certificates of the link to a control system (OPC UA)",
+    "browse-tags": "make a tag map by browsing a control system (OPC UA)",
+    "fetch-history": "read history from a control system (OPC UA) into CSV records",
+    "listen": "fill the windows of all loops in the graph, in one process",
+    "bench": "measure speed, side by side",
+}
+"""What ``stiction --help`` says of each command; its module is loaded when it is called."""
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands."""
+def parser(only: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser of all commands.
+
+    Args:
+        only: the command whose options are known, the others by name alone: no module but its
+            own is imported. None for all.
+    """
     top = argparse.ArgumentParser(
         prog="stiction",
         description="Find, quantify and compensate valve stiction in MPC loops.",
     )
     top.add_argument("--version", action="version", version=f"stiction_ros {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in COMMANDS:
-        module.add(commands)
+    for name, text in COMMANDS.items():
+        if only is None or name == only:
+            importlib.import_module(f"stiction_ros.cli.{name.replace('-', '_')}").add(commands)
+        else:
+            commands.add_parser(name, help=text)
     return top
 
 
@@ -79,8 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 done, 1 failed, 2 unusable input, 130 interrupted.
     """
-    options = parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    command = next((word for word in given if not word.startswith("-")), "")
     try:
+        options = parser(command).parse_args(given)
         return int(options.run(options))
     except InputError as error:
         print(f"stiction: {error}", file=sys.stderr)

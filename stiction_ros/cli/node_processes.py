@@ -19,7 +19,7 @@ from stiction_ros.config_files import config_directories
 from stiction_ros.errors import InputError
 from stiction_ros.orphans import DIE_WITH_PARENT
 
-ENDED = ("plant", "controller", "estimator", "recorder")  # who still has readers goes first
+ENDED = ("plant", "opcua", "controller", "estimator", "recorder")  # who has readers goes first
 PATIENCE = 60.0  # s for a node to end before it is killed
 GOODBYE = 5.0  # s from the end of a node that follows the plant to that of the plant
 SILENCE = 180.0  # s without progress before the run is given up
@@ -31,12 +31,12 @@ class NodeError(Exception):
 
 
 class NodeProcesses:
-    """Four nodes in processes of their own, in a ROS domain of their own."""
+    """The nodes of a loop in processes of their own, in a ROS domain of their own."""
 
     def __init__(self, nodes: Mapping[str, Mapping[str, Any]], directory: Path) -> None:
         """Write ``directory``/parameters.yaml and prepare logs; :meth:`start` starts."""
         self.directory = directory
-        self._names = [name for name in STARTED if name in nodes]
+        self._names = [name for name in (*STARTED, "opcua") if name in nodes]
         self._parameters = directory / "parameters.yaml"
         write_parameters(nodes, self._parameters)
         self._processes: dict[str, subprocess.Popen[str]] = {}
@@ -88,6 +88,16 @@ class NodeProcesses:
         if plant.returncode != 0:
             raise NodeError(self._describe("plant", plant.returncode))
 
+    def pids(self) -> dict[str, int]:
+        """Return the process ids of the nodes."""
+        return {name: process.pid for name, process in self._processes.items()}
+
+    def require_running(self) -> None:
+        """Raise NodeError when one of the nodes has ended."""
+        for name, process in self._processes.items():
+            if process.poll() is not None:
+                raise NodeError(self._describe(name, process.returncode))
+
     def _forgive(self, name: str, code: int) -> None:
         """Let a node end cleanly a moment before the plant, which says goodbye first."""
         try:
@@ -121,7 +131,9 @@ class NodeProcesses:
 
     def _read(self, name: str, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None
-        with (self.directory / "log" / f"{name}.log").open("w", encoding="utf-8") as log:
+        with (self.directory / "log" / f"{name}.log").open(
+            "w", encoding="utf-8", buffering=1
+        ) as log:
             for line in process.stdout:
                 log.write(line)
                 self._last[name] = line.strip()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.progress import bar
-from stiction_ros.online.replay import replay
-from stiction_ros.online.replay_result import FitMatch, Match, Replay
+from stiction_ros.records.storage_files import storage_files
+
+if TYPE_CHECKING:
+    from stiction_ros.online.replay_result import FitMatch, Replay
 
 
 def add(commands: Any) -> None:
@@ -28,6 +30,10 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    storage_files(options.bag)  # a wrong path is told at once
+    from stiction_ros.online.replay import replay
+    from stiction_ros.online.replay_result import Match
+
     with bar("replaying") as show:
         found = replay(options.bag, namespace=options.namespace, progress=show)
     if options.json is not None:
@@ -40,6 +46,8 @@ def run(options: argparse.Namespace) -> int:
 def _print(bag: str, found: Replay) -> None:
     from rich.console import Console
     from rich.table import Table
+
+    from stiction_ros.online.replay_result import Match
 
     console = Console()
     table = Table(title=f"{bag}: {found.samples} samples", title_justify="left")

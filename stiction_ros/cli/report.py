@@ -15,9 +15,7 @@ from stiction_ros.cli.intake import (
     tell,
 )
 from stiction_ros.errors import InputError
-from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.intake.intake import is_bag
-from stiction_ros.records.bag_messages import read_raw
 from stiction_ros.records.parts import longest_part
 
 
@@ -42,25 +40,29 @@ def add(commands: Any) -> None:
 
 def holds_live_run(path: str) -> bool:
     """Return whether a bag tells of a controller or an estimator, not of signals alone."""
+    from stiction_ros.records.bag_messages import read_raw
+
     names = {raw.topic.name.rpartition("/")[2] for raw in read_raw(path)}
     return bool(names & {"mode", "stiction", "loop_model"})
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    from stiction_ros.report.record_report import report_record
-    from stiction_ros.report.run_report import report_run
-
     out = Path(options.out)
     if options.dry_run:
         return show_loops([Path(options.record)], intake_options(options))
     try:
         if is_bag(options.record) and holds_live_run(options.record):
+            from stiction_ros.report.run_report import report_run
+
             print(report_run(options.record, out, namespace=options.namespace).page)
         else:
             loop = opened(options)
             tell(loop)
             record, parts = longest_part(loop.parts), loop.parts
+            from stiction_ros.identification import IdentificationOptions, identify
+            from stiction_ros.report.record_report import report_record
+
             found = identify(record, IdentificationOptions())
             print(report_record(record, found, out, parts))
     except OSError as error:

@@ -14,7 +14,6 @@ import yaml
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.online.session import Scenario
 
 SCENARIOS = ("tank", "siso")
 STARTED = ("recorder", "estimator", "controller", "plant")
@@ -39,6 +38,8 @@ def find(name: str) -> Path:
 
 def node_parameters(path: Path, directory: Path) -> dict[str, dict[str, Any]]:
     """Return the parameters of all nodes with full paths; the bag goes below ``directory``."""
+    from stiction_ros.online.session import Scenario
+
     nodes = {node: dict(values) for node, values in Scenario.load(path).nodes.items()}
     for values in nodes.values():
         for key in ("model", "set_points", "monitor_model"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -13,7 +13,9 @@ from rich.table import Table
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.scenarios import find
 from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
-from stiction_ros.online.session import Scenario, run_live
+
+if TYPE_CHECKING:
+    from stiction_ros.online.session import Scenario
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,6 +60,7 @@ def add(commands: Any) -> None:
 
 def run_seed(scenario: Scenario, seed: int, *, ideal_valves: bool) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
+    from stiction_ros.online.session import run_live
     from stiction_ros.report.live_log import log_of
     from stiction_ros.report.story import tell
     from stiction_ros.report.summary import summary
@@ -69,7 +72,10 @@ def run_seed(scenario: Scenario, seed: int, *, ideal_valves: bool) -> Outcome:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    scenario = Scenario.load(find(options.scenario))
+    path = find(options.scenario)
+    from stiction_ros.online.session import Scenario
+
+    scenario = Scenario.load(path)
     work = functools.partial(run_seed, scenario, ideal_valves=options.ideal_valves)
     outcomes = run_seeds(work, options.seeds, options.jobs, scenario.name)
     if options.json is not None:

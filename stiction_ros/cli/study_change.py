@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import functools
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -15,12 +15,12 @@ from rich.table import Table
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.scenarios import find
 from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
-from stiction_ros.control import ControlMode
 from stiction_ros.effects import Behaviour, HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import ValveChange
-from stiction_ros.online.friction_change import ChangeStatus
-from stiction_ros.online.session import LiveRun, Scenario, run_live
+
+if TYPE_CHECKING:
+    from stiction_ros.online.session import LiveRun, Scenario
 
 CHANGES = ("serviced", "little", "grown", "both", "unchanged")
 AT = 0.7  # of the scenario's samples: when the valve changes
@@ -116,6 +116,9 @@ def changed(scenario: Scenario, change: str) -> tuple[Scenario, Behaviour | None
 
 def run_seed(scenario: Scenario, change: str, seed: int) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
+    from stiction_ros.control import ControlMode
+    from stiction_ros.online.session import run_live
+
     chosen, friction = changed(scenario, change)
     live = run_live(chosen, seed=seed)
     at = round(AT * scenario.samples)
@@ -141,10 +144,14 @@ def run_seed(scenario: Scenario, change: str, seed: int) -> Outcome:
 
 
 def _happened(fit: Any) -> bool:
+    from stiction_ros.online.friction_change import ChangeStatus
+
     return any(change.status is not ChangeStatus.UNCHANGED for change in fit.changes)
 
 
 def _good(outcome: Outcome, change: str, friction: Behaviour | None, window: int) -> bool:
+    from stiction_ros.control import ControlMode
+
     found = outcome.static_friction
     if change in ("serviced", "little"):
         soon = outcome.noticed is not None and (
@@ -177,7 +184,10 @@ def _amplitudes(live: LiveRun, scenario: Scenario) -> dict[str, float]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    scenario = Scenario.load(find(options.scenario))
+    path = find(options.scenario)
+    from stiction_ros.online.session import Scenario
+
+    scenario = Scenario.load(path)
     changed(scenario, options.change)  # refuses before anything is run
     work = functools.partial(run_seed, scenario, options.change)
     outcomes = run_seeds(work, options.seeds, options.jobs, f"{scenario.name} {options.change}")

@@ -5,23 +5,20 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli import choices
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError
-from stiction_ros.examples.control_cases import (
-    CASES,
-    ControlOutcome,
-    run_case,
-    run_reference,
-    run_unaware,
-)
 from stiction_ros.loop.set_points import holds
+
+if TYPE_CHECKING:
+    from stiction_ros.examples.control_cases import ControlOutcome
 
 OFFSET_LIMITS = (0.006, 0.02)  # kg/m³, °C
 WIDTH = 100  # characters that the table needs
@@ -73,17 +70,22 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--seeds", type=seed_range, default=(101, 110), metavar="A:B", help="inclusive (101:110)"
     )
-    parser.add_argument("--cases", metavar="A,B", help=f"some of {', '.join(CASES)}")
+    known = ", ".join(choices.CONTROL_CASES)
+    parser.add_argument("--cases", metavar="A,B", help=f"some of {known}")
     add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write the scores; - for stdout")
     parser.set_defaults(run=run)
 
 
-Runs = tuple[ControlOutcome, ControlOutcome, ControlOutcome]  # embedding, stiction-free, unaware
+Runs: TypeAlias = (
+    "tuple[ControlOutcome, ControlOutcome, ControlOutcome]"  # embedding, stiction-free, unaware
+)
 
 
 def run_seed(names: tuple[str, ...], seed: int) -> dict[str, Runs]:
     """Run one seed of every case; a plain function, so that a worker process can run it."""
+    from stiction_ros.examples.control_cases import CASES, run_case, run_reference, run_unaware
+
     free: dict[object, ControlOutcome] = {}
     unaware: dict[object, ControlOutcome] = {}
     found = {}
@@ -101,6 +103,7 @@ def run_seed(names: tuple[str, ...], seed: int) -> dict[str, Runs]:
 
 def scores(name: str, runs: list[Runs]) -> CaseScores:
     """Return the scores of the case ``name`` over ``runs``, one entry per seed."""
+    from stiction_ros.examples.control_cases import CASES
     from stiction_ros.identification.closed_loop.oscillation import amplitude, dominant_cycle
 
     cycles = []
@@ -133,10 +136,11 @@ def _pair(values: Any) -> tuple[float, float]:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    names = tuple(CASES) if options.cases is None else tuple(options.cases.split(","))
+    names = choices.CONTROL_CASES if options.cases is None else tuple(options.cases.split(","))
     for name in names:
-        if name not in CASES:
-            raise InputError(f"no case {name!r}", where="--cases", fix=f"use {', '.join(CASES)}")
+        if name not in choices.CONTROL_CASES:
+            known = ", ".join(choices.CONTROL_CASES)
+            raise InputError(f"no case {name!r}", where="--cases", fix=f"use {known}")
     work = functools.partial(run_seed, names)
     seeds = run_seeds(work, options.seeds, options.jobs, "tank")
     found = [scores(name, [seed[name] for seed in seeds]) for name in names]

@@ -6,16 +6,17 @@ import argparse
 import dataclasses
 import functools
 from collections import Counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.blind.late import ONSET, SAMPLES, Watched, late_loop, watch
 from stiction_ros.cli.json_output import write_json
 from stiction_ros.cli.seeds import add_jobs, run_seeds, seed_range
-from stiction_ros.online.gap_finding import standing
-from stiction_ros.online.gap_monitor import MonitorRule
+
+if TYPE_CHECKING:
+    from stiction_ros.blind.late import Watched
+    from stiction_ros.online.gap_monitor import MonitorRule
 
 
 def add(commands: Any) -> None:
@@ -23,8 +24,8 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "study-monitor",
         help="the estimator's monitor over loops in which an effect sets in half-way",
-        description=f"Run the monitor over loops of {SAMPLES} samples drawn by seed. From sample "
-        f"{ONSET} on one effect acts, or none with --healthy. Print alarms and what was named.",
+        description="Run the monitor over long loops drawn by seed. From the middle on one effect "
+        "acts, or none with --healthy. Print alarms and what was named.",
     )
     parser.add_argument(
         "--seeds", type=seed_range, default=(10000, 10019), metavar="A:B", help="(10000:10019)"
@@ -40,6 +41,8 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    from stiction_ros.online.gap_monitor import MonitorRule
+
     rule = MonitorRule(monitor=True)
     if options.false_alarm is not None:
         rule = dataclasses.replace(rule, monitor_false_alarm=options.false_alarm)
@@ -54,6 +57,8 @@ def run(options: argparse.Namespace) -> int:
 
 def run_seed(rule: MonitorRule, healthy: bool, seed: int) -> Watched:
     """Run one seed; a plain function, so that a worker process can run it."""
+    from stiction_ros.blind.late import late_loop, watch
+
     return watch(late_loop(seed, healthy=healthy), rule)
 
 
@@ -70,6 +75,8 @@ def _document(one: Watched) -> dict[str, Any]:
 
 
 def _print(outcomes: list[Watched]) -> None:
+    from stiction_ros.online.gap_finding import standing
+
     console = Console()
     table = Table(
         "seed", "process", "noise", "sets in", "early", "delay", "score", "finding that stands"

@@ -39,6 +39,29 @@ class MpcController:
         valves: belief in each sticky valve, None for those taken to be healthy.
         stem: stem estimates χ̂, shape (m,), %; after a step those that its OP will bring about.
         raised: what the slip check found at the last step, empty for nothing.
+
+    Equations (19) to (22); the observer is offset-free by one disturbance per output.
+
+    Args:
+        design: process, weights and bounds, by :meth:`ControlSettings.design`.
+        mode: whether it takes no notice of the friction, inverts or embeds it, or holds OP.
+        frictions: of the m valves, None for a healthy one.
+        spreads: half-widths of the intervals of their parameters, where known.
+
+    Raises:
+        InputError: the model is not detectable, or embedding cannot be set up.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import ControlMode, ControlSettings, HeStiction, LoopModel
+        >>> from stiction_ros import MpcController, find_config
+        >>> model = LoopModel.load(find_config("example1_process.loop.yaml"))
+        >>> design = ControlSettings(horizon=30).design(model)
+        >>> controller = MpcController(design, ControlMode.EMBEDDING, [HeStiction(5.0, 2.0)])
+        >>> controller.start(model.stem_start, model.pv_start)
+        >>> step = controller.step(model.pv0, model.pv0 + 2.0, np.zeros(0), model.op0)
+        >>> bool(step.op[0] > model.op0[0] + 5.0)  # far enough for the valve to slip
+        True
     """
 
     def __init__(
@@ -48,14 +71,7 @@ class MpcController:
         frictions: Sequence[Behaviour | None] | None = None,
         spreads: Sequence[FrictionSpread | None] | None = None,
     ) -> None:
-        """Build for ``frictions``, one entry per valve, None for a healthy one.
-
-        ``spreads`` are the half-widths of the intervals of their parameters, where known. The
-        modes that do not know of friction take no notice of either.
-
-        Raises:
-            InputError: the model is not detectable, or embedding cannot be set up.
-        """
+        """Build for ``frictions``; the modes that know of none take no notice of them."""
         m = len(design.model.stem0)
         self.design, self.mode = design, mode
         aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION) and frictions is not None
@@ -154,7 +170,11 @@ class MpcController:
         return misfit
 
     def follow(self, history: History) -> None:
-        """Go on behind :meth:`take_over` over the samples since then, all of them answered."""
+        """Go on behind :meth:`take_over` over the samples since then, all of them answered.
+
+        Args:
+            history: the samples since then, in order.
+        """
         if len(history.op):
             self._follow(history, 0, self.valves.step(history.op[0]))
 
@@ -204,9 +224,11 @@ class MpcController:
     def pass_over(
         self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
     ) -> None:
-        """Take in a sample that is not answered: OP stays at ``applied``; as :meth:`step`.
+        """Take in a sample that is not answered: OP stays where it is.
 
-        What is not finite of ``pv`` is missing.
+        Args:
+            pv: measurement, shape (p,); what is not finite is missing.
+            dv, applied, known: as :meth:`step`.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             applied = self._take_in(pv, dv, applied, known)

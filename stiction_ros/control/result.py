@@ -11,7 +11,13 @@ from stiction_ros.effects.behaviour import FloatArray
 
 
 class ControlMode(enum.StrEnum):
-    """Which formulation moves the valves."""
+    """Which formulation moves the valves.
+
+    Examples:
+        >>> from stiction_ros import ControlMode
+        >>> ControlMode("embedding") is ControlMode.EMBEDDING
+        True
+    """
 
     UNAWARE = "unaware"
     EMBEDDING = "embedding"
@@ -74,6 +80,18 @@ class StepResult:
         age: samples since ``plan`` was made; 0 for a plan of this step.
         optimality_gap: cost above the mixed-integer optimum as a share of it; None where it
             was not asked for or not found, see :mod:`.certificate`.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import ControlMode, ControlSettings, LoopModel
+        >>> from stiction_ros import MpcController, find_config
+        >>> model = LoopModel.load(find_config("example1_process.loop.yaml"))
+        >>> design = ControlSettings(horizon=30).design(model)
+        >>> controller = MpcController(design, ControlMode.UNAWARE)
+        >>> controller.start(model.stem_start, model.pv_start)
+        >>> step = controller.step(model.pv0, model.pv0 + 2.0, np.zeros(0), model.op0)
+        >>> step.status.value, step.status.failed, step.op.shape
+        ('solved', False, (1,))
     """
 
     status: StepStatus

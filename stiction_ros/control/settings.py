@@ -38,6 +38,16 @@ class ControlSettings:
     """Weights, bounds and observer of the MPC.
 
     Lists have one entry per output or per valve; a single entry stands for all.
+
+    Raises:
+        InputError: by :meth:`design`, a list that fits neither outputs nor valves.
+
+    Examples:
+        >>> from stiction_ros import ControlSettings, LoopModel, find_config
+        >>> model = LoopModel.load(find_config("tank.loop.yaml"))
+        >>> design = ControlSettings(horizon=40, move_weights=(0.1, 0.2)).design(model)
+        >>> design.valve_names, design.limits.stem.tolist()
+        (('V1', 'V2'), [[0.0, 100.0], [0.0, 100.0]])
     """
 
     horizon: int = setting(50, "prediction horizon N_H, samples", low=2, high=1000)

@@ -30,6 +30,11 @@ class GapVerdict(enum.StrEnum):
     ``NONE``: no effect beats the current model. ``NAMED``: one does, and its rivals.
     ``AMBIGUOUS``: one of a set does. ``UNKNOWN``: there is a gap, but the catalogue does not
     explain it. ``UNTESTABLE``: the record could not show the effects.
+
+    Examples:
+        >>> from stiction_ros import GapVerdict
+        >>> GapVerdict("named") is GapVerdict.NAMED
+        True
     """
 
     NONE = "none"

@@ -24,6 +24,11 @@ class GapOptions:
 
     Raises:
         InputError: a negative margin, no effect at all, fewer than ten resamples.
+
+    Examples:
+        >>> from stiction_ros import GapOptions
+        >>> GapOptions(quick=True).margin
+        10.0
     """
 
     quick: bool = False

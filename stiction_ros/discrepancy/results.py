@@ -91,6 +91,16 @@ class Discrepancy:
         base_before, base_after: free runs of both models.
         seconds: wall time spent.
         notes: remarks for people.
+
+    Examples:
+        >>> from stiction_ros import GapOptions, LoopModel, SetPoints
+        >>> from stiction_ros import find_config, find_gap, simulate
+        >>> truth = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> schedule = SetPoints.load(find_config("flow.set_points.yaml"), truth.outputs)
+        >>> record = simulate(truth, schedule, samples=800)
+        >>> found = find_gap(truth, [record], GapOptions(quick=True))  # nothing is missing
+        >>> print(found.verdict, len(found.effects))
+        none 0
     """
 
     verdict: GapVerdict

@@ -84,6 +84,21 @@ def find_discrepancy(
     Raises:
         InputError: records that do not fit the model, or a model whose free run grows
             without bound.
+
+    Returns:
+        The effects that the simulation lacks, their sizes, and the model with them added.
+
+    Public as ``stiction_ros.find_gap``.
+
+    Examples:
+        >>> from stiction_ros import GapOptions, LoopModel, SetPoints
+        >>> from stiction_ros import find_config, find_gap, simulate
+        >>> truth = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> schedule = SetPoints.load(find_config("flow.set_points.yaml"), truth.outputs)
+        >>> record = simulate(truth, schedule, samples=800)
+        >>> found = find_gap(truth.with_ideal_valves(), [record], GapOptions(quick=True))
+        >>> print(found.verdict, *[effect.effect for effect in found.effects])
+        named stiction
     """
     return _Workflow(model, records, options or GapOptions(), progress).run()
 

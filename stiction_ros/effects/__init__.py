@@ -1,6 +1,12 @@
 """Behaviours of valves, sensors and disturbances: one effect, one file.
 
 To add an effect, write its file and name its class in :data:`BEHAVIOURS`.
+
+Examples:
+    >>> from stiction_ros import effects
+    >>> valve = effects.from_mapping({"effect": "stiction", "law": "he", "f_s": 5, "f_d": 2})
+    >>> valve.jump, valve.to_mapping()["law"]
+    (3.0, 'he')
 """
 
 from __future__ import annotations

@@ -80,6 +80,17 @@ class Behaviour(ABC):
         signature: what a record of the loop shows, one sentence.
         minimum_data: what a record must hold to tell its size, one sentence.
         confusable: places and effects, such as ``sensor lag``, that look alike.
+
+    Raises:
+        InputError: a parameter that is not finite or lies outside its range.
+
+    Examples:
+        >>> from stiction_ros import effects
+        >>> valve = effects.from_mapping({"effect": "backlash", "band": 2.0})
+        >>> memory = valve.rest(50.0)
+        >>> memory, stem = valve.step(memory, 53.0)  # OP leads by half the band
+        >>> stem, [entry.key for entry in valve.parameters()]
+        (52.0, ['band'])
     """
 
     effect: ClassVar[str]
@@ -116,7 +127,11 @@ class Behaviour(ABC):
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """Build from YAML keys; unknown and missing keys raise :class:`InputError`."""
+        """Build from YAML keys; unknown and missing keys raise :class:`InputError`.
+
+        Args:
+            values: parameters by their keys in YAML, without ``effect`` and ``law``.
+        """
         known = {entry.key: entry.attribute for entry in cls.parameters()}
         for key in values:
             if key not in known:
@@ -164,9 +179,12 @@ class Behaviour(ABC):
     def simulate(
         self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
     ) -> FloatArray:
-        """Run :meth:`step` over ``values``, shape (N,), from rest at ``start``.
+        """Run :meth:`step` over ``values`` from rest at ``start`` and return what comes out.
 
-        Without ``start`` the signal is taken to have rested at its first value.
+        Args:
+            values: the incoming signal, shape (N,).
+            start: where it had rested before; None for its first value.
+            sample_time: s.
         """
         out = np.empty(len(values))
         memory = self.rest(float(values[0]) if start is None else start)

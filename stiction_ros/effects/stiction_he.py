@@ -27,12 +27,25 @@ class HeStiction(FrictionPair):
 
     Raises:
         InputError: a negative or non-finite friction, or f_D > f_S.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import HeStiction
+        >>> valve = HeStiction(static_friction=4.0, dynamic_friction=1.5)
+        >>> valve.simulate(np.array([50.0, 53.0, 55.0, 54.0])).tolist()
+        [50.0, 50.0, 53.5, 53.5]
     """
 
     law: ClassVar[str | None] = "he"
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the stem position twice, as memory and as output, by (4)."""
+        """Return the stem position twice, as memory and as output, by (4).
+
+        Args:
+            memory: stem position χ, %.
+            value: OP, %.
+            time: s; without meaning here.
+        """
         assert isinstance(memory, float | int)
         error = value - memory
         if error > self.static_friction:
@@ -51,7 +64,14 @@ class HeStiction(FrictionPair):
         start: FloatArray | float,
         sample_time: float = 1.0,
     ) -> FloatArray:
-        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once."""
+        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once.
+
+        Args:
+            grid: rows (f_S, f_D), %, shape (G, 2).
+            values: OP, %, shape (N,).
+            start: stem before the first sample, %, one for all or shape (G,).
+            sample_time: s; without meaning here.
+        """
         # Compiled code takes half a second to import, which nodes that scan no grid save.
         from stiction_ros.effects.stiction_he_grid import he_stems
 
@@ -64,6 +84,10 @@ class HeStiction(FrictionPair):
 
         The stem moves by at least J, so for 0 < |wanted − χ| < J the nearer of staying
         and the smallest jump is taken; staying returns the stem position itself.
+
+        Args:
+            memory: stem position χ, %.
+            wanted: where the stem should be, %.
         """
         assert isinstance(memory, float | int)
         move = wanted - memory

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stiction_ros.cli.scenarios import find, node_parameters
 from stiction_ros.faults.fault import Fault, Pace
 from stiction_ros.loop import LoopModel
-from stiction_ros.online.session import NODE_SETTINGS, Scenario
 from stiction_ros.settings import settings_of
+
+if TYPE_CHECKING:
+    from stiction_ros.online.session import Scenario
 
 SCENARIO = "siso"
 NAMES = ("plant", "controller", "estimator", "recorder")
@@ -23,6 +25,8 @@ SETTLING = 40  # samples after the swap
 @functools.cache
 def scenario() -> Scenario:
     """Return the scenario of the suite."""
+    from stiction_ros.online.session import Scenario
+
     return Scenario.load(find(SCENARIO))
 
 
@@ -43,6 +47,8 @@ def case_parameters(
         speed: simulated seconds per second of realtime pace.
         bag: directory of the bag.
     """
+    from stiction_ros.online.session import NODE_SETTINGS
+
     nodes = node_parameters(find(SCENARIO), bag.parent)
     nodes["plant"].update(seed=seed, samples=0)
     nodes["controller"].update(hand_over_samples=HAND_OVER, fit_first=NEVER)

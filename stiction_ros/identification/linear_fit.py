@@ -55,6 +55,14 @@ class LinearOptions:
         delay: inclusive range of t_d, samples.
         criterion: AIC or BIC, for every order that is not given.
         method: projection of the state-space model.
+
+    Raises:
+        InputError: orders that do not belong to the structure.
+
+    Examples:
+        >>> from stiction_ros import LinearOptions
+        >>> LinearOptions(order=2).kind.value
+        'state_space'
     """
 
     kind: LinearKind = LinearKind.STATE_SPACE
@@ -105,6 +113,18 @@ def fit_linear(
 
     Raises:
         InputError: a record that no model can be fitted to.
+
+    Returns:
+        Fits, gains and poles with a status, and by ``loop_model`` the loop made of them.
+
+    Examples:
+        >>> from stiction_ros import LinearOptions, LoopModel, find_config
+        >>> from stiction_ros import fit_linear, prbs_experiment
+        >>> ideal = LoopModel.load(find_config("flow.loop.yaml")).with_ideal_valves()
+        >>> record = prbs_experiment(ideal, samples=400, seed=1)
+        >>> found = fit_linear(record, LinearOptions(order=1, delay=(0, 4)))
+        >>> found.gain.round(2).tolist(), found.delay.tolist()  # 0.8 per %, 2 samples
+        ([[0.8]], [[2]])
     """
     begun = time.perf_counter()
     options = options or LinearOptions()

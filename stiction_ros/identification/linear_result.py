@@ -44,6 +44,14 @@ class LinearIdentification:
         detail: the fits behind it, with their rivals.
         seconds: wall time spent.
         notes: remarks for people.
+
+    Examples:
+        >>> from stiction_ros import LinearOptions, LoopModel, find_config
+        >>> from stiction_ros import fit_linear, prbs_experiment
+        >>> ideal = LoopModel.load(find_config("flow.loop.yaml")).with_ideal_valves()
+        >>> found = fit_linear(prbs_experiment(ideal, 400, seed=1), LinearOptions(order=1))
+        >>> found.loop_model("fitted", limits=(0.0, 100.0)).outputs
+        ('PV1',)
     """
 
     kind: LinearKind

@@ -39,6 +39,12 @@ class IdentificationOptions:
 
     Raises:
         InputError: a value out of range.
+
+    Examples:
+        >>> from stiction_ros import IdentificationOptions
+        >>> options = IdentificationOptions(output_order=1, delay=(0, 4))
+        >>> options.law, options.confidence
+        ('he', 0.95)
     """
 
     method: str = "exact"

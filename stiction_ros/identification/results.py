@@ -13,7 +13,13 @@ from stiction_ros.identification.search_log import SearchLog
 
 
 class VerdictKind(enum.StrEnum):
-    """What the record says about one valve."""
+    """What the record says about one valve.
+
+    Examples:
+        >>> from stiction_ros import VerdictKind
+        >>> VerdictKind("sticky") is VerdictKind.STICKY
+        True
+    """
 
     STICKY = "sticky"
     HEALTHY = "healthy"
@@ -157,6 +163,14 @@ class Identification:
         search: what the search tried and its squared error; None where a method keeps none.
             The default search puts the friction and delays of least one-step SE here.
         orders: all orders that were compared.
+
+    Examples:
+        >>> from stiction_ros import IdentificationOptions, LoopModel
+        >>> from stiction_ros import find_config, identify, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=400)
+        >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
+        >>> found.status.value, found.samples, found.stem.shape
+        ('ok', 400, (400, 1))
     """
 
     status: FitStatus

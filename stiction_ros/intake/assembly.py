@@ -70,7 +70,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()
     block = without_outliers(block, rules)
-    unit = "OP's own unit"
+    unit = "its own unit"
     if not options.as_given:
         block, unit, note = in_percent(block, options.op_unit or found.op_unit)
         rules.told.extend([note] if note else [])

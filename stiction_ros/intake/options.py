@@ -87,6 +87,12 @@ class CsvColumns:
         sp: output to column of its set-point, default ``SP`` when it is there.
         stem: valve to column of its measured stem, default ``STEM`` when it is there.
         time: column of the time, default ``t``, then ``time`` or ``timestamp`` and the like.
+
+    Examples:
+        >>> from stiction_ros import CsvColumns
+        >>> columns = CsvColumns(op={"V1": "FIC101.OP"}, pv={"PV1": "FIC101.PV"}, time="stamp")
+        >>> columns.sp is None  # taken from the column SP where there is one
+        True
     """
 
     op: Mapping[str, str] | None = None

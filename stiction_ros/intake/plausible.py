@@ -11,6 +11,9 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.tables.block import Block
 
+PERCENT = (-10.0, 110.0)
+"""What an OP in % stays within."""
+
 FOLLOWS = 0.9
 """Share of the moves of a controller's output that its law explains, at least."""
 
@@ -57,10 +60,11 @@ def in_percent(block: Block, given: OpUnit | None) -> tuple[Block, str, str]:
                 f"OP lies between {low:.3g} and {high:.3g}, perhaps without its mean: frictions "
                 "are in its own unit; if it is a share say --op-unit share"
             )
-        return block, "%", note
+        usual = PERCENT[0] <= low and high <= PERCENT[1]
+        return block, "%" if usual else "its own unit", note
     factor, offset = TO_PERCENT[unit]
     if unit is OpUnit.OTHER:
-        return block, "OP's own unit", ""
+        return block, "its own unit", ""
     if (factor, offset) == (1.0, 0.0):
         return block, "%", ""
     columns = {

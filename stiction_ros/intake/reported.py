@@ -14,7 +14,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.repairs import Rules
+from stiction_ros.intake.repairs import Rules, plural
 from stiction_ros.intake.tables.block import Block, Column, Key
 from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.regular import GAP
@@ -59,9 +59,10 @@ def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block
     stamps = {key: _reports(block, column) for key, column in block.columns.items()}
     needed = {key: at for key, at in stamps.items() if key.signal in ("op", "pv")}
     for key, at in needed.items():
-        if len(at) < 2:
+        values = int(np.count_nonzero(np.isfinite(block.columns[key].values)))
+        if min(values, len(at)) < 2:
             raise InputError(
-                f"{block.columns[key].name} has {len(at)} values",
+                f"{block.columns[key].name} has {plural(values, 'value')}",
                 where=str(block.path),
                 fix="export a longer time",
             )
@@ -120,9 +121,9 @@ def _regular(
     columns = {}
     for key, column in block.columns.items():
         at = stamps[key]
-        if not len(at):
-            continue
         values = column.values[~column.blank]
+        if not np.isfinite(values).any():
+            continue
         after = np.searchsorted(at, time + 1e-6 * step, side="right")
         before = np.maximum(after - 1, 0)
         held = values[before]

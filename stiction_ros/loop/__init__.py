@@ -4,6 +4,8 @@ from stiction_ros.loop.closed_loop import (
     ClosedLoopRun,
     Controller,
     PiController,
+    own_controller,
+    simulate,
     simulate_closed_loop,
 )
 from stiction_ros.loop.excitation import prbs_experiment, random_binary, simulate_open_loop
@@ -26,9 +28,11 @@ __all__ = [
     "SetPoints",
     "Valve",
     "ValveChange",
+    "own_controller",
     "prbs_experiment",
     "random_binary",
     "read_valve_changes",
+    "simulate",
     "simulate_closed_loop",
     "simulate_open_loop",
 ]

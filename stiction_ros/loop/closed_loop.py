@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 from stiction_ros.loop.model import LoopModel, PiTuning
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
@@ -56,6 +57,22 @@ def simulate_closed_loop(
         seed: of the plant's noise.
         progress: called with the number of samples done, about a hundred times.
         valve_changes: valves that change in mid-run, in the order of their times.
+
+    Raises:
+        InputError: a signal that grows without bound.
+
+    Returns:
+        The record with the true stems (%), and the outputs without noise.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import LoopModel, SetPoints, find_config, simulate_closed_loop
+        >>> model = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> schedule = SetPoints.load(find_config("flow.set_points.yaml"), model.outputs)
+        >>> by_hand = lambda measured, sp: np.array([50.0 + 0.5 * (sp[0] - measured.pv[0])])
+        >>> run = simulate_closed_loop(model, by_hand, schedule, samples=30, seed=1)
+        >>> run.record.op.shape
+        (30, 1)
     """
     plant = Plant(model, seed, valve_changes)
     m, p = len(model.valves), len(model.outputs)
@@ -100,3 +117,81 @@ class PiController:
         self._op = min(max(op, self.limits[0]), self.limits[1])
         self._error = error
         return np.array([self._op])
+
+
+def own_controller(model: LoopModel) -> PiController:
+    """Return the controller that ``model`` records, at rest at the loop's starting point.
+
+    Args:
+        model: a loop of one valve and one output with ``controller: {kind: pi, …}``.
+
+    Raises:
+        InputError: the loop records no controller, or has more valves or outputs than a PI
+            controller serves.
+    """
+    if model.controller is None:
+        raise InputError(
+            "the loop has no controller of its own",
+            where=model.name,
+            fix="add controller: {kind: pi, gain: 0.5, integral_time: 20.0} to the loop model",
+        )
+    if (len(model.valves), len(model.outputs)) != (1, 1):
+        raise InputError(
+            f"a pi controller serves one valve and one output, not {len(model.valves)} "
+            f"and {len(model.outputs)}",
+            where=f"{model.name}: controller",
+            fix="run it under predictive control: stiction demo",
+        )
+    low, high = (float(limit) for limit in model.limits[0])
+    op = float(model.stem_start[0])
+    return PiController(model.controller, model.sample_time, op, (low, high))
+
+
+def simulate(
+    model: LoopModel,
+    set_points: SetPoints | None = None,
+    samples: int = 2000,
+    seed: int = 1,
+    progress: Callable[[int], None] | None = None,
+) -> Record:
+    """Return the record of a loop under its own controller, stems included.
+
+    Every sample the controller of ``model`` takes PV and gives OP, and the plant answers by
+    equations (1) and (2); the same model and seed give the same record, bit for bit.
+
+    Args:
+        model: plant and controller (``controller:`` of the loop model, a PI).
+        set_points: schedule in seconds; None holds the operating point.
+        samples: N ≥ 2.
+        seed: of the plant's noise, 0 up.
+        progress: called with the number of samples done, about a hundred times.
+
+    Returns:
+        OP and stem in %, shape (N, 1); PV and SP in engineering units, shape (N, 1).
+
+    Raises:
+        InputError: no controller, or one that does not fit the loop; a schedule of other
+            outputs; a number out of range.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=300)
+        >>> len(record), record.valves, record.outputs
+        (300, ('V1',), ('PV1',))
+        >>> bool((record.op[:, 0] != record.stem[:, 0]).any())
+        True
+    """
+    controller = own_controller(model)
+    if set_points is None:
+        set_points = SetPoints(model.outputs, np.zeros(1), model.pv0[None, :])
+    if set_points.outputs != model.outputs:
+        raise InputError(
+            f"set-points are of {', '.join(set_points.outputs)}",
+            where=model.name,
+            fix=f"use {', '.join(model.outputs)}",
+        )
+    if samples < 2:
+        raise InputError(f"{samples} is too few", where="samples", fix="use 2 or more")
+    if seed < 0:
+        raise InputError(f"{seed} is negative", where="seed", fix="use 0 or more")
+    return simulate_closed_loop(model, controller, set_points, samples, seed, progress).record

@@ -92,6 +92,23 @@ def prbs_experiment(
 
     Raises:
         InputError: as :func:`random_binary`; a negative seed.
+
+    Args:
+        model: plant and starting point.
+        samples: N ≥ 1.
+        seed: 0 up.
+        switch_probability: of a move at each sample, between 0 and 1.
+        levels: low and high OP, %.
+
+    Returns:
+        OP and stem in %, shape (N, m); PV in engineering units, shape (N, p); no set-points.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, prbs_experiment
+        >>> model = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> record = prbs_experiment(model, samples=200, seed=1)
+        >>> sorted(set(record.op[:, 0].tolist()))
+        [40.0, 60.0]
     """
     if seed < 0:
         raise InputError(f"{seed} is negative", where="seed")

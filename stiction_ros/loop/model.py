@@ -66,6 +66,14 @@ class LoopModel:
         provenance: who added which effect, when, with what evidence.
         instruments: what the instrument of each output can show, in the order of the outputs.
         document: the validated YAML mapping, which :meth:`to_yaml` writes.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config
+        >>> model = LoopModel.load(find_config("flow.loop.yaml"))
+        >>> model.valve_names, model.outputs, model.sample_time
+        (('V1',), ('PV1',), 1.0)
+        >>> model.with_ideal_valves().valves[0].effects
+        ()
     """
 
     name: str
@@ -85,17 +93,30 @@ class LoopModel:
 
     @classmethod
     def load(cls, path: Path | str) -> LoopModel:
-        """Read a ``*.loop.yaml`` file; anything wrong in it raises InputError."""
+        """Read a ``*.loop.yaml`` file; anything wrong in it raises InputError.
+
+        Args:
+            path: the file.
+        """
         return cls.from_mapping(load_yaml(path), str(path))
 
     @classmethod
     def from_yaml(cls, text: str, where: str = "loop model") -> LoopModel:
-        """Read YAML text, as the topic ``loop_model`` carries it."""
+        """Read YAML text, as the topic ``loop_model`` carries it.
+
+        Args:
+            text: the YAML text.
+            where: named in messages.
+        """
         return cls.from_mapping(parse_yaml(text, where), where)
 
     @classmethod
     def from_mapping(cls, document: Any, where: str = "loop model") -> LoopModel:
         """Check a YAML mapping and build the loop from it.
+
+        Args:
+            document: the mapping.
+            where: named in messages.
 
         Raises:
             InputError: naming ``where``, the key, and the mend.
@@ -175,7 +196,11 @@ class LoopModel:
         return yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
 
     def save(self, path: Path | str) -> None:
-        """Write the YAML file."""
+        """Write the YAML file.
+
+        Args:
+            path: the file, ``*.loop.yaml`` by custom.
+        """
         Path(path).write_text(self.to_yaml(), encoding="utf-8")
 
     def with_valve_effects(
@@ -183,7 +208,12 @@ class LoopModel:
     ) -> LoopModel:
         """Return the loop with the effects of the named valves replaced.
 
-        Keyword arguments, if any, become one entry of the provenance.
+        Args:
+            effects: valve to its new effects in signal order; none for a valve that follows OP.
+            provenance: if any, one entry of the provenance.
+
+        Raises:
+            InputError: no such valve.
         """
         document = self.to_mapping()
         for name in effects:

@@ -57,15 +57,26 @@ class Plant:
     Each sample is :meth:`measure`, then :meth:`apply` with the controller's OP (equations
     (1), (2) and (A.2)). The same model and seed give the same numbers, bit for bit, and the
     noise does not depend on what is applied.
+
+    Args:
+        model: the loop, at rest at its initial stem positions and outputs.
+        seed: of the noise, 0 up.
+        valve_changes: valves that change in mid-run, in the order of their times.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import LoopModel, Plant, find_config
+        >>> plant = Plant(LoopModel.load(find_config("flow.loop.yaml")), seed=1)
+        >>> plant.apply(np.array([51.0])).tolist()  # 3 % above the stem: within f_S, it stays
+        [48.0]
+        >>> plant.apply(np.array([53.0])).tolist()  # 5 % above: it slips, to f_D below OP
+        [51.5]
     """
 
     def __init__(
         self, model: LoopModel, seed: int, valve_changes: Sequence[ValveChange] = ()
     ) -> None:
-        """Start at rest at the model's initial stem positions and outputs.
-
-        Valves change as ``valve_changes`` says, in the order of their times.
-        """
+        """Start at rest at the model's initial stem positions and outputs."""
         self.model = model
         process = model.process
         self._random = np.random.default_rng(seed)

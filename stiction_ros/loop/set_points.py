@@ -24,6 +24,13 @@ class SetPoints:
         times: seconds of the moves, increasing, the first 0; shape (M,).
         values: set-points from each move on, shape (M, p), engineering units.
         repeat: seconds after which the schedule starts again; inf for never.
+
+    Examples:
+        >>> from stiction_ros import SetPoints
+        >>> moves = [{"time": 0.0, "PV1": 40.0}, {"time": 60.0, "PV1": 44.0}]
+        >>> schedule = SetPoints.from_mapping({"moves": moves}, ("PV1",), "example")
+        >>> schedule.at(59.0).item(), schedule.at(60.0).item()
+        (40.0, 44.0)
     """
 
     outputs: tuple[str, ...]
@@ -34,6 +41,11 @@ class SetPoints:
     @classmethod
     def from_mapping(cls, value: Any, outputs: tuple[str, ...], where: str) -> SetPoints:
         """Read ``{repeat: s, moves: [{time: s, TAG: value, …}, …]}``; the first sets every tag.
+
+        Args:
+            value: the mapping.
+            outputs: tags of the loop's outputs.
+            where: named in messages.
 
         Raises:
             InputError: unknown tags, times that do not increase, or no value for a tag.
@@ -61,7 +73,15 @@ class SetPoints:
 
     @classmethod
     def load(cls, path: Path | str, outputs: tuple[str, ...]) -> SetPoints:
-        """Read the schedule from a YAML file."""
+        """Read the schedule from a YAML file.
+
+        Args:
+            path: the file.
+            outputs: tags of the loop's outputs.
+
+        Raises:
+            InputError: as :meth:`from_mapping`; no such file.
+        """
         return cls.from_mapping(load_yaml(path), outputs, str(path))
 
     def at(self, time: float) -> FloatArray:

@@ -12,7 +12,7 @@ import sys
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-NODES = ("plant", "controller", "estimator", "recorder", "player")
+NODES = ("plant", "controller", "estimator", "recorder", "player", "opcua")
 
 
 def main() -> int:

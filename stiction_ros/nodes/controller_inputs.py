@@ -19,6 +19,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.nodes.managed import LATCHED_READER_QOS, READER_QOS, ManagedNode
 from stiction_ros.nodes.messages import rows_of, to_ns, values_of
+from stiction_ros.nodes.peers import PLANTS
 from stiction_ros.online.background import Background
 from stiction_ros.online.input_port import InputPort
 from stiction_ros.online.live_controller import LiveController
@@ -51,10 +52,10 @@ class ControllerInputs(ManagedNode):
         if self.settings.sp_source == "external":
             sp_qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
         self._draining = False
-        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS, ("plant",))
+        self.inlet(JointState, "op_applied", self._on_applied, READER_QOS, PLANTS)
         self.inlet(JointState, "sp", self._on_sp, sp_qos)
         self.inlet(JointState, "dv", self._on_dv, READER_QOS)
-        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, PLANTS)
         self.inlet(JointTrajectory, "sp_preview", self._on_preview, READER_QOS)
         self.inlet(JointState, "stiction", self._on_stiction, READER_QOS, ("estimator",))
         self.inlet(String, "loop_model", self._on_model, LATCHED_READER_QOS, ("estimator",))

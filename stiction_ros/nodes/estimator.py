@@ -19,6 +19,7 @@ from stiction_ros.nodes.estimates import figures_of, fit_status, friction_messag
 from stiction_ros.nodes.gap_status import finding_status, look_status, monitor_status
 from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND, to_ns, values_of
+from stiction_ros.nodes.peers import PLANTS
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator, fit
@@ -56,7 +57,7 @@ class EstimatorNode(ManagedNode):
         self._model = self.outlet(String, "loop_model", LATCHED_QOS, ("controller",))
         self.inlet(JointState, "op_applied", self._on_applied, READER_QOS)
         self.inlet(JointState, "op", self._on_op, READER_QOS, ("controller",))
-        self.inlet(JointState, "pv", self._on_pv, READER_QOS, ("plant",))
+        self.inlet(JointState, "pv", self._on_pv, READER_QOS, PLANTS)
 
     def _forget_loop(self) -> None:
         self.live: LiveEstimator | None = None

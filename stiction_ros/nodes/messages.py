@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from array import array
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -12,8 +13,10 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from stiction_ros.control import StepResult
 from stiction_ros.effects.behaviour import FloatArray
+
+if TYPE_CHECKING:  # nodes that control nothing load nothing of control
+    from stiction_ros.control import StepResult
 
 SECOND = 1_000_000_000
 LEVELS = {"ok": b"\x00", "warn": b"\x01", "error": b"\x02"}

@@ -15,6 +15,7 @@ from rclpy.subscription import Subscription
 TOPIC = "topic:"  # marks an entry of wait_for that names a topic; "/" and "~" do as well
 PATIENCE = 0.5  # s for readers to receive
 GRACE = 0.5  # s for which a partner may be missing before it has gone
+PLANTS = ("plant", "opcua")  # nodes that publish pv: the simulated plant, the driver of a real one
 WATCHER = "recorder"  # reads every topic and commands nothing
 
 

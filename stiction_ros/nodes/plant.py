@@ -17,8 +17,8 @@ from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, va
 from stiction_ros.nodes.peers import publishers_of
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.node_settings import PlantNodeSettings
 from stiction_ros.online.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.plain_settings import PlantNodeSettings
 from stiction_ros.online.round_trips import RoundTrips
 
 AGAIN = 1.0  # s after which a sample in lockstep is shown again

@@ -16,7 +16,7 @@ from stiction_ros.nodes.endpoints import message_class
 from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode, Outlet
 from stiction_ros.nodes.messages import SECOND, to_stamp
 from stiction_ros.nodes.runner import run
-from stiction_ros.online.node_settings import PlayerNodeSettings
+from stiction_ros.online.plain_settings import PlayerNodeSettings
 from stiction_ros.records.bag_metadata import BagTopic, Qos
 from stiction_ros.records.mcap_scan import RawMessage
 from stiction_ros.records.playback import Playback, PlaybackOptions, bag_content, offered_qos

@@ -20,7 +20,7 @@ from stiction_ros.nodes.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.messages import SECOND
 from stiction_ros.nodes.runner import run
 from stiction_ros.online.health import Noticed
-from stiction_ros.online.node_settings import RecorderNodeSettings
+from stiction_ros.online.plain_settings import RecorderNodeSettings
 from stiction_ros.records.bag_finish import CLOCK
 from stiction_ros.records.bag_writer import BagWriter, Packing, Splitting
 from stiction_ros.records.log_time import SIMULATED, LogTime

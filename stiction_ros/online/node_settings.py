@@ -1,4 +1,4 @@
-"""The parameters of the nodes, as parameter files and ``ros2 param`` know them."""
+"""The parameters of controller and estimator, as parameter files and ``ros2 param`` know them."""
 
 from __future__ import annotations
 
@@ -8,59 +8,8 @@ from stiction_ros.online.controller_settings import LiveControllerSettings
 from stiction_ros.online.gap_monitor import MonitorRule
 from stiction_ros.online.live_estimator import EstimatorSettings
 from stiction_ros.online.pairing import BRIDGED, Pairing
+from stiction_ros.online.plain_settings import PACES, NodeSettings
 from stiction_ros.settings import setting
-
-PACES = ("lockstep", "realtime")
-
-
-@dataclasses.dataclass(frozen=True)
-class NodeSettings:
-    """Start-up, the same for every node."""
-
-    autostart: bool = setting(True, "configure and activate without being told", fixed=True)
-    wait_for: tuple[str, ...] = setting(
-        (),
-        "nodes of this package that must be ready, and topics (/pv, topic:pv) that must be "
-        "there, before this one begins",
-        fixed=True,
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class PlantNodeSettings(NodeSettings):
-    """What the plant simulates, how long and how fast."""
-
-    model: str = setting("", "loop model file, *.loop.yaml", fixed=True)
-    set_points: str = setting(
-        "", "set-point schedule file; empty when sp comes from elsewhere", fixed=True
-    )
-    seed: int = setting(0, "seed of the noise", low=0, fixed=True)
-    samples: int = setting(0, "samples to run; 0 runs until stopped", low=0, fixed=True)
-    valve_changes: str = setting(
-        "",
-        "valves that change in mid-run: YAML text [{time: s, valve: TAG, effects: [...]}]; "
-        "empty for none",
-        fixed=True,
-    )
-    pace: str = setting(
-        "lockstep",
-        "lockstep waits for the op of each sample; realtime does not",
-        choices=PACES,
-        fixed=True,
-    )
-    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
-    commander: str = setting(
-        "controller",
-        "the only node whose op is taken, as it names itself in frame_id; without a leading "
-        "slash in the plant's namespace; empty for the first that commands",
-        fixed=True,
-    )
-    op_timeout: float = setting(
-        120.0, "s to wait for op in lockstep before the run is given up", low=0.1, high=1e5
-    )
-    start_time: float = setting(
-        1.0, "simulated time of the first sample, s", low=0.0, high=4e9, fixed=True
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,64 +58,3 @@ class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
     def pairing(self) -> Pairing:
         """Return what pairs PV and OP; no bridge is longer than what a fit can wait for."""
         return Pairing(self.sample_time, self.window, min(BRIDGED, self.fit_latency - 1))
-
-
-@dataclasses.dataclass(frozen=True)
-class RecorderNodeSettings(NodeSettings):
-    """What is recorded, and where."""
-
-    directory: str = setting("bag", "the bag, a directory that holds nothing yet", fixed=True)
-    topics: tuple[str, ...] = setting(
-        (), "names of topics to record, beside those that regex fits", fixed=True
-    )
-    regex: str = setting(
-        "own",
-        "regular expression of the full names of topics to record; own: all in the recorder's "
-        "namespace and /clock, /diagnostics, /rosout, /parameter_events; empty for none",
-        fixed=True,
-    )
-    exclude_regex: str = setting(
-        "", "regular expression of the full names of topics to leave out", fixed=True
-    )
-    compression: str = setting(
-        "zstd", "of the finished bag", choices=("zstd", "lz4", "none"), fixed=True
-    )
-    max_bag_size: int = setting(
-        0,
-        "bytes of messages after which the bag goes on in its next file; 0 for never",
-        low=0,
-        fixed=True,
-    )
-    max_bag_duration: float = setting(
-        0.0,
-        "s of log time after which the bag goes on in its next file; 0 for never",
-        low=0.0,
-        high=1e9,
-        fixed=True,
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class PlayerNodeSettings(NodeSettings):
-    """What is played, how fast and from where."""
-
-    bag: str = setting("", "rosbag2 directory or .mcap file", fixed=True)
-    rate: float = setting(1.0, "recorded seconds per second", low=1e-3, high=1e6)
-    start: float = setting(0.0, "seconds of the bag that are passed over", low=0.0, fixed=True)
-    loop: bool = setting(False, "begin again at the end", fixed=True)
-    paused: bool = setting(False, "wait for ~/resume or ~/step at the beginning", fixed=True)
-    topics: str = setting(
-        "(?!/(rosout|parameter_events)$).*",
-        "regular expression of the full names of the topics to play",
-        fixed=True,
-    )
-    clock: str = setting(
-        "auto",
-        "auto: the recorded /clock, or the player's own where there is none; "
-        "own: the player's own; none: no /clock",
-        choices=("auto", "own", "none"),
-        fixed=True,
-    )
-    clock_rate: float = setting(
-        40.0, "messages per second of the player's own /clock", low=0.1, high=1000.0, fixed=True
-    )

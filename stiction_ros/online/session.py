@@ -33,9 +33,8 @@ from stiction_ros.online.gap_monitor import GapLook, MonitorRule
 from stiction_ros.online.live_controller import LiveController, ModeChange
 from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
 from stiction_ros.online.monitoring import Monitoring, check_model
-from stiction_ros.online.node_settings import (
-    ControllerNodeSettings,
-    EstimatorNodeSettings,
+from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
+from stiction_ros.online.plain_settings import (
     NodeSettings,
     PlantNodeSettings,
     RecorderNodeSettings,
@@ -68,6 +67,12 @@ class Scenario:
         monitor: rule of the estimator's monitor.
         monitor_model: what the monitor compares with; None for the loop as it is identified.
         valve_changes: valves of the plant that change in mid-run.
+
+    Examples:
+        >>> from stiction_ros import Scenario, find_config
+        >>> scenario = Scenario.load(find_config("siso.scenario.yaml"))
+        >>> scenario.plant.valve_names, scenario.process.valves[0].effects
+        (('V1',), ())
     """
 
     name: str
@@ -93,6 +98,9 @@ class Scenario:
 
         Raises:
             InputError: anything missing or wrong, in one line.
+
+        Args:
+            path: the scenario, ``*.scenario.yaml`` by custom.
         """
         path = Path(path)
         top = Section(load_yaml(path), str(path))
@@ -163,6 +171,12 @@ class LiveRun:
         changes: modes, the first at sample 0.
         fits: every fit in order.
         looks, findings: what the monitor measured and found, in order.
+
+    Examples:
+        >>> from stiction_ros import Scenario, find_config, run_live
+        >>> live = run_live(Scenario.load(find_config("siso.scenario.yaml")), samples=60)
+        >>> live.changes[0].mode.value, live.stem_estimate.shape
+        ('unaware', (60, 1))
     """
 
     run: ClosedLoopRun
@@ -246,6 +260,19 @@ def run_live(
         ideal_valves: run with valves that follow OP exactly, to the end.
         identify: whether the estimator runs; without it the controller stays as it starts.
         progress: as in :func:`stiction_ros.loop.simulate_closed_loop`.
+
+    Returns:
+        Signals, every fit and every change of the controller, in order.
+
+    Raises:
+        InputError: the controller cannot be built from the scenario's process.
+
+    Examples:
+        >>> from stiction_ros import Scenario, find_config, run_live
+        >>> scenario = Scenario.load(find_config("siso.scenario.yaml"))
+        >>> live = run_live(scenario, seed=7, samples=60)  # too short for a swap
+        >>> live.run.record.pv.shape, live.swap
+        ((60, 1), None)
     """
     plant = scenario.plant.with_ideal_valves() if ideal_valves else scenario.plant
     loop = _Loop(scenario, plant, identify)

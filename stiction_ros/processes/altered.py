@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from stiction_ros.effects import Behaviour, Filter, FloatArray, LinearFilter
 from stiction_ros.errors import InputError
@@ -46,9 +45,9 @@ class AlteredProcess(Process):
         self._point = inner.linear(sample_time).pv0
         self._chains = [[_filter(effect, sample_time) for effect in chain] for chain in effects]
         filters = [_in_series(chain) for chain in self._chains]
-        self._a = block_diag(*(f.a for f in filters))
-        self._b = block_diag(*(f.b[:, None] for f in filters))
-        self._c = block_diag(*(f.c[None, :] for f in filters))
+        self._a = _diagonal([f.a for f in filters])
+        self._b = _diagonal([f.b[:, None] for f in filters])
+        self._c = _diagonal([f.c[None, :] for f in filters])
         self._d = np.array([f.d for f in filters])
 
     def rest(self, stem: FloatArray, pv: FloatArray) -> FloatArray:
@@ -126,4 +125,16 @@ def _in_series(filters: list[Filter]) -> Filter:
             np.concatenate([new.d * whole.c, new.c]),
             whole.d * new.d,
         )
+    return whole
+
+
+def _diagonal(blocks: list[FloatArray]) -> FloatArray:
+    """Return the matrix that has ``blocks`` on its diagonal and zeros elsewhere."""
+    rows, columns = (sum(block.shape[axis] for block in blocks) for axis in (0, 1))
+    whole = np.zeros((rows, columns))
+    row = column = 0
+    for block in blocks:
+        height, width = block.shape
+        whole[row : row + height, column : column + width] = block
+        row, column = row + height, column + width
     return whole

@@ -38,6 +38,13 @@ def write_csv(record: Record, path: str | Path, *, iso: bool = False) -> None:
     Raises:
         InputError: the file cannot be written, no ISO stamp can say its times, or it holds
             several runs.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, read, simulate, write_csv
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=20)
+        >>> write_csv(record, "flow.csv")
+        >>> bool((read("flow.csv").pv == record.pv).all())
+        True
     """
     if (np.diff(record.time) <= 0).any():
         raise InputError(

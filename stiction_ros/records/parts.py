@@ -123,5 +123,5 @@ def joined(parts: Sequence[Record]) -> Record:
 def _moment(seconds: float) -> str:
     if not DATES < seconds < 2 * 10**9:
         return f"{seconds:.9g} s"
-    at = datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC).replace(tzinfo=None)
-    return at.isoformat(" ")[:23]
+    moment = datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC)
+    return moment.replace(tzinfo=None).isoformat(" ")[:23]

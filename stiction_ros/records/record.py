@@ -41,6 +41,14 @@ class Record:
     Raises:
         InputError: shapes that do not fit together, a value that is not finite at a sample
             that is not bad, an unknown quality, gaps out of order.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import Record
+        >>> op, pv = np.full((4, 1), 50.0), np.ones((4, 1))
+        >>> record = Record("FIC101", 2.0, ("V1",), ("PV1",), op, pv)
+        >>> len(record), record.time.tolist()
+        (4, [0.0, 2.0, 4.0, 6.0])
     """
 
     name: str

@@ -37,6 +37,14 @@ def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
     Raises:
         InputError: stamps before 0 or beyond what a ROS stamp holds; the message definitions
             of ``sensor_msgs`` are not installed; the directory holds something.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, read, simulate, write_bag
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=20)
+        >>> write_bag(record, "flow_bag")["/pv"]
+        20
+        >>> bool((read("flow_bag").op == record.op).all())
+        True
     """
     first = round(record.start * SECOND)
     stamps = [first + round(time * SECOND) for time in record.time.tolist()]

@@ -60,6 +60,20 @@ def report_record(
         identification: of this record.
         out: folder, made when missing; or the ``.html`` file alone.
         parts: all parts of the source that it is from, when there are several.
+
+    Returns:
+        The page.
+
+    Raises:
+        OSError: nothing can be written there.
+
+    Examples:
+        >>> from stiction_ros import IdentificationOptions, LoopModel
+        >>> from stiction_ros import find_config, identify, report_record, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=400)
+        >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
+        >>> report_record(record, found, "report.html").name
+        'report.html'
     """
     out = Path(out)
     alone = out.suffix.lower() == ".html"

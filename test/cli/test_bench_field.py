@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stiction_ros.cli import bench_field, bench_stability
+from stiction_ros import identification
+from stiction_ros.cli import bench_field
 from stiction_ros.cli.bench_field import Answer, Judged, answer_of, shares, splits
 from stiction_ros.cli.bench_stability import BASE, VARIANTS, Held, Source, sources, varied
 from stiction_ros.cli.main import main
@@ -156,7 +157,7 @@ def test_frictions_come_back_in_the_record_s_own_unit(monkeypatch: pytest.Monkey
             valve = {"verdict": "sticky", "f_s_interval": [20.0, 40.0], "f_d_interval": [0.0, 2.0]}
             return {"valves": [valve], "outputs": [{}]}
 
-    monkeypatch.setattr(bench_stability, "identify", lambda record, options: Found())
+    monkeypatch.setattr(identification, "identify", lambda record, options: Found())
     variant = next(variant for variant in VARIANTS if variant.op[0] == 20.0)
     assert varied("exact", record_of(), variant).f_s == (1.0, 2.0)
     assert varied("exact", record_of(), variant).band == (1.0, 2.1)

@@ -30,14 +30,24 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "name", [m.__name__.rpartition(".")[2].replace("_", "-") for m in COMMANDS]
-)
+@pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         parser().parse_args([name, "--help"])
     assert end.value.code == 0
     assert "usage: stiction " + name in capsys.readouterr().out
+
+
+def test_help_says_of_every_command_what_the_command_says(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    told = []
+    for only in (None, ""):
+        with pytest.raises(SystemExit) as end:
+            parser(only).parse_args(["--help"])
+        assert end.value.code == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
 
 
 def test_identify_lists_the_friction_laws(capsys: pytest.CaptureFixture[str]) -> None:

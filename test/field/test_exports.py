@@ -10,6 +10,7 @@ from stiction_ros.cli.main import main
 from stiction_ros.field import field_loop
 from stiction_ros.field.exports.formats import Form
 from stiction_ros.field.exports.plant import loop_seed
+from stiction_ros.field.exports.table import Table
 from stiction_ros.intake import IntakeOptions, loops
 
 LOOPS, SEED = 20, 3
@@ -75,3 +76,13 @@ def test_a_folder_in_use_is_refused(plant: Path, capsys: pytest.CaptureFixture[s
     arguments = ["--loops", "1", "--jobs", "1", "--out", str(plant)]
     assert main(["experiment", "plant", *arguments]) == 2
     assert "is not empty" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_change_is_kept_where_it_happened(turned: bool) -> None:
+    cells: dict[str, list[float | str | None]] = {"OP": [1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0]}
+    faults = ("turned",) if turned else ()
+    table = Table("F", np.arange(7.0), cells, {"OP": "%"}, 1.0, faults, True)
+    rows = list(range(7))[:: -1 if turned else 1]
+    kept = [(0.0, 1.0), (2.0, 2.0), (5.0, 3.0), (6.0, 3.0)]
+    assert table.rows(rows).changes("OP") == (kept[::-1] if turned else kept)

@@ -19,7 +19,7 @@ from stiction_ros.nodes import managed, peers
 from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.messages import joint_state
 from stiction_ros.nodes.peers import Peers
-from stiction_ros.online.node_settings import NodeSettings
+from stiction_ros.online.plain_settings import NodeSettings
 from stiction_ros.settings import setting
 
 

@@ -22,7 +22,15 @@ DISTRIBUTION = {
     "yaml": "pyyaml",
 }
 # Imported where it is there; the package runs without.
-OPTIONAL = {"dask", "distributed", "do_mpc", "openpyxl", "pyarrow"}
+OPTIONAL = {
+    "asyncua",
+    "cryptography",
+    "dask",
+    "distributed",
+    "do_mpc",
+    "openpyxl",
+    "pyarrow",
+}
 # Distribution in setup.cfg → rosdep key in package.xml; the others are installed with pip.
 ROSDEP = {
     "matplotlib": "python3-matplotlib",

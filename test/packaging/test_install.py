@@ -123,6 +123,10 @@ def test_config_files_are_installed(prefix: Path) -> None:
     assert {path.name for path in folder.glob("*")} == wanted
 
 
+def test_type_checkers_are_told_that_the_package_is_typed(pip_prefix: Path) -> None:
+    assert list(pip_prefix.glob("lib/python*/site-packages/stiction_ros/py.typed"))
+
+
 @pytest.mark.parametrize("name", NODES)
 def test_launcher_starts_its_node_of_this_installation(
     prefix: Path, name: str, tmp_path: Path

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 import tempfile
 from pathlib import Path
 
@@ -234,3 +235,10 @@ def test_a_csv_file_holds_gaps_but_one_run_only(tmp_path: Path) -> None:
     assert joined(read_csv_parts(tmp_path / "r.csv")).segments == found.segments
     with pytest.raises(InputError, match="holds several runs"):
         write_csv(record(gaps=(Gap(5, 5.0),)), tmp_path / "s.csv")
+
+
+def test_the_part_that_is_kept_is_told_by_its_dates() -> None:
+    first = dataclasses.replace(record(count=4), start=1.7e9)
+    second = dataclasses.replace(record(count=2), start=1.7e9 + 100.0)
+    (note,) = longest_part([first, second]).notes
+    assert re.search(r"at: 2023-11-14 22:13:20 to 2023-11-14 22:13:\d\d, 4 of 6", note), note

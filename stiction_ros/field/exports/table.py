@@ -56,13 +56,18 @@ class Table:
         return dataclasses.replace(self, time=self.time[order], cells=cells)
 
     def changes(self, name: str) -> list[tuple[float, Cell]]:
-        """Return stamps and cells of one signal: those that differ from the one before."""
-        column = self.cells[name]
-        return [
-            (float(stamp), cell)
-            for k, (stamp, cell) in enumerate(zip(self.time.tolist(), column, strict=True))
+        """Return stamps and cells of one signal, those that differ from the one before in time.
+
+        They stand in the order of the rows, from the last to the first where those do.
+        """
+        rows = np.argsort(self.time, kind="stable").tolist()
+        column = [self.cells[name][row] for row in rows]
+        kept = [
+            (float(self.time[row]), cell)
+            for k, (row, cell) in enumerate(zip(rows, column, strict=True))
             if k in (0, len(column) - 1) or cell != column[k - 1]
         ]
+        return kept[::-1] if "turned" in self.faults else kept
 
 
 def table_of(random: np.random.Generator, loop: FieldLoop, tag: str, start: float) -> Table:

@@ -27,6 +27,8 @@ class Accepted:
 
     Attributes:
         static, dynamic, band: hulls of f_S, f_D and f_S + f_D of what is not rejected.
+        gain: −2 log of the marginal likelihood that the friction of this valve adds to a model in
+            which it has none.
         none: whether a valve without friction is not rejected.
         deadband_loss: by how much the best f_D = f_S is worse than the best.
         profile: rows (f_S, least loss above the best), best over f_D.
@@ -35,6 +37,7 @@ class Accepted:
     static: Interval
     dynamic: Interval
     band: Interval
+    gain: float
     none: bool
     deadband_loss: float
     profile: tuple[tuple[float, float], ...]
@@ -50,7 +53,7 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         confidence: level of the intervals.
     """
     best = found.best
-    gain = found.ideal.loss - best.loss
+    gain = found.without[valve].loss - best.loss
     slack = float(chi2.ppf(confidence, FREEDOM)) + MISFIT * max(gain, 0.0)
     rows, lost = _looked_at(problem, found, valve)
     lost = lost - lost.min()
@@ -62,6 +65,7 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         static=(float(static.min()), float(static.max())),
         dynamic=(float(dynamic.min()), float(dynamic.max())),
         band=(float(band.min()), float(band.max())),
+        gain=gain,
         none=gain <= slack,
         deadband_loss=float(lost[flat].min(initial=np.inf)),
         profile=_profile(rows[:, 0], lost),

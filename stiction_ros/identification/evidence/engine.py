@@ -9,14 +9,14 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.explanation import RIVAL, explained
+from stiction_ros.identification.closed_loop.explanation import LINE, OPEN, RIVAL, explained
 from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.engine import order_row
-from stiction_ros.identification.evidence.accepted import Accepted, accepted
 from stiction_ros.identification.evidence.kernels import whitened
-from stiction_ros.identification.evidence.output_fit import OutputFit
-from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.search import Candidate, Found, search
+from stiction_ros.identification.evidence.output_fit import OutputFit, noise_of
+from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
+from stiction_ros.identification.evidence.rates import Agreement, Look, agreement, looks
+from stiction_ros.identification.evidence.search import Candidate
 from stiction_ros.identification.models import Data, Model, linear_model, settle_delays, stem_of
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.preparation import prepare, windows
@@ -31,7 +31,17 @@ from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
 
-LEAST_GONE = 0.1  # share of OP's movement that must go away with a friction
+PRICE = 15.0
+"""−2 log likelihood that friction must gain at two neighbouring rates: what the best of so many
+frictions gains on quiet loops without any."""
+LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
+MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
+HARMLESS = 0.12  # of the range of OP: a valve is healthy when larger bands are rejected
+UNHEARD = 12.0  # gain of friction at any rate from which on a valve is not called healthy
+POWERFUL = 3  # rates of which one must reject larger bands
+BETWEEN = 3.0
+"""Standard deviations of OP's innovations by which the band may be larger than the record shows: a
+valve feels what OP does between two samples, and slips at its peaks."""
 
 
 def identify(
@@ -55,28 +65,30 @@ def identify(
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    problem = Problem.of(record, options.law, skipped=options.delay[0])
-    found = search(problem)
+    seen = looks(record, options)
     report(0.7)
-    valves = tuple(_judged(record, problem, found, j, options) for j in range(len(record.valves)))
+    valves = tuple(_judged(record, seen, j, options) for j in range(len(record.valves)))
     model, table = _process(data, options, valves, record)
     report(1.0)
     concluded = conclude(record, data, Findings(model, valves, table, (), None), 0.0)
     looped = explained(record, dataclasses.replace(concluded, method="evidence"))
-    judged = tuple(_doubted(valve) for valve in looped.valves)
+    judged = tuple(doubted(valve) for valve in looped.valves)
     return dataclasses.replace(looped, valves=judged, seconds=time.perf_counter() - begun)
 
 
-def _doubted(valve: ValveEstimate) -> ValveEstimate:
+def doubted(valve: ValveEstimate) -> ValveEstimate:
     """Return the estimate, no longer sticky where its loop says otherwise.
 
     A wave of one period that explains the record nearly as well comes from outside, and a
-    friction without which OP would move all the same is not what moves it.
+    friction without which OP would move all the same is not what moves it; the latter holds where
+    the controller is known.
     """
     if valve.verdict is not VerdictKind.STICKY:
         return valve
-    wave = valve.evidence.get("line_rivalry", 0.0) > RIVAL
-    idle = 0.0 < valve.evidence.get("loop_gone", 1.0) < LEAST_GONE
+    told = valve.evidence
+    wave = told.get("line_rivalry", 0.0) > RIVAL and told.get("outside_line", 0.0) > LINE
+    known = told.get("controller_fit", 0.0) > OPEN
+    idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
     if not (wave or idle):
         return valve
     return dataclasses.replace(
@@ -88,24 +100,29 @@ def _doubted(valve: ValveEstimate) -> ValveEstimate:
 
 
 def _judged(
-    record: Record, problem: Problem, found: Found, valve: int, options: IdentificationOptions
+    record: Record, seen: tuple[Look, ...], valve: int, options: IdentificationOptions
 ) -> ValveEstimate:
-    held = accepted(problem, found, valve, options.confidence)
-    figures = evidence_of(problem, found, valve)
-    figures["deadband_loss"] = held.deadband_loss
-    verdict = _verdict(figures, held, float(problem.limit[valve]), options)
+    agreed = agreement(seen, valve)
+    problem, found, held = agreed.look.problem, agreed.look.found, agreed.look.accepted[valve]
+    figures = evidence_of(agreed, valve)
+    for look in seen:
+        figures[f"gain_{look.problem.rate}"] = look.accepted[valve].gain
+        figures[f"band_high_{look.problem.rate}"] = look.accepted[valve].band[1]
+    verdict = _verdict(figures, agreed, seen, valve, options)
     believed = verdict is VerdictKind.STICKY
     low = (held.static[0], held.dynamic[0]) if believed else (0.0, 0.0)
-    chosen = found.ideal if verdict is VerdictKind.HEALTHY else found.best
+    healthy = verdict is VerdictKind.HEALTHY
+    high = 0.0 if healthy else 0.5 * BETWEEN * _innovation(problem.op[valve])
+    chosen = found.without[valve] if healthy else found.best
     static, dynamic = (float(value) for value in chosen.friction[valve])
     return ValveEstimate(
         name=record.valves[valve],
         verdict=verdict,
         law=options.law,
         static_friction=static,
-        static_interval=(low[0], max(held.static[1], static)),
+        static_interval=(low[0], max(held.static[1], static) + high),
         dynamic_friction=dynamic,
-        dynamic_interval=(low[1], max(held.dynamic[1], dynamic)),
+        dynamic_interval=(low[1], max(held.dynamic[1], dynamic) + high),
         jump=0.0 if held.deadband_loss < 4.0 else static - dynamic,
         stem_start=float(record.op[0, valve]) + float(chosen.starts[valve]),
         moves=int(np.count_nonzero(np.diff(chosen.stems[valve]))),
@@ -114,23 +131,30 @@ def _judged(
     )
 
 
-def evidence_of(problem: Problem, found: Found, valve: int) -> dict[str, float]:
+def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
     """Return the named figures behind the verdict on one valve."""
-    best, without = found.best, found.ideal
-    count = problem.count * len(problem.pv)
-    gain = without.loss - best.loss
+    problem, found = agreed.look.problem, agreed.look.found
+    best, without = found.best, found.without[valve]
     halves = half_gains(
         (_innovations(problem, one), _innovations(problem, other))
         for one, other in zip(best.fits, without.fits, strict=True)
     )
     return {
-        "delta_bic": gain - 2.0 * float(np.log(count)),
+        "delta_bic": agreed.gain - PRICE,
         "free_run_ratio": _free_run(problem, without) / _free_run(problem, best),
         "half_1": halves[0],
         "half_2": halves[1],
         "share": float(best.friction[valve, 0] / problem.limit[valve]),
         "moves": float(np.count_nonzero(np.diff(best.stems[valve]))),
+        "rate": float(problem.rate),
+        "alike": float(agreed.alike),
+        "deadband_loss": agreed.look.accepted[valve].deadband_loss,
     }
+
+
+def _innovation(op: FloatArray) -> float:
+    """Return the standard deviation of what the past of OP does not tell, %."""
+    return float(whitened(noise_of(op), op, float(op[0]))[NOISE_ORDER:].std())
 
 
 def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
@@ -142,14 +166,21 @@ def _free_run(problem: Problem, candidate: Candidate) -> float:
 
 
 def _verdict(
-    figures: dict[str, float], held: Accepted, span: float, options: IdentificationOptions
+    figures: dict[str, float],
+    agreed: Agreement,
+    seen: tuple[Look, ...],
+    valve: int,
+    options: IdentificationOptions,
 ) -> VerdictKind:
-    negligible = options.negligible_share * span
-    if figures["delta_bic"] > options.bic_margin and held.band[0] > negligible:
-        if min(figures["half_1"], figures["half_2"]) > 0.0:
-            return VerdictKind.STICKY
-        return VerdictKind.UNDECIDED
-    if held.band[1] <= 2.0 * negligible and figures["moves"] >= options.min_moves:
+    span = float(agreed.look.problem.limit[valve])
+    held = agreed.look.accepted[valve]
+    slips = figures["moves"] >= options.min_moves
+    if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL * span:
+        both = min(figures["half_1"], figures["half_2"]) > 0.0
+        return VerdictKind.STICKY if both and slips else VerdictKind.UNDECIDED
+    told = [look.accepted[valve] for look in seen]
+    quiet = max(one.gain for one in told) < UNHEARD
+    if quiet and slips and min(one.band[1] for one in told[:POWERFUL]) <= HARMLESS * span:
         return VerdictKind.HEALTHY
     return VerdictKind.UNDECIDED
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stiction_ros.compiled import compiled_fused
@@ -42,25 +44,51 @@ def lagged(signal: FloatArray, before: float, first: int, taps: int) -> FloatArr
 
 
 @compiled_fused
-def lagged_products(rows: FloatArray, signal: FloatArray, before: float, first: int) -> FloatArray:
-    """Return the products of :func:`lagged` rows with each other, shape (M, M).
+def with_past(signal: FloatArray, taps: int) -> FloatArray:
+    """Return a signal behind M samples of its first value, shape (M + N,)."""
+    out = np.empty(taps + len(signal))
+    out[:taps] = signal[0]
+    out[taps:] = signal
+    return out
 
-    Each follows from its neighbour up and left by two samples; only one row is summed up.
+
+@compiled_fused
+def lagged_with(padded: FloatArray, other: FloatArray, taps: int) -> FloatArray:
+    """Return the products of :func:`lagged` rows of a signal with another, shape (M,).
+
+    Args:
+        padded: the signal by :func:`with_past`.
+        other: its last samples, shape (n,).
+        taps: M.
     """
-    taps, count = rows.shape
+    out = np.empty(taps)
+    for i in range(taps):
+        start = len(padded) - len(other) - 1 - i
+        out[i] = np.dot(padded[start : start + len(other)], other)
+    return out
+
+
+@compiled_fused
+def lagged_products(left: FloatArray, right: FloatArray, count: int, taps: int) -> FloatArray:
+    """Return the products of the :func:`lagged` rows of two signals, shape (M, M).
+
+    Each follows from its neighbour up and left by two samples; only one row and one column are
+    summed up.
+
+    Args:
+        left, right: by :func:`with_past`.
+        count: n, samples of a row.
+        taps: M.
+    """
+    start = len(left) - 1 - count
     out = np.empty((taps, taps))
-    out[0] = np.dot(rows, rows[0])
+    out[:, 0] = lagged_with(left, right[start : start + count], taps)
+    out[0] = lagged_with(right, left[start : start + count], taps)
     for i in range(1, taps):
-        out[i, 0] = out[0, i]
-        enters, leaves = first - 1 - i, first - 1 - i + count
-        a = signal[enters] if enters >= 0 else before
-        b = signal[leaves] if leaves >= 0 else before
-        for j in range(i, taps):
-            enters, leaves = first - 1 - j, first - 1 - j + count
-            c = signal[enters] if enters >= 0 else before
-            d = signal[leaves] if leaves >= 0 else before
-            out[i, j] = out[i - 1, j - 1] + a * c - b * d
-            out[j, i] = out[i, j]
+        enters, leaves = left[start - i], left[start - i + count]
+        for j in range(1, taps):
+            gone = leaves * right[start - j + count]
+            out[i, j] = out[i - 1, j - 1] + enters * right[start - j] - gone
     return out
 
 
@@ -100,57 +128,63 @@ def solved(factor: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
     return out, explained
 
 
+class Given(NamedTuple):
+    """What stands beside one stem in one output, whitened.
+
+    Attributes:
+        noise: monic polynomial D, shape (d + 1,).
+        known: rows of any signals, shape (c, n).
+        others: stems of the other valves, by :func:`with_past`, shape (m − 1, M + N).
+        root: L^-1, with L L^T the products of ``known`` and of M lags of each of ``others`` with
+            each other and what is known of them before the record, shape (q, q).
+        target: what all these leave of the output, shape (n,).
+        energy: of that and of the prior of what explains the rest.
+    """
+
+    noise: FloatArray
+    known: FloatArray
+    others: FloatArray
+    root: FloatArray
+    target: FloatArray
+    energy: float
+
+
 @compiled_fused
-def evidence(
-    stem: FloatArray,
-    noise: FloatArray,
-    fixed: FloatArray,
-    target: FloatArray,
-    energy: float,
-    precision: FloatArray,
-) -> tuple[float, FloatArray]:
+def evidence(stem: FloatArray, given: Given, precision: FloatArray) -> tuple[float, FloatArray]:
     r"""Return −2 log of the marginal likelihood but for constants, and the response.
 
     .. math:: n \log(r / n) + \log\det(X X^T + K^{-1})
 
     with r what the response of the best fit and its prior leave of the target, and X the whitened
-    lags of the stem but for what the fixed rows explain. log det K is the caller's.
+    lags of the stem but for what stands beside them explains. log det K is the caller's.
 
     Args:
         stem: scaled, shape (N,).
-        noise: monic polynomial D, shape (d + 1,).
-        fixed: rows R that explain what they can, R^T R of a signal, shape (q, n).
-        target: what they leave of the whitened output, shape (n,).
-        energy: of that and of the prior of what explains the rest.
+        given: everything else.
         precision: inverse of K, shape (M, M).
     """
-    first = len(stem) - len(target)
-    before = stem[0]
-    signal = whitened(noise, stem, before)
-    rest_of_past = signal[0]
-    rows = lagged(signal, rest_of_past, first, len(precision))
-    gram = lagged_products(rows, signal, rest_of_past, first)
-    shared = np.dot(rows, fixed.T)
+    taps, known, count = len(precision), len(given.known), len(given.target)
+    signal = with_past(whitened(given.noise, stem, stem[0]), taps)
+    gram = lagged_products(signal, signal, count, taps)
+    shared = np.empty((taps, len(given.root)))
+    for row in range(known):
+        shared[:, row] = lagged_with(signal, given.known[row], taps)
+    for other in range(len(given.others)):
+        at = known + other * taps
+        shared[:, at : at + taps] = lagged_products(signal, given.others[other], count, taps)
+    shared = np.dot(shared, given.root.T)
     gram -= np.dot(shared, shared.T)
     gram += precision
     determinant = factorised(gram)
-    response, explained = solved(gram, np.dot(rows, target))
-    left = max(energy - explained, LEAST * energy)
-    count = len(target)
+    response, explained = solved(gram, lagged_with(signal, given.target, taps))
+    left = max(given.energy - explained, LEAST * given.energy)
     return count * np.log(left / count) + determinant, response
 
 
 @compiled_fused
-def evidences(
-    stems: FloatArray,
-    noise: FloatArray,
-    fixed: FloatArray,
-    target: FloatArray,
-    energy: float,
-    precision: FloatArray,
-) -> FloatArray:
+def evidences(stems: FloatArray, given: Given, precision: FloatArray) -> FloatArray:
     """Return :func:`evidence` of many stems, shape (G, N)."""
     out = np.empty(len(stems))
     for g in range(len(stems)):
-        out[g] = evidence(stems[g], noise, fixed, target, energy, precision)[0]
+        out[g] = evidence(stems[g], given, precision)[0]
     return out

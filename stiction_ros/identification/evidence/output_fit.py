@@ -17,11 +17,14 @@ from scipy.linalg import solve_triangular
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.kernels import (
+    LEAST,
+    Given,
     evidence,
     evidences,
-    factorised,
     lagged,
+    lagged_products,
     whitened,
+    with_past,
 )
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.response_prior import ResponsePrior
@@ -56,83 +59,115 @@ class Criterion:
     """The loss of one output as a function of the stem of one valve, all else given.
 
     Attributes:
-        noise, precision: D and the inverse of K.
-        fixed, target, energy: see :func:`.kernels.evidence`.
+        given: what stands beside the stem.
+        precision: inverse of K.
         constant: what the loss adds to the kernel's.
     """
 
-    noise: FloatArray
+    given: Given
     precision: FloatArray
-    fixed: FloatArray
-    target: FloatArray
-    energy: float
     constant: float
 
     def losses(self, stems: FloatArray) -> FloatArray:
         """Return the loss of each of many stems, scaled, shape (G, n)."""
-        found = evidences(stems, self.noise, self.fixed, self.target, self.energy, self.precision)
-        return np.asarray(found + self.constant)
+        return np.asarray(evidences(stems, self.given, self.precision) + self.constant)
 
     def best(self, stem: FloatArray) -> tuple[float, FloatArray]:
         """Return the loss of one stem and its response."""
-        loss, response = evidence(
-            stem, self.noise, self.fixed, self.target, self.energy, self.precision
-        )
+        loss, response = evidence(stem, self.given, self.precision)
         return float(loss) + self.constant, response
 
 
 @dataclasses.dataclass(frozen=True)
 class Whitened:
-    """One output and the stems beside one valve, whitened: what no prior changes.
+    """One output and some stems, whitened: what no prior changes.
 
     Attributes:
         noise: D.
         seen: the output, shape (n,).
-        rows: a constant, then M lags of every other stem, shape (q, n).
-        products: of these rows with each other, shape (q, q).
+        known: a constant, and the signals beside, shape (c, n).
+        stems: by :func:`.kernels.with_past`, shape (m, M + N).
+        products: of ``known`` and of M lags of every stem with each other, shape (q, q).
+        seen_products: of these with the output, shape (q,).
+        sizes: of the signals beside.
         taps: M.
     """
 
     noise: FloatArray
     seen: FloatArray
-    rows: FloatArray
+    known: FloatArray
+    stems: FloatArray
     products: FloatArray
+    seen_products: FloatArray
+    sizes: FloatArray
     taps: int
 
     @classmethod
-    def of(cls, problem: Problem, output: int, others: FloatArray, noise: FloatArray) -> Whitened:
-        """Whiten an output and the stems of the ``others``, scaled, shape (m − 1, n)."""
+    def of(cls, problem: Problem, output: int, stems: FloatArray, noise: FloatArray) -> Whitened:
+        """Whiten an output and ``stems``, scaled, shape (m, n); m may be 0."""
         taps, first = problem.taps, problem.first
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[first:]
         ones = np.full((1, len(seen)), float(noise.sum()) or 1.0)
-        parts = [ones / np.linalg.norm(ones)]
-        for stem in others:
-            signal = whitened(noise, stem, float(stem[0]))
-            parts.append(lagged(signal, float(signal[0]), first, taps))
-        rows = np.vstack(parts)
-        return cls(noise, seen, rows, rows @ rows.T, taps)
+        beside = [whitened(noise, row, float(row[0]))[None, first:] for row in problem.beside]
+        known = np.vstack([ones / np.linalg.norm(ones), *beside])
+        past = [with_past(whitened(noise, stem, float(stem[0])), taps) for stem in stems]
+        signals = np.array(past).reshape(len(stems), taps + problem.rows)
+        rows = np.vstack([known, *(lagged(x, float(x[0]), first + taps, taps) for x in signals)])
+        count = len(known)
+        products = np.empty((len(rows), len(rows)))
+        products[:, :count] = rows @ known.T
+        products[:count] = products[:, :count].T
+        for i, left in enumerate(signals):
+            for j, right in enumerate(signals[: i + 1]):
+                down, along = (slice(count + k * taps, count + (k + 1) * taps) for k in (i, j))
+                products[down, along] = lagged_products(left, right, len(seen), taps)
+                products[along, down] = products[down, along].T
+        return cls(noise, seen, known, signals, products, rows @ seen, problem.sizes, taps)
+
+    def with_precision(self, prior: ResponsePrior) -> FloatArray:
+        """Return the products and what is known before the record, shape (q, q)."""
+        out, known = self.products.copy(), np.arange(1, len(self.known))
+        out[known, known] += 1.0 / self.sizes
+        precision = prior.precision(self.taps)
+        for start in range(len(self.known), len(out), self.taps):
+            block = slice(start, start + self.taps)
+            out[block, block] += precision
+        return out
+
+    def log_determinant(self, prior: ResponsePrior) -> float:
+        """Return log det of the prior covariance of everything but the constant."""
+        own = len(self.stems) * prior.log_determinant(self.taps)
+        return own + float(np.log(self.sizes).sum())
+
+    def loss(self, prior: ResponsePrior) -> tuple[float, FloatArray]:
+        """Return the loss, and what multiplies ``known`` and each lag, shape (q,)."""
+        factor = np.linalg.cholesky(self.with_precision(prior))
+        half = solve_triangular(factor, self.seen_products, lower=True, check_finite=False)
+        count, energy = len(self.seen), float(self.seen @ self.seen)
+        left = max(energy - float(half @ half), LEAST * energy)
+        determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
+        weights = solve_triangular(factor, half, lower=True, trans=1, check_finite=False)
+        return float(count * np.log(left / count) + determinant), weights
 
     def under(self, prior: ResponsePrior) -> Criterion:
-        """Return the criterion under a prior, the others' responses integrated out."""
-        precision, seen = prior.precision(self.taps), self.seen
-        factor = self.products.copy()
-        starts = range(1, len(factor), self.taps)
-        for start in starts:
-            block = slice(start, start + self.taps)
-            factor[block, block] += precision
-        determinant = factorised(factor)
-        fixed = np.ascontiguousarray(
-            solve_triangular(factor, self.rows, lower=True, check_finite=False)
-        )
-        explained = fixed @ seen
+        """Return the criterion for one more stem beside these, their responses integrated out."""
+        factor = np.linalg.cholesky(self.with_precision(prior))
+        root = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+        half = root @ self.seen_products
+        weights = root.T @ half
+        target = self.seen - weights[: len(self.known)] @ self.known
+        first = self.stems.shape[1] - len(target)
+        for i, signal in enumerate(self.stems):
+            at = len(self.known) + i * self.taps
+            response = weights[at : at + self.taps]
+            target -= response @ lagged(signal, float(signal[0]), first, self.taps)
+        energy = float(self.seen @ self.seen) - float(half @ half)
+        determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
         return Criterion(
-            noise=self.noise,
-            precision=precision,
-            fixed=fixed,
-            target=seen - fixed.T @ explained,
-            energy=float(seen @ seen - explained @ explained),
-            constant=determinant + (1 + len(starts)) * prior.log_determinant(self.taps),
+            Given(self.noise, self.known, self.stems, root, target, energy),
+            prior.precision(self.taps),
+            determinant + prior.log_determinant(self.taps),
         )
 
 
@@ -191,12 +226,12 @@ def _tuned(
     problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
 ) -> ResponsePrior:
     """Return the prior to which no neighbour is better, downhill from ``prior``."""
-    beside = Whitened.of(problem, output, stems[1:], noise)
+    whole = Whitened.of(problem, output, stems, noise)
     met: dict[ResponsePrior, float] = {}
 
     def loss(one: ResponsePrior) -> float:
         if one not in met:
-            met[one] = beside.under(one).best(stems[0])[0]
+            met[one] = whole.loss(one)[0]
         return met[one]
 
     while True:
@@ -209,17 +244,16 @@ def _tuned(
 def _fitted(
     problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
 ) -> OutputFit:
-    taps, y = problem.taps, problem.pv[output]
-    responses = np.empty((len(stems), taps))
-    loss = np.inf
-    for j in range(len(stems)):
-        beside = Whitened.of(problem, output, np.delete(stems, j, axis=0), noise)
-        loss, responses[j] = beside.under(prior).best(stems[j])
-    rest = y.copy()
+    taps, known = problem.taps, len(problem.beside)
+    loss, weights = Whitened.of(problem, output, stems, noise).loss(prior)
+    responses = weights[1 + known :].reshape(len(stems), taps)
+    rest = problem.pv[output].copy()
+    if known:
+        rest -= weights[1 : 1 + known] @ problem.beside
     for stem, response in zip(stems, responses, strict=True):
         rest -= response @ lagged(stem, float(stem[0]), 0, taps)
     rest -= rest[problem.first :].mean()
-    return OutputFit(noise, prior, float(loss), responses, rest)
+    return OutputFit(noise, prior, loss, responses, rest)
 
 
 def noise_of(rest: FloatArray) -> FloatArray:

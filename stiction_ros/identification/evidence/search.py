@@ -68,11 +68,13 @@ class Found:
     Attributes:
         best: the candidate of least loss.
         ideal: the best fit without any friction.
+        without: per valve, the best fit in which it has no friction and the others theirs.
         met: every candidate, best first.
     """
 
     best: Candidate
     ideal: Candidate
+    without: tuple[Candidate, ...]
     met: tuple[Candidate, ...]
 
 
@@ -227,6 +229,58 @@ def search(problem: Problem) -> Found:
             best = found[0]
         if best.loss > before - GAIN:
             break
-    without = ideal(problem, [one.fits for one in sorted(met, key=lambda one: one.loss)[:HEADS]])
+    return _concluded(problem, met)
+
+
+def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> Found:
+    """Return what is found with frictions that were best elsewhere, as at another rate.
+
+    Args:
+        problem: the record.
+        found: by :func:`search`.
+        seeds: of which frictions and beginnings are tried.
+    """
+    met, best = list(found.met), found.best
+    for valve in range(len(problem.op)):
+        tried = _Valve(problem, best, valve)
+        for seed in seeds:
+            tried.add(tried.row_of(seed), best.fits, whole=True)
+        if min((one.loss for one in tried.met), default=np.inf) < best.loss - GAIN:
+            tried.polish()
+            tried.settle()
+        met += tried.met
+        best = min([best, *tried.met], key=lambda one: one.loss)
+    return found if best is found.best else _concluded(problem, met)
+
+
+def heads(found: Found, valve: int, count: int, distance: float) -> list[Candidate]:
+    """Return the best candidates with friction of a valve, apart by ``distance``, %."""
+    met = [one for one in found.met if one.friction[valve, 0] > 0.0]
+    places = np.array([one.friction[valve] for one in met]).reshape(-1, 2)
+    ranks = np.arange(len(met), dtype=float)
+    return [met[i] for i in _apart(places, ranks, count, distance)]
+
+
+def _concluded(problem: Problem, met: list[Candidate]) -> Found:
+    near = [one.fits for one in sorted(met, key=lambda one: one.loss)[:HEADS]]
+    without = ideal(problem, near)
     met = sorted([without, *met], key=lambda one: one.loss)
-    return Found(met[0], without, tuple(met))
+    return Found(met[0], without, _one_by_one(problem, met, without), tuple(met))
+
+
+def _one_by_one(
+    problem: Problem, met: list[Candidate], without: Candidate
+) -> tuple[Candidate, ...]:
+    """Return per valve the best candidate without its friction, once fitted for itself."""
+    if len(problem.op) == 1:
+        return (without,)
+    told = []
+    for valve in range(len(problem.op)):
+        best = met[0]
+        friction, starts, stems = best.friction.copy(), best.starts.copy(), best.stems.copy()
+        friction[valve], starts[valve] = 0.0, 0.0
+        stems[valve] = problem.ideal_stems()[valve]
+        fits = tuple(fit_output(problem, i, stems, (None, fit)) for i, fit in enumerate(best.fits))
+        known = [one for one in met if not one.friction[valve].any()]
+        told.append(min([Candidate(friction, starts, stems, fits), *known], key=lambda c: c.loss))
+    return tuple(told)

@@ -1,9 +1,13 @@
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from evidence_loops import pi_loop
 
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
+from stiction_ros.identification.evidence.engine import doubted
+from stiction_ros.identification.results import ValveEstimate
 
 
 def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:
@@ -28,3 +32,47 @@ def test_an_ideal_valve_is_not_called_sticky() -> None:
     for seed in range(3):
         found = identify(pi_loop(0.0, 0.0, seed=seed), IdentificationOptions(method="evidence"))
         assert found.valves[0].verdict is not VerdictKind.STICKY
+
+
+def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
+    record = pi_loop(3.0, 1.0, samples=1600, noise=0.1)
+    slow = record.pv.copy()
+    slow[1::2] = slow[::2]  # reported every other sample
+    held = dataclasses.replace(record, pv=slow)
+    valve = identify(held, IdentificationOptions(method="evidence")).valves[0]
+    assert valve.verdict is VerdictKind.STICKY
+    assert valve.evidence["gain_2"] > valve.evidence["gain_1"]
+    assert valve.static_interval[0] <= 3.0 <= valve.static_interval[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict"),
+    [
+        ({}, VerdictKind.STICKY),
+        ({"line_rivalry": 2.0, "outside_line": 50.0}, VerdictKind.UNDECIDED),
+        ({"line_rivalry": 2.0, "outside_line": -5.0}, VerdictKind.STICKY),
+        ({"line_rivalry": 0.1, "outside_line": 50.0}, VerdictKind.STICKY),
+        ({"loop_gone": 0.01, "controller_fit": 0.99}, VerdictKind.UNDECIDED),
+        ({"loop_gone": 0.01, "controller_fit": 0.5}, VerdictKind.STICKY),
+    ],
+)
+def test_the_loop_takes_back_what_a_wave_or_an_idle_friction_explains(
+    changes: dict[str, float], verdict: VerdictKind
+) -> None:
+    plain = {"line_rivalry": 0.0, "outside_line": -5.0, "loop_gone": 0.5, "controller_fit": 0.99}
+    valve = ValveEstimate(
+        name="V1",
+        verdict=VerdictKind.STICKY,
+        law="he",
+        static_friction=3.0,
+        static_interval=(2.5, 3.5),
+        dynamic_friction=1.0,
+        dynamic_interval=(0.5, 1.5),
+        jump=2.0,
+        stem_start=50.0,
+        moves=40,
+        evidence=plain | changes,
+    )
+    found = doubted(valve)
+    assert found.verdict is verdict
+    assert found.static_interval[0] == (2.5 if verdict is VerdictKind.STICKY else 0.0)

@@ -6,12 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.identification.evidence.kernels import (
+    Given,
     evidence,
     factorised,
     lagged,
     lagged_products,
     solved,
     whitened,
+    with_past,
 )
 from stiction_ros.identification.evidence.response_prior import ResponsePrior
 
@@ -19,10 +21,12 @@ from stiction_ros.identification.evidence.response_prior import ResponsePrior
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.integers(2, 12), st.integers(0, 20))
 def test_products_of_lags_are_those_of_the_rows(seed: int, taps: int, first: int) -> None:
-    signal = np.random.default_rng(seed).standard_normal(60)
-    rows = lagged(signal, 0.7, first, taps)
-    found = lagged_products(rows, signal, 0.7, first)
-    assert found == pytest.approx(rows @ rows.T, abs=1e-9)
+    signal, other = np.random.default_rng(seed).standard_normal((2, 60))
+    rows = lagged(signal, float(signal[0]), first, taps)
+    others = lagged(other, float(other[0]), first, taps)
+    padded = [with_past(one, taps) for one in (signal, other)]
+    found = lagged_products(padded[0], padded[1], 60 - first, taps)
+    assert found == pytest.approx(rows @ others.T, abs=1e-9)
 
 
 def test_lags_reach_back_before_the_record() -> None:
@@ -56,9 +60,8 @@ def test_evidence_is_the_marginal_likelihood_of_a_normal_record(
     random = np.random.default_rng(seed)
     stem, y = random.standard_normal(50), random.standard_normal(40)
     prior, noise = ResponsePrior(decay, 2), np.array([1.0, -0.5])
-    loss, response = evidence(
-        stem, noise, np.zeros((1, 40)), y, float(y @ y), prior.precision(taps)
-    )
+    given = Given(noise, np.zeros((1, 40)), np.empty((0, 50)), np.eye(1), y, float(y @ y))
+    loss, response = evidence(stem, given, prior.precision(taps))
     rows = lagged(whitened(noise, stem, float(stem[0])), float(stem[0]) * 0.5, 10, taps)
     kernel = np.linalg.inv(prior.precision(taps))
     covariance = np.eye(40) + rows.T @ kernel @ rows

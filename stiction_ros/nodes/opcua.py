@@ -1,0 +1,300 @@
+"""The driver of a real plant: tags of a control system to topics, and OP back under its grant."""
+
+from __future__ import annotations
+
+import functools
+import random
+import time
+from typing import Any
+
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError
+from stiction_ros.nodes.loop_topics import LoopTopics, grant_keys
+from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.messages import to_ns, values_of
+from stiction_ros.nodes.peers import publishers_of
+from stiction_ros.nodes.runner import run
+from stiction_ros.online.plain_settings import OpcuaNodeSettings
+from stiction_ros.opcua import require_asyncua
+from stiction_ros.opcua.heartbeat import IDENTITIES
+from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, WriteOrder
+from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Written
+from stiction_ros.opcua.security import Credentials
+from stiction_ros.opcua.tag_map import LoopTags, TagMap, check_address
+
+QUICKEST, SLOWEST = 0.005, 0.05  # s between two looks for samples that are due
+PART = 10  # looks in a sample
+TOLD = 20  # loops that have a status of their own each; of more, those that are not well
+GRAPH_LOOKS = 10  # looks at the loop until the next one at who commands
+
+
+class OpcuaNode(ManagedNode):
+    """Thin shell around :class:`stiction_ros.opcua.loop_bridge.LoopBridge`, one a loop."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Build the node ``opcua``; ``kwargs`` go to the ROS node."""
+        super().__init__("opcua", OpcuaNodeSettings, **kwargs)
+        self._link: PlantLink | None = None
+        self._pacer: Any = None
+        self._woken = False
+        self._graph_services: list[Any] = []
+
+    def configure(self) -> None:
+        settings = self.settings
+        require_asyncua()
+        if not settings.tags:
+            raise InputError("no tag map", where="opcua: tags", fix="set it to a *.tags.yaml")
+        self._writes = tuple(name for name in settings.write if name)
+        told = TagMap.load(find_config(settings.tags))
+        self._loops = self._chosen(told)
+        self._url = settings.url or told.server
+        check_address(self._url, "opcua: url")
+        self._credentials = Credentials(
+            settings.security,
+            settings.certificate,
+            settings.private_key,
+            settings.server_certificate,
+            settings.user,
+            settings.password_file,
+            settings.password_variable,
+        )
+        self._credentials.check(bool(self._writes))
+        self._said = "not connected yet"
+        self._losses = 0
+        self._graph_looks = 0
+        identity = random.SystemRandom().randrange(1, IDENTITIES)
+        self.bridges: dict[str, LoopBridge] = {}
+        self._topics: dict[str, LoopTopics] = {}
+        self._by_tag: dict[str, list[str]] = {}
+        for tags in self._loops:
+            self._add(tags, identity)
+        self._wakeup = self.create_guard_condition(self._serve)
+
+    def _chosen(self, told: TagMap) -> tuple[LoopTags, ...]:
+        """Return the loops that are bridged; those to be written must be able to."""
+        known = {tags.loop: tags for tags in told.loops}
+        chosen = tuple(name for name in self.settings.loops if name)
+        for key, names in (("loops", chosen), ("write", self._writes)):
+            for name in names:
+                if name not in known:
+                    raise InputError(
+                        f"no loop {name!r} in the tag map",
+                        where=f"opcua: {key}",
+                        fix=f"use {', '.join(known)}",
+                    )
+        for name in self._writes:
+            if known[name].grant is None:
+                raise InputError(
+                    f"loop {name!r} has no section write in the tag map", where="opcua: write"
+                )
+        wanted = dict.fromkeys((*chosen, *self._writes)) if chosen else known
+        return tuple(known[name] for name in wanted)
+
+    def _add(self, tags: LoopTags, identity: int) -> None:
+        """Build bridge, topics and services of one loop."""
+        settings, name = self.settings, tags.loop
+        writes = name in self._writes
+        prefix = f"{tags.namespace}/" if tags.namespace else ""
+        rules = BridgeRules(
+            settings.speed,
+            writes,
+            writes and settings.ask == "start",
+            self._commander(tags),
+            identity,
+        )
+        self.bridges[name] = LoopBridge(tags, rules, time.monotonic())
+        readers = ("controller", "estimator")
+        self._topics[name] = LoopTopics(
+            tags,
+            pv=self.outlet(JointState, f"{prefix}pv", SIGNAL_QOS, readers),
+            applied=self.outlet(JointState, f"{prefix}op_applied", SIGNAL_QOS),
+            sp=self._outlet_if(any(one.sp for one in tags.outputs), f"{prefix}sp"),
+            dv=self._outlet_if(bool(tags.disturbances), f"{prefix}dv"),
+            grant=self.outlet(String, f"{prefix}grant", LATCHED_QOS) if writes else None,
+        )
+        for tag in tags.read_tags():
+            self._by_tag.setdefault(tag, []).append(name)
+        if writes:
+            take = functools.partial(self._on_op, name)
+            self.inlet(JointState, f"{prefix}op", take, READER_QOS, ("controller",))
+            ask = functools.partial(self._on_ask, name)
+            back = functools.partial(self._on_give_back, name)
+            self._graph_services += [
+                self.create_service(Trigger, f"{prefix}ask_grant", ask),
+                self.create_service(Trigger, f"{prefix}give_back_grant", back),
+            ]
+
+    def _outlet_if(self, there: bool, topic: str) -> Any:
+        return self.outlet(JointState, topic, SIGNAL_QOS, ("controller",)) if there else None
+
+    def _commander(self, tags: LoopTags) -> str:
+        """Return the full name of the node whose OP is written."""
+        name = str(self.settings.commander)
+        if name.startswith("/"):
+            return name
+        parts = (self.get_namespace().strip("/"), tags.namespace, name)
+        return "/" + "/".join(part for part in parts if part)
+
+    def configuration(self) -> dict[str, Any]:
+        return {"url": self._url, "bridged": [tags.loop for tags in self._loops]}
+
+    def hardware(self) -> str:
+        return self._url
+
+    def activate(self) -> None:
+        read = [tag for tags in self._loops for tag in tags.read_tags()]
+        written = [
+            tag for tags in self._loops if tags.loop in self._writes for tag in tags.written_tags()
+        ]
+        publishing = self.settings.publishing
+        tags = tuple(dict.fromkeys(read))
+        settings = LinkSettings(self._url, self._credentials, tags, tuple(written), publishing)
+        self._link = PlantLink(settings, self._wake)
+        self._link.start()
+        shortest = min(bridge.period for bridge in self.bridges.values())
+        every = min(max(shortest / PART, QUICKEST), SLOWEST)
+        self._pacer = self.create_timer(every, self._serve)
+
+    def deactivate(self) -> None:
+        if self._pacer is not None:
+            self.destroy_timer(self._pacer)
+            self._pacer = None
+        link, self._link = self._link, None
+        if link is not None:
+            now = time.monotonic()
+            for bridge in self.bridges.values():
+                link.submit(bridge.give_back(now, "the node stops"))
+            link.stop()
+            self._tell_grants()
+
+    def _tear_down(self) -> None:
+        self.deactivate()
+        for service in self._graph_services:
+            self.destroy_service(service)
+        self._graph_services = []
+        super()._tear_down()
+
+    # ---- diagnostics -----------------------------------------------------------------------
+
+    def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        alive = self._link is not None and self._link.alive(time.monotonic())
+        values = [("connected", alive), ("losses", self._losses), ("loops", len(self.bridges))]
+        return ("ok" if alive else "error"), self._said, values
+
+    def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
+        now = time.monotonic()
+        found = []
+        for name, topics in self._topics.items():
+            level, text, values = topics.health(self.bridges[name], now)
+            if level != "ok" or len(self.bridges) <= TOLD:
+                found.append((level, f"loop {name}", text, values))
+        return found
+
+    def look(self) -> None:
+        self._graph_looks += 1
+        if self._graph_looks % GRAPH_LOOKS:
+            return
+        for name in self._writes:
+            topic = self._topics[name].pv.publisher.topic_name.removesuffix("pv") + "op"
+            names = publishers_of(self, topic)
+            if len(names) > 1:
+                self.notice("commanders", "error", f"op is published by {', '.join(names)}")
+
+    # ---- the plant -------------------------------------------------------------------------
+
+    def _wake(self) -> None:
+        """Called by the link's thread."""
+        if not self._woken:
+            self._woken = True
+            self._wakeup.trigger()
+
+    def _serve(self) -> None:
+        """Take in what the plant said, publish what is due, write what is to be written."""
+        self._woken = False
+        link = self._link
+        if link is None:
+            return
+        for event in link.drain():
+            if isinstance(event, Heard):
+                for name in self._by_tag[event.tag]:
+                    self._submit(self.bridges[name].hear(event.tag, event.reading, event.at))
+            elif isinstance(event, Written):
+                self._on_written(event)
+            else:
+                self._on_linked(event)
+        now = time.monotonic()
+        alive = link.alive(now)
+        for name, bridge in self.bridges.items():
+            for sample in bridge.samples(now):
+                self.stamp = sample.stamp
+                if self.running:
+                    self._topics[name].publish(sample)
+            self._submit(bridge.linked(alive, now))
+        self._tell_grants()
+
+    def _on_linked(self, event: Linked) -> None:
+        before, self._said = self._said, event.reason
+        self._losses += not event.connected
+        if event.reason == before:
+            return
+        if event.connected:  # rclpy wants one severity a line
+            self.get_logger().info(event.reason)
+        else:
+            self.get_logger().warning(event.reason)
+        self.report()
+
+    def _on_written(self, event: Written) -> None:
+        bridge, now = self.bridges[event.order.loop], time.monotonic()
+        self._submit(bridge.written(event.order, event.failure, event.seconds, now))
+
+    def _submit(self, orders: list[WriteOrder]) -> None:
+        if orders and self._link is not None:
+            self._link.submit(orders)
+
+    def _tell_grants(self) -> None:
+        """Publish every grant that has changed."""
+        for name in self._writes:
+            grant = self._topics[name].changed_grant(self.bridges[name])
+            if grant is not None:
+                self.get_logger().info(f"loop {name}: {grant.state.value}, {grant.reason}")
+                self.report([(f"grant {name}", grant.state.value, grant_keys(grant))])
+                if grant.lost:
+                    self.notice(f"grant {name}", "warn", f"loop {name}: {grant.reason}")
+
+    # ---- the loop --------------------------------------------------------------------------
+
+    def _on_op(self, name: str, message: JointState) -> None:
+        if not self.running:
+            return
+        bridge, sender = self.bridges[name], message.header.frame_id
+        op = values_of(message, [valve.name for valve in bridge.tags.valves])
+        stamp = to_ns(message.header.stamp)
+        found, orders = bridge.command(sender, stamp, op, time.monotonic())
+        complaint = bridge.op_port.complaint(found, sender)
+        if complaint:
+            self.notice(found.value, "warn", complaint)
+        self._submit(orders)
+
+    def _on_ask(self, name: str, _request: Any, response: Any) -> Any:
+        why_not = self.bridges[name].ask(time.monotonic())
+        response.success, response.message = not why_not, why_not or "asked for"
+        return response
+
+    def _on_give_back(self, name: str, _request: Any, response: Any) -> Any:
+        self._submit(self.bridges[name].give_back(time.monotonic(), "given back by service"))
+        self._tell_grants()
+        response.success, response.message = True, "given back"
+        return response
+
+
+def main() -> int:
+    """Run the node."""
+    return run("opcua", "Bridges loops of a control system by OPC UA.", OpcuaNode)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

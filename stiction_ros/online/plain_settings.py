@@ -1,0 +1,175 @@
+"""The parameters of the nodes that neither identify nor control: plant, recorder, player.
+
+They stand apart so that these nodes load nothing of control and identification.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.settings import setting
+
+PACES = ("lockstep", "realtime")
+
+
+@dataclasses.dataclass(frozen=True)
+class NodeSettings:
+    """Start-up, the same for every node."""
+
+    autostart: bool = setting(True, "configure and activate without being told", fixed=True)
+    wait_for: tuple[str, ...] = setting(
+        (),
+        "nodes of this package that must be ready, and topics (/pv, topic:pv) that must be "
+        "there, before this one begins",
+        fixed=True,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class PlantNodeSettings(NodeSettings):
+    """What the plant simulates, how long and how fast."""
+
+    model: str = setting("", "loop model file, *.loop.yaml", fixed=True)
+    set_points: str = setting(
+        "", "set-point schedule file; empty when sp comes from elsewhere", fixed=True
+    )
+    seed: int = setting(0, "seed of the noise", low=0, fixed=True)
+    samples: int = setting(0, "samples to run; 0 runs until stopped", low=0, fixed=True)
+    valve_changes: str = setting(
+        "",
+        "valves that change in mid-run: YAML text [{time: s, valve: TAG, effects: [...]}]; "
+        "empty for none",
+        fixed=True,
+    )
+    pace: str = setting(
+        "lockstep",
+        "lockstep waits for the op of each sample; realtime does not",
+        choices=PACES,
+        fixed=True,
+    )
+    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
+    commander: str = setting(
+        "controller",
+        "the only node whose op is taken, as it names itself in frame_id; without a leading "
+        "slash in the plant's namespace; empty for the first that commands",
+        fixed=True,
+    )
+    op_timeout: float = setting(
+        120.0, "s to wait for op in lockstep before the run is given up", low=0.1, high=1e5
+    )
+    start_time: float = setting(
+        1.0, "simulated time of the first sample, s", low=0.0, high=4e9, fixed=True
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class RecorderNodeSettings(NodeSettings):
+    """What is recorded, and where."""
+
+    directory: str = setting("bag", "the bag, a directory that holds nothing yet", fixed=True)
+    topics: tuple[str, ...] = setting(
+        (), "names of topics to record, beside those that regex fits", fixed=True
+    )
+    regex: str = setting(
+        "own",
+        "regular expression of the full names of topics to record; own: all in the recorder's "
+        "namespace and /clock, /diagnostics, /rosout, /parameter_events; empty for none",
+        fixed=True,
+    )
+    exclude_regex: str = setting(
+        "", "regular expression of the full names of topics to leave out", fixed=True
+    )
+    compression: str = setting(
+        "zstd", "of the finished bag", choices=("zstd", "lz4", "none"), fixed=True
+    )
+    max_bag_size: int = setting(
+        0,
+        "bytes of messages after which the bag goes on in its next file; 0 for never",
+        low=0,
+        fixed=True,
+    )
+    max_bag_duration: float = setting(
+        0.0,
+        "s of log time after which the bag goes on in its next file; 0 for never",
+        low=0.0,
+        high=1e9,
+        fixed=True,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class PlayerNodeSettings(NodeSettings):
+    """What is played, how fast and from where."""
+
+    bag: str = setting("", "rosbag2 directory or .mcap file", fixed=True)
+    rate: float = setting(1.0, "recorded seconds per second", low=1e-3, high=1e6)
+    start: float = setting(0.0, "seconds of the bag that are passed over", low=0.0, fixed=True)
+    loop: bool = setting(False, "begin again at the end", fixed=True)
+    paused: bool = setting(False, "wait for ~/resume or ~/step at the beginning", fixed=True)
+    topics: str = setting(
+        "(?!/(rosout|parameter_events)$).*",
+        "regular expression of the full names of the topics to play",
+        fixed=True,
+    )
+    clock: str = setting(
+        "auto",
+        "auto: the recorded /clock, or the player's own where there is none; "
+        "own: the player's own; none: no /clock",
+        choices=("auto", "own", "none"),
+        fixed=True,
+    )
+    clock_rate: float = setting(
+        40.0, "messages per second of the player's own /clock", low=0.1, high=1000.0, fixed=True
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class OpcuaNodeSettings(NodeSettings):
+    """Which control system is listened to, how, and what may be written there."""
+
+    tags: str = setting("", "tag map, *.tags.yaml", fixed=True)
+    url: str = setting(
+        "", "address of the server, opc.tcp://HOST:PORT; empty for that of the tag map", fixed=True
+    )
+    loops: tuple[str, ...] = setting((), "loops of the tag map; empty for all", fixed=True)
+    security: str = setting(
+        "sign_and_encrypt",
+        "sign_and_encrypt (Basic256Sha256), or none, by which nothing can be written",
+        choices=("sign_and_encrypt", "none"),
+        fixed=True,
+    )
+    certificate: str = setting("", "file of our certificate, DER", fixed=True)
+    private_key: str = setting("", "file of our key, PEM, mode 600", fixed=True)
+    server_certificate: str = setting(
+        "", "file of the certificate that the server must show, DER", fixed=True
+    )
+    user: str = setting("", "name of the user; empty for none", fixed=True)
+    password_file: str = setting("", "file of the user's password, mode 600", fixed=True)
+    password_variable: str = setting(
+        "", "environment variable of the user's password, in place of the file", fixed=True
+    )
+    publishing: float = setting(
+        0.1, "s between two publications of the server", low=0.005, high=60.0, fixed=True
+    )
+    write: tuple[str, ...] = setting(
+        (), "loops whose OP may be written while the plant grants it; empty for none", fixed=True
+    )
+    ask: str = setting(
+        "service",
+        "when the grant is asked for: by the service ask_grant of the loop, or once at the start",
+        choices=("service", "start"),
+        fixed=True,
+    )
+    commander: str = setting(
+        "controller",
+        "the only node whose op is written, as it names itself in frame_id; without a leading "
+        "slash in the loop's namespace",
+        fixed=True,
+    )
+    speed: float = setting(
+        1.0,
+        "seconds of the plant per second, other than 1 for a simulated one",
+        low=1e-3,
+        high=1e6,
+        fixed=True,
+    )

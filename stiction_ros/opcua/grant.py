@@ -1,0 +1,113 @@
+"""Who may write: a grant that is asked for, given by the plant, and lost at the first doubt."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+
+class GrantState(enum.Enum):
+    """Where the handshake stands."""
+
+    LISTENING = "listening"
+    """Nothing is ever written."""
+    IDLE = "idle"
+    """Nothing is asked for; the plant's own controller has the valves."""
+    ASKED = "asked"
+    """Remote operation is asked for; the mode does not grant it yet."""
+    GRANTED = "granted"
+    """The mode of each valve grants it; OP is written."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Facts:
+    """What is known at one look.
+
+    Attributes:
+        now: s on our clock.
+        granted: whether the mode of every valve grants remote operation, by good quality.
+        fault: what speaks against writing now; empty for nothing.
+        foreign: whether another one lets the heartbeat rise.
+    """
+
+    now: float
+    granted: bool
+    fault: str = ""
+    foreign: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Grant:
+    """The state of the handshake, as a value.
+
+    Attributes:
+        state: where it stands.
+        since: s on our clock.
+        reason: why it stands there.
+        wanted: whether it is to be asked for as soon as nothing speaks against it.
+        lost: whether it was asked for or granted before and is so no longer.
+    """
+
+    state: GrantState
+    since: float
+    reason: str
+    wanted: bool = False
+    lost: bool = False
+
+    @property
+    def requesting(self) -> bool:
+        """Whether the request stands and the heartbeat rises."""
+        return self.state in (GrantState.ASKED, GrantState.GRANTED)
+
+    @property
+    def may_write(self) -> bool:
+        """Whether an OP may be written."""
+        return self.state is GrantState.GRANTED
+
+    def ask(self) -> Grant:
+        """Want the grant; nothing changes where nothing is ever written."""
+        if self.state is not GrantState.IDLE:
+            return self
+        return dataclasses.replace(self, wanted=True, lost=False)
+
+    def give_back(self, now: float, reason: str) -> Grant:
+        """Return to idle, and stay there until it is asked for again."""
+        if self.state is GrantState.LISTENING:
+            return self
+        return Grant(GrantState.IDLE, now, reason, lost=self.requesting)
+
+    def follow(self, facts: Facts) -> Grant:
+        """Return what becomes of it.
+
+        - idle and wanted: asked, once nothing speaks against it and nobody else asks.
+        - asked: granted when every mode says so; idle at a fault.
+        - granted: idle at a fault, another writer, or as soon as a mode says otherwise.
+
+        A grant that was lost is not asked for again by itself: the operator may have meant it.
+        """
+        if self.state is GrantState.LISTENING or (not self.wanted and not self.requesting):
+            return self
+        if self.state is GrantState.IDLE:
+            if facts.fault or facts.foreign:
+                why = facts.fault or "another one lets the heartbeat rise"
+                return dataclasses.replace(self, reason=f"waits: {why}")
+            if facts.granted:
+                why = "the mode grants what was not asked for"
+                return dataclasses.replace(self, reason=f"waits: {why}")
+            return Grant(GrantState.ASKED, facts.now, "waits for the operator")
+        if facts.fault:
+            return self.give_back(facts.now, facts.fault)
+        if facts.foreign:
+            return self.give_back(facts.now, "another one lets the heartbeat rise")
+        if self.state is GrantState.ASKED and facts.granted:
+            return Grant(GrantState.GRANTED, facts.now, "granted by the mode")
+        if self.state is GrantState.GRANTED and not facts.granted:
+            return self.give_back(facts.now, "taken back by the mode")
+        return self
+
+
+def begin(now: float, writes: bool) -> Grant:
+    """Return the grant of a node that has just begun."""
+    if writes:
+        return Grant(GrantState.IDLE, now, "not asked for")
+    return Grant(GrantState.LISTENING, now, "writing is off")

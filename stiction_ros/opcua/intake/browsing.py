@@ -1,0 +1,125 @@
+"""A tag map made by browsing a server: loops are what has a PV and an OP under one name."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from stiction_ros.errors import InputError
+from stiction_ros.opcua.security import Credentials
+from stiction_ros.opcua.session import node_ids, open_client
+
+if TYPE_CHECKING:
+    from asyncua import Client
+
+DEPTH = 8  # levels of folders
+MOST = 200_000  # nodes that are looked at
+
+
+@dataclasses.dataclass(frozen=True)
+class TagNames:
+    """How the control system calls the tags of a controller; ``sp`` and ``mode`` may lack."""
+
+    pv: str = "PV"
+    op: str = "OUT"
+    sp: str = "SP"
+    mode: str = "MODE"
+
+    def key_of(self, name: str) -> str:
+        """Return which of them ``name`` is; empty for none."""
+        for key in ("pv", "op", "sp", "mode"):
+            if name.casefold() == getattr(self, key).casefold():
+                return key
+        return ""
+
+
+async def browse(url: str, credentials: Credentials, root: str) -> dict[tuple[str, str], str]:
+    """Return node ids of all variables below ``root`` by group and name.
+
+    ``FIC101.PV`` is PV of the group FIC101, and so is a variable PV in a folder FIC101. Node ids
+    name their namespace.
+
+    Args:
+        url: of the server.
+        credentials: of the session.
+        root: node id to begin at; empty for the folder Objects.
+
+    Raises:
+        InputError: no such node, or more than 200 000 nodes.
+        OSError, TimeoutError, asyncua.ua.UaError: the session was lost, or refused.
+    """
+    client = await open_client(url, credentials)
+    try:
+        return await _browse(client, root)
+    finally:
+        await client.disconnect()
+
+
+async def _browse(client: Client, root: str) -> dict[tuple[str, str], str]:
+    from asyncua import ua
+
+    spaces = await client.get_namespace_array()
+    begin = client.nodes.objects
+    if root:
+        begin = client.get_node((await node_ids(client, [root]))[root])
+    found: dict[tuple[str, str], str] = {}
+    level: list[tuple[Any, str]] = [(begin, "")]
+    seen: set[Any] = set()
+    for _ in range(DEPTH):
+        below: list[tuple[Any, str]] = []
+        for node, folder in level:
+            for one in await node.get_references(
+                ua.ObjectIds.HierarchicalReferences, ua.BrowseDirection.Forward
+            ):
+                if one.NodeId in seen or one.NodeId.NamespaceIndex == 0:
+                    continue
+                seen.add(one.NodeId)
+                if len(seen) > MOST:
+                    raise InputError(f"more than {MOST} nodes", where=url_of(client), fix="--root")
+                name = one.BrowseName.Name
+                if one.NodeClass == ua.NodeClass.Variable:
+                    group, _, last = name.rpartition(".")
+                    found[group or folder, last] = _named(one.NodeId.to_string(), spaces)
+                below.append((client.get_node(one.NodeId), name))
+        level = below
+    return found
+
+
+def url_of(client: Client) -> str:
+    """Return the address of a client without anything secret."""
+    return str(client.server_url.geturl())
+
+
+def loops_of(
+    found: Mapping[tuple[str, str], str], names: TagNames, sample_time: float
+) -> list[dict[str, Any]]:
+    """Return the loops of a tag map, one for each group that has a PV and an OP."""
+    groups: dict[str, dict[str, str]] = {}
+    for (group, name), node in found.items():
+        key = names.key_of(name)
+        if key:
+            groups.setdefault(group, {})[key] = node
+    loops, taken = [], set()
+    for group, tags in sorted(groups.items()):
+        name = re.sub(r"\W+", "_", group, flags=re.ASCII).strip("_")
+        name = name if name[:1].isalpha() else f"L{name}"
+        if not {"pv", "op"} <= set(tags) or name in taken:
+            continue
+        taken.add(name)
+        output = {"name": "PV1", "pv": tags["pv"]} | ({"sp": tags["sp"]} if "sp" in tags else {})
+        valve = {"name": "V1", "op_read": tags["op"]}
+        valve |= {"mode": tags["mode"]} if "mode" in tags else {}
+        loops.append(
+            {"loop": name, "sample_time": sample_time, "outputs": [output], "valves": [valve]}
+        )
+    return loops
+
+
+def _named(node: str, spaces: list[str]) -> str:
+    """Return a node id with the name of its namespace, as its number may change."""
+    match = re.match(r"ns=(\d+);", node)
+    if match is None or int(match[1]) >= len(spaces):
+        return node
+    return f"nsu={spaces[int(match[1])]};{node[match.end() :]}"

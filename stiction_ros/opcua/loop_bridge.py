@@ -1,0 +1,334 @@
+"""One loop between its tags and its topics: what goes out, what may be written, and why."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections import Counter
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.online.health import stopped_after
+from stiction_ros.online.op_port import CommandRules, OpPort, Reception
+from stiction_ros.opcua.grant import Facts, GrantState, begin
+from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
+from stiction_ros.opcua.op_limits import OpLimits
+from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.opcua.sampling import LoopSampler, PlantSample
+from stiction_ros.opcua.tag_map import GrantTags, LoopTags
+
+PATIENCE = 3  # samples of bad quality in succession before the plant takes over
+BEATS = 5  # beats in the time of the watchdog
+SLOW = 2  # a part of the watchdog's time: an answer may take that long
+AGAIN = 1.0  # s between two attempts to take a request back
+MODE_REFUSES = "the mode does not grant it"
+
+
+class OrderKind(enum.Enum):
+    """What is written."""
+
+    REQUEST = "request"
+    BEAT = "beat"
+    OP = "op"
+
+
+@dataclasses.dataclass(frozen=True)
+class WriteOrder:
+    """What to write in one call of the service.
+
+    Attributes:
+        loop: that it belongs to.
+        kind: of what.
+        values: node and value each.
+        modes: nodes that must say one of ``granted`` right before it is written.
+        granted: see ``modes``.
+        expires: s on our clock after which it is not written any more.
+    """
+
+    loop: str
+    kind: OrderKind
+    values: tuple[tuple[str, float], ...]
+    expires: float
+    modes: tuple[str, ...] = ()
+    granted: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class BridgeRules:
+    """How a loop is bridged.
+
+    Attributes:
+        speed: seconds of the plant per second of our clock.
+        writes: whether anything may be written at all.
+        asks: whether the grant is asked for at the start.
+        commander: full name of the node whose OP is taken; empty for the first that commands.
+        identity: number that tells our heartbeat from others', 1 … 32 767.
+    """
+
+    speed: float = 1.0
+    writes: bool = False
+    asks: bool = False
+    commander: str = ""
+    identity: int = 1
+
+
+class LoopBridge:
+    """Hands tags to a :class:`LoopSampler`, and OPs to the plant as long as it grants them.
+
+    All times are s on one clock that only rises, handed in by the caller. The bridge itself
+    writes nothing: it returns orders, and is told by :meth:`written` what became of each.
+
+    What speaks against writing (and gives a grant back at once): no connection or no keep-alive;
+    the plant's own heartbeat standing still; three samples in succession with a bad PV; OP in
+    force, mode or limits of bad quality; OP in force beyond the limits; no OP from the commander
+    for three samples; a write that is refused, or that takes longer than half the watchdog's time.
+    """
+
+    def __init__(self, tags: LoopTags, rules: BridgeRules, now: float) -> None:
+        """Begin to listen; ``rules.writes`` needs ``tags.grant``."""
+        self.tags, self.rules = tags, rules
+        self.sampler = LoopSampler(tags, rules.speed)
+        self.grant = begin(now, rules.writes and tags.grant is not None)
+        if rules.asks:
+            self.grant = self.grant.ask()
+        self.op_port = OpPort(CommandRules(rules.commander, tags.step, exact=False))
+        self.counts: Counter[str] = Counter()
+        self._beat, self._foreign, self._plant = OwnBeat(rules.identity), HeardBeat(), HeardBeat()
+        self._alive = False
+        self._alive_since = self._command_at = self._beat_at = now
+        self._told = 0.0  # what the request says, as far as we wrote it
+        self._tried: tuple[float, float] | None = None  # a request that is under way, and when
+        self._bad = 0  # samples of bad quality in succession
+        self._stamp: int | None = None
+        self._writing: FloatArray | None = None  # an OP that is under way
+        self._last: tuple[FloatArray, float] | None = None  # OP written in this grant, and when
+        self._read_at: dict[str, float] = {}
+
+    @property
+    def period(self) -> float:
+        """A sample, s on our clock."""
+        return self.tags.sample_time / self.rules.speed
+
+    # ---- what is heard ---------------------------------------------------------------------
+
+    def linked(self, alive: bool, now: float) -> list[WriteOrder]:
+        """Take in whether the server is heard, and return what is to be written."""
+        if alive and not self._alive:
+            self._alive_since = now
+        if not alive:
+            self._writing = None  # nobody will tell what became of it
+        self._alive = alive
+        return self.look(now)
+
+    def hear(self, tag: str, reading: TagReading, now: float) -> list[WriteOrder]:
+        """Take in what was reported of a tag, and return what is to be written."""
+        told = self.tags.grant
+        if told is not None and tag in (told.heartbeat, told.alive):
+            self._hear_beat(told, tag, reading, now)
+            return []
+        self.sampler.hear(tag, reading, now)
+        self._read_at[tag] = now
+        if self.rules.writes and any(tag == valve.mode for valve in self.tags.valves):
+            return self.look(now)
+        return []
+
+    def _hear_beat(self, told: GrantTags, tag: str, reading: TagReading, now: float) -> None:
+        """Take in a heartbeat; what counts of it is that it changes, not its stamp."""
+        beat = reading.number
+        if not np.isfinite(beat):
+            return
+        if tag == told.alive:
+            self._plant.hear(beat, now, reading.first)
+        elif identity_of(beat) != self.rules.identity:
+            self._foreign.hear(beat, now, reading.first)
+
+    def samples(self, now: float) -> list[PlantSample]:
+        """Return the samples that are closed by now."""
+        found = self.sampler.due(now, self._alive)
+        for sample in found:
+            self._stamp = sample.stamp
+            good = np.isfinite(sample.pv).all()
+            self._bad = 0 if good else self._bad + 1
+        return found
+
+    # ---- the grant -------------------------------------------------------------------------
+
+    def ask(self, now: float) -> str:
+        """Ask for the grant; return why not, empty when it is asked for."""
+        if self.grant.state is GrantState.LISTENING:
+            return "writing is off"
+        if self.grant.state is not GrantState.IDLE:
+            return f"{self.grant.state.value} already"
+        self.grant = self.grant.ask()
+        return ""
+
+    def give_back(self, now: float, reason: str) -> list[WriteOrder]:
+        """Leave the valves to the plant, and return what is to be written."""
+        self.grant = self.grant.give_back(now, reason)
+        return self.look(now)
+
+    def look(self, now: float) -> list[WriteOrder]:
+        """Follow the grant, and return the request and the beat that are to be written."""
+        if self.grant.state is GrantState.LISTENING:
+            return []
+        before = self.grant.state
+        facts = Facts(now, self._is_granted(), self._fault(now), self._foreign_beats(now))
+        self.grant = self.grant.follow(facts)
+        if self.grant.state is not before:
+            self._last = None
+        return [*self._request(now), *self._beats(now)]
+
+    def _is_granted(self) -> bool:
+        """Return whether the mode of every valve grants it."""
+        assert self.tags.grant is not None
+        found = [self.sampler.latest(valve.mode) for valve in self.tags.valves]
+        return all(
+            one.quality is TagQuality.GOOD and mode_text(one.value) in self.tags.grant.granted
+            for one in found
+        )
+
+    def _foreign_beats(self, now: float) -> bool:
+        assert self.tags.grant is not None
+        return self._foreign.beats(now, self.tags.grant.watchdog)
+
+    def _fault(self, now: float) -> str:
+        """Return what speaks against writing; empty for nothing."""
+        told = self.tags.grant
+        assert told is not None
+        if not self._alive:
+            return "nothing is heard of the server"
+        since = self._alive_since
+        if told.alive and self._plant.silent_for(now, since) > told.watchdog:
+            return "the plant's heartbeat stands still"
+        if self._bad >= PATIENCE or self._stamp is None:
+            return "PV of bad quality" if self._stamp is not None else "no sample yet"
+        for valve in self.tags.valves:
+            if self.sampler.latest(valve.mode).quality is not TagQuality.GOOD:
+                return f"mode of {valve.name} of bad quality"
+        if not np.isfinite(self._op_read()).all():
+            return "OP in force of bad quality"
+        limits = self.limits()
+        if limits is None:
+            return "limits of bad quality"
+        if not limits.within(self._op_read()):
+            return "OP in force beyond its limits"
+        if now - self._command_at > stopped_after(self.period):
+            return f"no op from {self.op_port.commander or 'anyone'}"
+        if not self.grant.requesting and now - since < told.watchdog / SLOW:
+            return "listens for other writers"
+        return ""
+
+    def _op_read(self) -> FloatArray:
+        return np.array([self.sampler.number(valve.op_read) for valve in self.tags.valves])
+
+    def limits(self) -> OpLimits | None:
+        """Return the limits in force; None when one that the plant sets is not known."""
+        low, high = [], []
+        for valve in self.tags.valves:
+            lows = [self.sampler.number(valve.low)] if valve.low else []
+            highs = [self.sampler.number(valve.high)] if valve.high else []
+            if not np.isfinite([*lows, *highs]).all():
+                return None
+            low.append(max(valve.limits[0], *lows, valve.limits[0]))
+            high.append(min(valve.limits[1], *highs, valve.limits[1]))
+        rate = [valve.rate for valve in self.tags.valves]
+        return OpLimits(np.array(low), np.array(high), np.array(rate))
+
+    def _request(self, now: float) -> list[WriteOrder]:
+        told = self.tags.grant
+        assert told is not None
+        wanted = 1.0 if self.grant.requesting else 0.0
+        if wanted == self._told or not self._alive:
+            return []
+        if not wanted and self._foreign_beats(now):
+            self._told = 0.0  # the request is another one's by now
+            return []
+        if self._tried is not None and self._tried[0] == wanted and now - self._tried[1] < AGAIN:
+            return []
+        self._tried = wanted, now
+        values = ((told.request, wanted),)
+        return [WriteOrder(self.tags.loop, OrderKind.REQUEST, values, now + told.watchdog)]
+
+    def _beats(self, now: float) -> list[WriteOrder]:
+        told = self.tags.grant
+        assert told is not None
+        if not self.grant.requesting or now - self._beat_at < told.watchdog / BEATS:
+            return []
+        self._beat_at = now
+        values = ((told.heartbeat, float(self._beat.next())),)
+        return [WriteOrder(self.tags.loop, OrderKind.BEAT, values, now + told.watchdog / BEATS)]
+
+    # ---- the OP ----------------------------------------------------------------------------
+
+    def command(
+        self, sender: str, stamp: int, op: FloatArray | None, now: float
+    ) -> tuple[Reception, list[WriteOrder]]:
+        """Judge an OP, and return what of it is to be written now."""
+        present = self._stamp if self._stamp is not None else stamp - 1
+        found = self.op_port.judge(sender, stamp, op, present)
+        if found not in (Reception.TAKEN, Reception.LATE) or op is None:
+            return found, []
+        self._command_at = now
+        orders = self.look(now)
+        if self.grant.may_write:
+            orders += self._write(op, now)
+        return found, orders
+
+    def _write(self, wanted: FloatArray, now: float) -> list[WriteOrder]:
+        limits, told = self.limits(), self.tags.grant
+        assert told is not None
+        if self._writing is not None:
+            self.counts["op_under_way"] += 1
+            return []
+        if limits is None:
+            return []
+        in_force, elapsed = self._op_read(), 0.0
+        if self._last is not None:
+            written, at = self._last
+            heard = [self._read_at.get(valve.op_read, at) for valve in self.tags.valves]
+            in_force = np.where(np.array(heard) > at, in_force, written)
+            elapsed = min((now - at) * self.rules.speed, self.tags.sample_time)
+        op = limits.allowed(wanted, in_force, elapsed)
+        if (np.abs(op - wanted) > 1e-9).any():
+            self.counts["op_limited"] += 1
+        self._writing = op
+        values = tuple((v.op, float(x)) for v, x in zip(self.tags.valves, op, strict=True))
+        modes = tuple(valve.mode for valve in self.tags.valves)
+        expires = now + max(self.period, 0.1)
+        return [WriteOrder(self.tags.loop, OrderKind.OP, values, expires, modes, told.granted)]
+
+    def written(
+        self, order: WriteOrder, failure: str, seconds: float, now: float
+    ) -> list[WriteOrder]:
+        """Take in what became of an order, and return what is to be written.
+
+        Args:
+            order: as it was returned.
+            failure: why it was not written; empty when it was.
+            seconds: that the server took.
+            now: s on our clock.
+        """
+        told = self.tags.grant
+        assert told is not None
+        self.counts[f"{order.kind.value}_{'failed' if failure else 'written'}"] += 1
+        if order.kind is OrderKind.REQUEST and not failure:
+            self._told = order.values[0][1]
+        if order.kind is OrderKind.OP:
+            if not failure and self._writing is not None:
+                self._last = self._writing, now
+            self._writing = None
+        if failure and self.grant.requesting:
+            return self.give_back(now, f"{order.kind.value} not written: {failure}")
+        if seconds > told.watchdog / SLOW and self.grant.requesting:
+            return self.give_back(now, f"the server took {seconds:.1f} s to answer")
+        return []
+
+
+def mode_text(value: float | str | None) -> str:
+    """Return a mode as the tag map writes it: a name, or a whole number."""
+    if isinstance(value, str):
+        return value
+    if value is None or not float(value).is_integer():
+        return ""
+    return str(int(value))

@@ -1,0 +1,156 @@
+"""One session with a server: opened by credentials, read, written, its errors in words."""
+
+from __future__ import annotations
+
+import asyncio
+import datetime
+import logging
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from stiction_ros.errors import InputError
+from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, mode_text
+from stiction_ros.opcua.reading import TagQuality, TagReading, quality_of
+from stiction_ros.opcua.security import CLIENT_URI, Credentials, check_dates, load_certificate
+
+if TYPE_CHECKING:
+    from asyncua import Client, ua
+
+ANSWER = 6.0  # s for which an answer of the server is waited for
+PROBE = 5.0  # s between two questions whether the server still answers
+EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
+
+
+async def open_client(url: str, credentials: Credentials) -> Client:
+    """Return a client with an active session, as the credentials ask for.
+
+    Raises:
+        InputError: files that cannot be used, or certificates that have expired.
+        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be reached, or refuses.
+    """
+    from asyncua import Client, ua
+    from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+
+    logging.getLogger("asyncua").setLevel(logging.CRITICAL)
+    client = Client(url, timeout=ANSWER, watchdog_intervall=PROBE)
+    client.application_uri = CLIENT_URI
+    client.name = client.description = "stiction_ros"
+    if credentials.security != "none":
+        for path in (credentials.certificate, credentials.server_certificate):
+            check_dates(load_certificate(Path(path)), path)
+        await client.set_security(
+            SecurityPolicyBasic256Sha256,
+            certificate=Path(credentials.certificate),
+            private_key=Path(credentials.private_key),
+            server_certificate=Path(credentials.server_certificate),
+            mode=ua.MessageSecurityMode.SignAndEncrypt,
+        )
+    if credentials.user:
+        client.set_user(credentials.user)
+        client.set_password(credentials.password())
+    await asyncio.wait_for(client.connect(), 2 * ANSWER)
+    return client
+
+
+async def node_ids(client: Client, tags: Sequence[str]) -> dict[str, ua.NodeId]:
+    """Return the node id of each tag; ``nsu=URI;`` is looked up in the server's namespaces.
+
+    Raises:
+        InputError: a namespace that the server does not have, or no node id.
+    """
+    from asyncua import ua
+
+    spaces = await client.get_namespace_array()
+    found = {}
+    for tag in dict.fromkeys(tags):
+        text = tag
+        if tag.startswith("nsu="):
+            uri, _, rest = tag[4:].partition(";")
+            if uri not in spaces:
+                raise InputError(f"the server has no namespace {uri}", where=f"tag {tag}")
+            text = f"ns={spaces.index(uri)};{rest}"
+        try:
+            found[tag] = ua.NodeId.from_string(text)
+        except ua.UaError:
+            raise InputError("is no node id", where=f"tag {tag}") from None
+    return found
+
+
+def reading_of(value: ua.DataValue | None, first: bool) -> TagReading:
+    """Return what a data value says; the server's stamp serves where the source has none."""
+    stamp = None if value is None else value.SourceTimestamp or value.ServerTimestamp
+    if value is None or stamp is None:
+        return TagReading(None, TagQuality.BAD, 0, first)
+    stamp = stamp if stamp.tzinfo else stamp.replace(tzinfo=datetime.UTC)
+    spent = stamp - EPOCH
+    nanoseconds = (spent.days * 86_400 + spent.seconds) * 1_000_000_000 + spent.microseconds * 1000
+    code = value.StatusCode.value if value.StatusCode is not None else 0
+    content = value.Value.Value if value.Value is not None else None
+    quality = quality_of(code)
+    if not isinstance(content, bool | int | float | str):
+        content, quality = None, max(quality, TagQuality.BAD)
+    plain = content if isinstance(content, str) or content is None else float(content)
+    return TagReading(plain, quality, nanoseconds, first)
+
+
+def describe(error: BaseException) -> str:
+    """Return an error of the network or of OPC UA in one line without secrets."""
+    from asyncua import ua
+
+    if isinstance(error, ua.UaStatusCodeError):
+        return f"the server answers {ua.StatusCode(error.code).name}"
+    if isinstance(error, TimeoutError):
+        return "the server does not answer"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+async def kinds_of(client: Client, written: dict[str, ua.NodeId]) -> dict[str, ua.VariantType]:
+    """Return the type of number that each written tag takes."""
+    return {
+        tag: await client.get_node(node).read_data_type_as_variant_type()
+        for tag, node in written.items()
+    }
+
+
+async def write(
+    client: Client,
+    order: WriteOrder,
+    resolve: dict[str, ua.NodeId],
+    kinds: dict[str, ua.VariantType],
+) -> str:
+    """Write one order, if the modes still grant it; return why not, empty when it is written."""
+    from asyncua import ua
+
+    try:
+        if order.modes:
+            modes = await client.read_attributes([client.get_node(resolve[m]) for m in order.modes])
+            found = [reading_of(one, first=True) for one in modes]
+            if any(
+                one.quality is not TagQuality.GOOD or mode_text(one.value) not in order.granted
+                for one in found
+            ):
+                return MODE_REFUSES
+        if time.monotonic() > order.expires:
+            return "it came too late to be written"
+        nodes = [resolve[tag] for tag, _ in order.values]
+        values = [
+            ua.DataValue(ua.Variant(_as_kind(value, kinds[tag]), kinds[tag]))
+            for tag, value in order.values
+        ]
+        results = await client.uaclient.write_attributes(nodes, values, ua.AttributeIds.Value)
+    except (OSError, TimeoutError, ua.UaError) as error:
+        return describe(error)
+    bad = next((result for result in results if not result.is_good()), None)
+    return "" if bad is None else f"the server answers {bad.name}"
+
+
+def _as_kind(value: float, kind: ua.VariantType) -> bool | int | float:
+    from asyncua import ua
+
+    if kind is ua.VariantType.Boolean:
+        return bool(value)
+    if kind in (ua.VariantType.Float, ua.VariantType.Double):
+        return float(value)
+    return round(value)

@@ -1,0 +1,135 @@
+"""History of a real server becomes the record that was lived through."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plant_process import START, PlantProcess, wait_until
+from small_maps import OP, PV, SP, loop_tags
+from stiction_ros.records.csv_file import read_csv_parts
+
+from stiction_ros.cli.main import main
+from stiction_ros.errors import InputError
+from stiction_ros.opcua.intake import history
+from stiction_ros.opcua.intake.history import HistoryFile, Span, record_of
+from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.records.quality import Quality
+
+SCANS = 60
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PlantProcess]:
+    process = PlantProcess(tmp_path_factory.mktemp("kept") / "plant", speed=2400.0, history=True)
+    process.start()
+    wait_until(lambda: len(process.events("out")) > SCANS, "scans")
+    yield process
+    process.stop()
+
+
+def iso(sample: int) -> str:
+    seconds = START // 1_000_000_000 + 60 * sample
+    return datetime.datetime.fromtimestamp(seconds, datetime.UTC).isoformat()
+
+
+def call(plant: PlantProcess, out: Path, **changes: str) -> int:
+    told = plant.credentials("reader")
+    options = {
+        "--tags": str(plant.map_file),
+        "--from": iso(5),
+        "--to": iso(SCANS - 5),
+        "--out": str(out),
+        "--certificate": told.certificate,
+        "--private-key": told.private_key,
+        "--server-certificate": told.server_certificate,
+        "--user": told.user,
+        "--password-file": told.password_file,
+        **changes,
+    }
+    pairs = [part for pair in options.items() for part in pair]
+    return main(["fetch-history", plant.url, *pairs])
+
+
+def test_pages_become_the_record(
+    plant: PlantProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(history, "PAGE", 7)
+    assert call(plant, tmp_path) == 0
+    (record,) = read_csv_parts(tmp_path / "tank.csv")
+    assert (record.valves, record.outputs) == (("V1", "V2"), ("C", "T"))
+    assert len(record) == SCANS - 9
+    outs = {one["stamp"]: one["out"] for one in plant.events("out")}
+    told = [outs[START + 60_000_000_000 * k] for k in range(5, SCANS - 4)]
+    np.testing.assert_array_equal(record.op, told)
+    assert record.sp is not None
+    assert (record.quality == Quality.GOOD).all()
+    assert len(np.unique(record.pv[:, 0])) == len(record)
+
+
+def test_what_was_broken_off_goes_on(plant: PlantProcess, tmp_path: Path) -> None:
+    assert call(plant, tmp_path) == 0
+    whole = {path: path.read_text() for path in (tmp_path / "raw").glob("*.txt")}
+    assert len(whole) == 6
+    for path, text in whole.items():
+        path.write_text(text[: len(text) // 2])
+        path.with_suffix(".done").unlink()
+    (tmp_path / "tank.csv").unlink()
+    assert call(plant, tmp_path) == 0
+    assert {path: path.read_text() for path in whole} == whole
+
+
+def test_another_stretch_is_not_mixed_in(
+    plant: PlantProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(plant, tmp_path) == 0
+    assert call(plant, tmp_path, **{"--to": iso(30)}) == 2
+    assert "other history" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"--to": "2001-01-01"}, "--from"),
+        ({"--from": "yesterday"}, "no time"),
+        ({"--password-file": ""}, "password_file"),
+    ],
+)
+def test_what_cannot_be_fetched_is_said(
+    plant: PlantProcess,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    changes: dict[str, str],
+    said: str,
+) -> None:
+    assert call(plant, tmp_path, **changes) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_bad_values_are_marked_and_op_belongs_to_most_of_its_sample(tmp_path: Path) -> None:
+    second = 1_000_000_000
+    span = Span(0, 10 * second)
+    told = {
+        PV: [(float(k), TagQuality.BAD if k == 4 else TagQuality.GOOD, k) for k in range(1, 10)],
+        SP: [(5.0, TagQuality.GOOD, 0)],
+        OP: [
+            (40.0, TagQuality.GOOD, 0),
+            (41.0, TagQuality.GOOD, 2.4),
+            (42.0, TagQuality.GOOD, 5.6),
+        ],
+    }
+    files = {}
+    for number, (tag, values) in enumerate(told.items()):
+        files[tag] = HistoryFile(tmp_path / f"{number}.txt")
+        files[tag].begin(tag, span)
+        files[tag].append([TagReading(v, q, round(at * second)) for v, q, at in values])
+    record = record_of(loop_tags(), files, span)
+    assert record.op[:, 0].tolist() == [40.0, 41.0, 41.0, 41.0, 41.0, 42.0, 42.0, 42.0, 42.0]
+    assert np.flatnonzero(record.quality == Quality.BAD).tolist() == [3]
+    files[PV] = HistoryFile(tmp_path / "none.txt")
+    files[PV].begin(PV, span)
+    with pytest.raises(InputError, match="no history"):
+        record_of(loop_tags(), files, span)

@@ -1,0 +1,91 @@
+"""The documentation site, and what a maintainer is told."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+import stiction_ros
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
+
+
+def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    page = (tmp_path / "api" / "identification" / "index.html").read_text(encoding="utf-8")
+    assert "stiction_ros.identification.methods.identify" in page
+    assert ":class:" not in page
+    assert ".. math::" not in page
+
+
+def test_every_page_is_in_the_contents() -> None:
+    contents = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
+    named = set(re.findall(r"[\w/]+\.md", str(contents)))
+    assert named == {str(page.relative_to(ROOT / "docs")) for page in PAGES}
+
+
+def test_every_public_name_has_its_page() -> None:
+    shown = re.findall(
+        r"^::: ([\w.]+)$",
+        "\n".join(page.read_text(encoding="utf-8") for page in PAGES),
+        re.MULTILINE,
+    )
+    homes = {
+        f"stiction_ros.{home.replace(':', '.') if ':' in home else f'{home}.{name}'}"
+        for name, home in stiction_ros._HOMES.items()
+    }
+    assert sorted(shown) == sorted(homes)
+
+
+@pytest.mark.parametrize(
+    "path", [ROOT / "README.md", *ROOT.glob("[AC]*.md")], ids=lambda path: path.name
+)
+def test_files_and_links_that_are_named_exist(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#:]+)\)", text)
+    files = re.findall(r"`((?:stiction_ros|examples|docs|tools|test|config)/[\w./]+\.\w+)`", text)
+    missing = [name for name in (*links, *files) if not (ROOT / name).exists()]
+    assert not missing
+
+
+def test_the_maintainer_s_kit_is_there() -> None:
+    for name in ("ARCHITECTURE", "CONTRIBUTING", "CHANGELOG"):
+        assert len((ROOT / f"{name}.md").read_text(encoding="utf-8").splitlines()) > 20
+    latest = re.search(r"^## (\d+\.\d+\.\d+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert latest is not None
+    assert latest.group(1) == stiction_ros.__version__
+
+
+def test_the_forge_runs_what_ci_runs() -> None:
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "checks.yml").read_text())
+    steps = [step.get("run") for step in workflow["jobs"]["test"]["steps"]]
+    assert ".ci/run" in steps
+    assert "make docs" in steps
+
+
+def test_the_first_program_of_the_readme_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    after = text[text.index("## Two commands") :].split("```sh", 1)[1].split("```", 1)[1]
+    block = re.search(r"^```(\w+)\n(.*?)^```", after, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    assert block.group(1) == "python"
+    model = stiction_ros.LoopModel.load(stiction_ros.find_config("flow.loop.yaml"))
+    monkeypatch.chdir(tmp_path)
+    stiction_ros.write_csv(stiction_ros.simulate(model, samples=600), "history.csv")
+    exec(compile(block.group(2), "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("V1 sticky ")

@@ -1,0 +1,63 @@
+"""The floors of the package: who imports whom, as pyproject.toml says it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
+    "importlinter"
+]["contracts"]
+COMMAND = Path(sys.executable).with_name("lint-imports")
+
+
+def lint(folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(COMMAND), "--no-logo", "--no-cache"], cwd=folder, capture_output=True, text=True
+    )
+
+
+def test_the_floors_hold() -> None:
+    done = lint(ROOT)
+    assert done.returncode == 0, done.stdout
+
+
+def test_every_sub_package_stands_in_a_contract() -> None:
+    named = str([contract.get("layers", contract.get("source_modules")) for contract in CONTRACTS])
+    folders = [path.parent.name for path in (ROOT / "stiction_ros").glob("*/__init__.py")]
+    assert not [name for name in folders if f"stiction_ros.{name}" not in named]
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("loop", "from stiction_ros.control import MpcController"),
+        ("field", "from stiction_ros.loop import LoopModel"),
+        ("online", "import rclpy"),
+    ],
+)
+def test_an_import_that_runs_up_is_noticed(tmp_path: Path, module: str, line: str) -> None:
+    """A tree of the same names, in which one module imports what it must not."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    # The imports that are left out of the contracts are not in this small tree.
+    lines = [row for row in text.splitlines() if " -> stiction_ros" not in row]
+    (tmp_path / "pyproject.toml").write_text("\n".join(lines), encoding="utf-8")
+    names = [*(path.parent.name for path in (ROOT / "stiction_ros").glob("*/__init__.py"))]
+    files = [path.stem for path in (ROOT / "stiction_ros").glob("[!_]*.py")]
+    for name in names:
+        (tmp_path / "stiction_ros" / name).mkdir(parents=True)
+        (tmp_path / "stiction_ros" / name / "__init__.py").write_text("")
+    (tmp_path / "stiction_ros" / "__init__.py").write_text("")
+    for name in files:
+        (tmp_path / "stiction_ros" / f"{name}.py").write_text("")
+    (tmp_path / "stiction_ros" / "control" / "__init__.py").write_text("class MpcController: ...\n")
+    assert lint(tmp_path).returncode == 0
+    (tmp_path / "stiction_ros" / module / "wrong.py").write_text(line + "\n")
+    done = lint(tmp_path)
+    assert done.returncode == 1
+    assert f"stiction_ros.{module}.wrong" in done.stdout
