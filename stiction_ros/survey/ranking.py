@@ -4,8 +4,9 @@
    cycle has another cause, where a service helps less; then valves that the record does not
    decide, which are worth a look; then healthy valves in loops that cycle for another reason,
    which are nobody's work in the valve shop; then the rest; at the end what was not judged.
-2. Among one kind *confidence × worth*, so that a planner who works from the top down finds what
-   is surest and largest first. Worth is the band's share of OP's movement, which is what of the
+2. Among one kind *confidence² × worth*, so that a planner who works from the top down finds what
+   is surest and largest first; squared, as a valve that is opened for nothing costs a stop and
+   the trust in the list. Worth is the band's share of OP's movement, which is what of the
    controller's work never reaches the process; where a cost was given it is multiplied by what
    the cycle costs over the median of what was given, so that money counts where it is known and
    a loop without a figure stands as one that costs as much as most.
@@ -93,7 +94,7 @@ def ranked(entries: Sequence[Entry], costs: Mapping[str, float]) -> list[Entry]:
     def worth(entry: Entry) -> float:
         money = 1.0 if entry.cost_per_hour is None else entry.cost_per_hour / usual
         size = min(entry.band_share or 0.0, 1.0) if entry.found else 1.0
-        return (entry.confidence or 0.0) * size * money
+        return (entry.confidence or 0.0) ** 2 * size * money
 
     order = sorted(priced, key=lambda entry: (kind(entry), -worth(entry), entry.name))
     return [dataclasses.replace(entry, rank=place) for place, entry in enumerate(order, start=1)]

@@ -16,7 +16,7 @@ STYLE = """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
   font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
-main { max-width: 1320px; margin: 0 auto; padding: 28px 20px 60px; }
+main { max-width: 1600px; margin: 0 auto; padding: 28px 20px 60px; }
 h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 4px; }
 h2 { font-size: 1.15rem; margin: 34px 0 8px; }
 p { margin: 8px 0; max-width: 80ch; }
@@ -41,8 +41,10 @@ th button { font: inherit; color: inherit; background: none; border: 0; padding:
   cursor: pointer; font-weight: 600; text-align: inherit; }
 th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
-td.t, th.t { text-align: left; overflow-wrap: anywhere; }
-td.name { min-width: 15ch; font-weight: 600; }
+td.t, th.t { text-align: left; }
+td.name, td.wordy { overflow-wrap: anywhere; } td.wordy { min-width: 20ch; }
+table.list { font-size: .84rem; }
+td.name { min-width: 14ch; font-weight: 600; }
 td.s { white-space: nowrap; }
 .sticky, .backlash, .failed { color: var(--bad); font-weight: 600; }
 .healthy { color: var(--good); } .undecided, .skipped { color: var(--open); }
@@ -74,7 +76,7 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
 @media (max-width: 760px) {
   main { padding: 18px 14px 44px; }
   table.list thead { display: none; }
-  table.list, table.list tbody { display: block; }
+  table.list, table.list tbody { display: block; } table.list { font-size: .92rem; }
   table.list tr { display: grid; grid-template-columns: 1fr 1fr; gap: 0 14px; padding: 9px 0;
     border-bottom: 1px solid var(--line); }
   table.list tr[hidden] { display: none; }
