@@ -262,9 +262,11 @@ class PlantLink:
         while True:
             order = await self._orders.get()
             begin = time.monotonic()
-            failure = await write(client, order, resolve, kinds)
+            try:
+                failure = await write(client, order, resolve, kinds)
+            finally:
+                self._orders.task_done()
             self._tell(Written(order, failure, time.monotonic() - begin))
-            self._orders.task_done()
 
     async def _write_the_rest(self, writing: asyncio.Task[str]) -> None:
         """Let what waits be written before the end, as a request that is taken back."""

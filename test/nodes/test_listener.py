@@ -35,7 +35,7 @@ def test_windows_of_all_loops_are_filled(tmp_path: Path) -> None:
         [node.create_publisher(JointState, f"L{i}/{topic}", SIGNAL_QOS) for topic in topics]
         for i in range(LOOPS)
     ]
-    options = ["--seconds", "12", "--out", str(tmp_path / "out"), "--json", str(tmp_path / "j")]
+    options = ["--seconds", "9", "--out", str(tmp_path / "out"), "--json", str(tmp_path / "j")]
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", "stiction_ros.cli.main", "listen", *options],
         env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
