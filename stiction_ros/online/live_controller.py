@@ -30,6 +30,7 @@ from stiction_ros.online.watch import Watch
 HISTORY_SAMPLES = 20_000
 FIRST_MOVE = 0.9  # %; largest move of the first OP after a start or a hold
 REMEMBERED = 20  # frictions that were rolled back
+ANOTHER = 0.5  # %; OPs that differ by more, three times in succession, are another one's
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,6 +93,7 @@ class LiveController:
         self._raised: tuple[Behaviour | None, ...] | None = None  # by the slip check
         self._rolled_back: deque[tuple[Behaviour | None, ...]] = deque(maxlen=REMEMBERED)
         self._given_up = False
+        self._others = 0  # samples in succession at which another one's OP was applied
         self._sample = 0
         self._controller = self._build(self._design, model, settings.mode)
         self._proven = self._controller, self._known
@@ -291,6 +293,10 @@ class LiveController:
         own, pv, dv = self._latest
         self._in_force, self._sure = (own, True) if self._told is None else self._told
         self._latest = self._told = None
+        other = bool(np.abs(self._in_force - own).max() > ANOTHER)
+        self._others = self._others + 1 if other else 0
+        if self._others >= 3:  # as while the plant's own controller has the valves
+            self._watch.forget()
         self._past.add(self._in_force, pv, np.where(np.isfinite(dv), dv, 0.0))
 
     def _tell(self, result: StepResult) -> None:

@@ -79,6 +79,11 @@ class Watch:
         """Leave out the next samples, as behind a move of the set-point."""
         self._since_move = 0
 
+    def forget(self) -> None:
+        """Begin anew: another one controls, and its errors say nothing of ours."""
+        self.disturb()
+        self._recent, self._reference = [], None
+
     def stop(self) -> None:
         """Stop judging."""
         self.active = False

@@ -14,6 +14,7 @@ from stiction_ros.control import ControlMode, StepStatus
 from stiction_ros.effects import ChoudhuryStiction, HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints
+from stiction_ros.online import live_controller
 from stiction_ros.online.controller_settings import LiveControllerSettings
 from stiction_ros.online.live_controller import LiveController
 
@@ -231,6 +232,25 @@ def test_a_controller_that_does_well_stays() -> None:
     run.live.offer(KNOWN, 1000)
     run.go(1500)
     assert modes(run.live) == [(0, "unaware"), (1000, "embedding")]
+
+
+@pytest.mark.parametrize("told_apart", [True, False])
+def test_a_controller_whose_op_is_not_applied_is_not_judged(
+    told_apart: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not told_apart:
+        monkeypatch.setattr(live_controller, "ANOTHER", np.inf)
+    run = Run(LiveController(watched(), PROCESS))
+    run.go(350)
+    run.live.offer(KNOWN, 350)
+    other = np.array([run.op[-1] + 20.0])  # another one has the valve, and does worse
+    for _ in range(500):
+        measured = run.plant.measure()
+        run.live.step(measured.pv, MOVES.at(measured.time))
+        run.plant.apply(other)
+        run.live.applied(other)
+    rolled_back = [c for c in run.live.changes if c.reason.startswith("rolled back")]
+    assert bool(rolled_back) is not told_apart
 
 
 def test_after_the_roll_back_the_loop_goes_on_at_the_next_sample() -> None:
