@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ from stiction_ros.report.page import card, duration, embedded, number, page, tab
 from stiction_ros.report.scoring import Phases, phases
 from stiction_ros.report.summary import messages, scores, write_json
 
+JOURNAL = "journal.jsonl"  # of the simulated plant, beside the bag
 SMOOTH = 1.0  # %: what OP may step by at a transfer of control
 GONE = 0.2  # share of the amplitude before that a cycle that is gone may still have
 
@@ -145,6 +147,10 @@ def report_opcua(
     """
     run = read_bridged(bag)
     record, transfers = run.log.record, run.transfers()
+    steps = journal_steps(out / JOURNAL)
+    if len(steps) == len(transfers):  # the plant itself knows it to the write
+        pairs = zip(transfers, steps, strict=True)
+        transfers = [dataclasses.replace(one, step=step) for one, step in pairs]
     granted = next((one for one in transfers if one.to == "remote"), None)
     at = None if granted is None else round(granted.time / record.sample_time)
     found = phases(record, at, round_samples)
@@ -178,6 +184,31 @@ def report_opcua(
     told = dict(finite(summary))
     write_json(told, out / "summary.json")
     return told
+
+
+def journal_steps(path: Path) -> list[float]:
+    """Return the step of OP at each transfer, %, from the journal of a simulated plant.
+
+    It is that from the last OP in force before the mode changed to the first that the new one
+    gave: the first OP written, or the first scan of the plant's PIs. Empty without a journal.
+    """
+    if not path.is_file():
+        return []
+    found: list[float] = []
+    mode, before, scan, waiting = "AUTO", None, 0, False
+    for line in path.read_text(encoding="utf-8").splitlines():
+        event = json.loads(line)
+        if event["event"] == "mode" and event["mode"] != mode:
+            mode, waiting, scan = event["mode"], before is not None, event["sample"]
+        elif event["event"] in ("op", "out"):
+            op = np.array(event[event["event"]])
+            given = event["event"] == "op" if mode != "AUTO" else event["sample"] > scan
+            if waiting and given:
+                found.append(float(np.abs(op - before).max()))
+                waiting = False
+            if not waiting:
+                before = op
+    return found
 
 
 def _failure(found: Phases, transfers: Sequence[Transfer]) -> str:

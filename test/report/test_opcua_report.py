@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import types
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from stiction_ros.report.opcua_report import BridgedRun, GrantChange, Transfer, _failure
+from stiction_ros.report.opcua_report import (
+    BridgedRun,
+    GrantChange,
+    Transfer,
+    _failure,
+    journal_steps,
+)
 from stiction_ros.report.scoring import Phase, Phases, PhaseStatus, Score
 
 SECOND = 1_000_000_000
@@ -37,6 +45,26 @@ def test_transfers_are_told_with_their_step() -> None:
 def test_a_reason_that_changes_is_no_transfer() -> None:
     waits = GrantChange(SECOND, "idle", "waits: no sample yet")
     assert run(waits, ASKED).transfers() == []
+
+
+def test_the_plants_journal_tells_the_step_to_the_write(tmp_path: Path) -> None:
+    events = [
+        {"event": "mode", "mode": "AUTO", "sample": 0},
+        {"event": "out", "out": [50.0], "sample": 4},
+        {"event": "out", "out": [52.0], "sample": 5},
+        {"event": "mode", "mode": "ROUT", "sample": 5},
+        {"event": "out", "out": [52.0], "sample": 5},
+        {"event": "op", "op": [52.1], "sample": 6},
+        {"event": "op", "op": [60.0], "sample": 7},
+        {"event": "mode", "mode": "AUTO", "sample": 7},
+        {"event": "out", "out": [60.0], "sample": 7},
+        {"event": "out", "out": [60.3], "sample": 8},
+        {"event": "out", "out": [64.0], "sample": 9},
+    ]
+    path = tmp_path / "journal.jsonl"
+    path.write_text("".join(json.dumps(event) + "\n" for event in events))
+    assert journal_steps(path) == pytest.approx([0.1, 0.3])
+    assert journal_steps(tmp_path / "none") == []
 
 
 def phases_of(before: float, after: float, reason: str = "") -> Phases:
