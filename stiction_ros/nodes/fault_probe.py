@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -74,6 +76,7 @@ class Probe:
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_status, DEEP_QOS)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
+        self._gone: deque[Callable[[], object]] = deque()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._spin, name="probe", daemon=True)
         self._thread.start()
@@ -91,6 +94,13 @@ class Probe:
     def _spin(self) -> None:
         while not self._stop.is_set():
             self._executor.spin_once(timeout_sec=0.1)
+            while self._gone:
+                self._gone.popleft()()
+
+    def _destroy(self, action: Callable[[], object]) -> None:
+        """Have the thread that spins destroy an entity: it must not be waited for meanwhile."""
+        self._gone.append(action)
+        self._executor.wake()
 
     # ---- what is heard ---------------------------------------------------------------------
 
@@ -175,7 +185,7 @@ class Probe:
         """Take back the publisher of a topic."""
         publisher = self._publishers.pop(topic, None)
         if publisher is not None:
-            self.node.destroy_publisher(publisher)
+            self._destroy(functools.partial(self.node.destroy_publisher, publisher))
 
     def _publisher(self, kind: Any, topic: str, qos: Any) -> Any:
         if topic not in self._publishers:
@@ -235,7 +245,7 @@ class Probe:
             future.add_done_callback(lambda _future: done.set())
             return future.result() if done.wait(ANSWER) else None
         finally:
-            self.node.destroy_client(client)
+            self._destroy(functools.partial(self.node.destroy_client, client))
 
 
 def _frictions(values: Mapping[str, str]) -> dict[str, float]:

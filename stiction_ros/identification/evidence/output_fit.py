@@ -85,11 +85,10 @@ class Whitened:
     Attributes:
         noise: D.
         seen: the output, shape (n,).
-        known: a constant, and the signals beside, shape (c, n).
+        known: a constant, shape (1, n).
         stems: by :func:`.kernels.with_past`, shape (m, M + N).
         products: of ``known`` and of M lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
-        sizes: of the signals beside.
         taps: M.
     """
 
@@ -99,7 +98,6 @@ class Whitened:
     stems: FloatArray
     products: FloatArray
     seen_products: FloatArray
-    sizes: FloatArray
     taps: int
 
     @classmethod
@@ -108,9 +106,7 @@ class Whitened:
         taps, first = problem.taps, problem.first
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[first:]
-        ones = np.full((1, len(seen)), float(noise.sum()) or 1.0)
-        beside = [whitened(noise, row, float(row[0]))[None, first:] for row in problem.beside]
-        known = np.vstack([ones / np.linalg.norm(ones), *beside])
+        known = np.full((1, len(seen)), 1.0 / np.sqrt(len(seen)))
         past = [with_past(whitened(noise, stem, float(stem[0])), taps) for stem in stems]
         signals = np.array(past).reshape(len(stems), taps + problem.rows)
         rows = np.vstack([known, *(lagged(x, float(x[0]), first + taps, taps) for x in signals)])
@@ -123,13 +119,11 @@ class Whitened:
                 down, along = (slice(count + k * taps, count + (k + 1) * taps) for k in (i, j))
                 products[down, along] = lagged_products(left, right, len(seen), taps)
                 products[along, down] = products[down, along].T
-        return cls(noise, seen, known, signals, products, rows @ seen, problem.sizes, taps)
+        return cls(noise, seen, known, signals, products, rows @ seen, taps)
 
     def with_precision(self, prior: ResponsePrior) -> FloatArray:
         """Return the products and what is known before the record, shape (q, q)."""
-        out, known = self.products.copy(), np.arange(1, len(self.known))
-        out[known, known] += 1.0 / self.sizes
-        precision = prior.precision(self.taps)
+        out, precision = self.products.copy(), prior.precision(self.taps)
         for start in range(len(self.known), len(out), self.taps):
             block = slice(start, start + self.taps)
             out[block, block] += precision
@@ -137,8 +131,7 @@ class Whitened:
 
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
-        own = len(self.stems) * prior.log_determinant(self.taps)
-        return own + float(np.log(self.sizes).sum())
+        return len(self.stems) * prior.log_determinant(self.taps)
 
     def loss(self, prior: ResponsePrior) -> tuple[float, FloatArray]:
         """Return the loss, and what multiplies ``known`` and each lag, shape (q,)."""
@@ -244,12 +237,10 @@ def _tuned(
 def _fitted(
     problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
 ) -> OutputFit:
-    taps, known = problem.taps, len(problem.beside)
+    taps = problem.taps
     loss, weights = Whitened.of(problem, output, stems, noise).loss(prior)
-    responses = weights[1 + known :].reshape(len(stems), taps)
+    responses = weights[1:].reshape(len(stems), taps)
     rest = problem.pv[output].copy()
-    if known:
-        rest -= weights[1 : 1 + known] @ problem.beside
     for stem, response in zip(stems, responses, strict=True):
         rest -= response @ lagged(stem, float(stem[0]), 0, taps)
     rest -= rest[problem.first :].mean()

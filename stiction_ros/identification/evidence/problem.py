@@ -29,8 +29,6 @@ class Problem:
         limit: largest f_S per valve, %, shape (m,).
         scale: standard deviation of OP per valve, %, shape (m,).
         skipped: smallest delay, rows.
-        beside: known signals that may stand in an output, of any amplitude, shape (q, n).
-        sizes: variance of their amplitudes before the record, over that of the innovations, (q,).
     """
 
     op: FloatArray
@@ -40,8 +38,6 @@ class Problem:
     limit: FloatArray
     scale: FloatArray
     skipped: int = 0
-    beside: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 1)))
-    sizes: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(cls, record: Record, law: str = "he", rate: int = 1, skipped: int = 0) -> Problem:
