@@ -11,6 +11,7 @@ from stiction_ros.faults.signal_junk import MALFORMED, STAMPS, flood, said
 STRANGER = "/somebody"
 COMMANDER = "/controller"
 BESIDE = 6.0  # s that a second controller runs
+SIGHT = 1.0  # s by which nodes of the loop may see it before the suite's own node does
 
 
 def stranger(frame_id: str) -> Callable[[RunningLoop], None]:
@@ -33,7 +34,7 @@ def second_controller(name: str) -> Callable[[RunningLoop], None]:
         loop.beside("controller", name)
         if not loop.wait_until(lambda: loop.probe.publishers("op") > 1, 30.0):
             loop.remark("the second controller did not start")
-        loop.begins()
+        loop.begins(earlier=SIGHT)
         loop.wait(BESIDE)
         loop.end_beside()
 

@@ -70,9 +70,13 @@ class RunningLoop:
                 self.remark(f"{name} did not end when it was asked to")
         self.probe.close()
 
-    def begins(self) -> None:
-        """Say that the fault begins now, and not when it was prepared."""
-        self.begun = time.monotonic()
+    def begins(self, earlier: float = 0.0) -> None:
+        """Say that the fault begins now, and not when it was prepared.
+
+        Args:
+            earlier: s by which the nodes may have seen it before the suite did.
+        """
+        self.begun = time.monotonic() - earlier
 
     def beside(self, kind: str, name: str, parameters: Mapping[str, Any] | None = None) -> None:
         """Start one more node of ``kind`` that nobody has asked for."""
