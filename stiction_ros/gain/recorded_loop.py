@@ -18,10 +18,10 @@ from stiction_ros.errors import InputError
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
 from stiction_ros.gain.stems import stems_of
 from stiction_ros.identification.closed_loop.closed_loop import output_oscillation, paired
-from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
+from stiction_ros.identification.closed_loop.loop_run import Process, Runs, run_loops
 from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.closed_loop.repeated_runs import period_of
+from stiction_ros.identification.closed_loop.repeated_runs import controllers_of, period_of
 from stiction_ros.identification.closed_loop.scaled_loop import (
     ScaledLoop,
     free_run,
@@ -195,7 +195,7 @@ class RecordedLoop:
         )
         sp = np.repeat(self.set_points[None], number, axis=0)
         load = np.repeat(self.load[None], number, axis=0)
-        op, pv = run_loops(self.process, self._controllers, runs, sp, load)
+        op, pv = run_loops(self.process, controllers_of(self.pairs), runs, sp, load)
         start = np.full(number, self.loop.stem[self.rows[0] - 1, j])
         stem = stems_of(np.ascontiguousarray(op[:, :, j]), friction[:, j].copy(), start)
         errors = pv[:, :, i] - sp[:, past:, i]
@@ -205,17 +205,6 @@ class RecordedLoop:
             else None
             for error, moved in zip(errors, stem, strict=True)
         ]
-
-    @property
-    def _controllers(self) -> Controllers:
-        laws = [law for _, law in self.pairs]
-        return Controllers(
-            np.array([i for i, _ in self.pairs]),
-            np.array([law.lag for law in laws]),
-            np.array([law.smoothing for law in laws]),
-            np.array([law.limits[0] for law in laws]),
-            np.array([law.limits[1] for law in laws]),
-        )
 
 
 def _past(process: Process, pairs: tuple[tuple[int, RecoveredController], ...]) -> int:

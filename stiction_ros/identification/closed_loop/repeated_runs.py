@@ -47,6 +47,18 @@ DOUBTED = 0.7
 Pairs = Sequence[tuple[int, RecoveredController]]
 
 
+def controllers_of(pairs: Pairs) -> Controllers:
+    """Return controllers, each with the output that it reads, as the runs take them."""
+    laws = [law for _, law in pairs]
+    return Controllers(
+        np.array([i for i, _ in pairs]),
+        np.array([law.lag for law in laws]),
+        np.array([law.smoothing for law in laws]),
+        np.array([law.limits[0] for law in laws]),
+        np.array([law.limits[1] for law in laws]),
+    )
+
+
 @dataclasses.dataclass(frozen=True)
 class Repeated:
     """One loop, ready to be run again and again; everything scaled.
@@ -101,14 +113,7 @@ class Repeated:
     @property
     def controllers(self) -> Controllers:
         """The controllers as the runs take them."""
-        laws = [law for _, law in self.pairs]
-        return Controllers(
-            np.array([i for i, _ in self.pairs]),
-            np.array([law.lag for law in laws]),
-            np.array([law.smoothing for law in laws]),
-            np.array([law.limits[0] for law in laws]),
-            np.array([law.limits[1] for law in laws]),
-        )
+        return controllers_of(self.pairs)
 
     def with_friction(self, valve: int) -> FloatArray:
         """Return OP, shape (R, n), with the frictions tried for ``valve``."""

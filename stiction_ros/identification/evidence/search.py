@@ -119,9 +119,7 @@ class _Valve:
     def heads(self, count: int, distance: float) -> list[Candidate]:
         """Return the best that was met, frictions apart."""
         met = sorted(self.met, key=lambda one: one.loss)
-        places = np.array([one.friction[self.valve] for one in met]).reshape(-1, 2)
-        ranks = np.arange(len(met), dtype=float)
-        return [met[i] for i in _apart(places, ranks, count, distance)]
+        return _candidates_apart(met, self.valve, count, distance)
 
     def settle(self) -> None:
         """Fit the heads until nothing changes, once more from the noise of the best."""
@@ -256,6 +254,13 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
 def heads(found: Found, valve: int, count: int, distance: float) -> list[Candidate]:
     """Return the best candidates with friction of a valve, apart by ``distance``, %."""
     met = [one for one in found.met if one.friction[valve, 0] > 0.0]
+    return _candidates_apart(met, valve, count, distance)
+
+
+def _candidates_apart(
+    met: Sequence[Candidate], valve: int, count: int, distance: float
+) -> list[Candidate]:
+    """Return the first of ``met``, best first, whose frictions of a valve are apart."""
     places = np.array([one.friction[valve] for one in met]).reshape(-1, 2)
     ranks = np.arange(len(met), dtype=float)
     return [met[i] for i in _apart(places, ranks, count, distance)]
