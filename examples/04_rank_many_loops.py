@@ -11,9 +11,9 @@ FRICTION = {"FIC101": 0.0, "FIC102": 2.0, "FIC103": 6.0}  # f_S, %, true of the 
 
 
 def urgency(found: Identification) -> tuple[bool, float]:
-    """Return what loops are sorted by: sticky ones first, by the share of OP in the band."""
+    """Return what loops are sorted by: friction first, then the share of OP in the band."""
     valve = found.valves[0]
-    return valve.verdict == "sticky", valve.band_share
+    return valve.verdict.has_friction, valve.band_share
 
 
 def main(samples: int = 1200) -> None:

@@ -1,15 +1,15 @@
-"""A friction law of your own: a stem that creeps on before it rests.
+"""A friction law of your own: a stem that is harder to close than to open.
 
-For researchers. What it takes today, and what does not work from outside yet:
+For researchers. This file *is* the law. Lay it into a folder that the environment variable
+STICTION_EFFECTS names, or into a package with an entry point of ``stiction_ros.effects``, and
+every command and node knows it: ``stiction identify record.csv --law lopsided``. A script, as
+here, calls ``effects.register``. Parameters and ``step`` are all that it needs. What is left
+out is said, never guessed:
 
-- to simulate: the class below, named in ``effects.BEHAVIOURS``. Loop models, plants, the nodes
-  and ``stiction simulate`` then know it by its name in YAML.
-- to be found: nothing. ``identify`` fits the laws it knows; He's is the nearest here, and its
-  figures are those of an equivalent valve, not the parameters of this law.
-- to identify its own parameters: the package has to be changed. The law must simulate whole
-  grids and stand in ``LAWS`` of identification, which searches two parameters, no third; the
-  certificate of the search holds for laws whose switching patterns it knows, no others.
-- to control with it: the package has to be changed, embedding needs the law's smallest jump.
+- ``simulate_grid``: whole grids at once. Without it every row is stepped, slowly.
+- ``switching``: its patterns. Without it identify searches on grids and certifies nothing.
+- ``jump_form``: its moves between rests. Without it no controller plans for it, and says why.
+- ``axes``: on what ``stiction gap`` searches it. Without it gap lists it as not considered.
 """
 
 from __future__ import annotations
@@ -17,41 +17,54 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from stiction_ros import Behaviour, LoopModel, effects, find_config, identify, simulate
-from stiction_ros.effects.behaviour import Memory, parameter
+import numpy as np
+
+import stiction_ros as sr
+from stiction_ros import effects
 
 
 @dataclasses.dataclass(frozen=True)
-class CreepingStiction(Behaviour):
-    """Sticks within f_S of OP; once it slips it goes the share ``creep`` of the way a sample."""
+class LopsidedStiction(effects.FrictionPair):
+    """He's law with another static friction, ``closing`` times as large, where OP falls."""
 
-    effect: ClassVar[str] = "stiction"
-    law: ClassVar[str | None] = "creeping"
-    places: ClassVar[tuple[str, ...]] = ("valve",)
+    law: ClassVar[str | None] = "lopsided"
+    closing: float = effects.parameter("closing", "1", "f_S closing / opening", low=0.5, high=3.0)
 
-    static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
-    dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
-    creep: float = parameter("creep", "1", "share of the way done a sample", low=0.01, high=1.0)
+    def step(self, memory, value, time=0.0):  # type: ignore[no-untyped-def]
+        """Return the stem position twice, as memory and as output."""
+        if value - memory > self.static_friction:
+            memory = value - self.dynamic_friction
+        elif value - memory < -self.closing * self.static_friction:
+            memory = value + self.dynamic_friction
+        return memory, memory
 
-    def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
-        """Return the stem, and as memory the stem and where it is going, %."""
-        stem, goal = memory if isinstance(memory, tuple) else (memory, memory)
-        error = value - stem
-        if abs(error) > self.static_friction:
-            goal = value - self.dynamic_friction * (1.0 if error > 0.0 else -1.0)
-        stem += self.creep * (goal - stem)
-        return (stem, goal), stem
+    @classmethod
+    def simulate_grid(cls, grid, values, start, sample_time=1.0):  # type: ignore[no-untyped-def]
+        """Return stems, shape (N, G), for rows (f_S, f_D, closing)."""
+        static, dynamic, closing = grid.T
+        stem, out = np.full(len(grid), 1.0) * start, np.empty((len(values), len(grid)))
+        for k, value in enumerate(values):
+            error = value - stem
+            np.copyto(stem, value - dynamic, where=error > static)
+            np.copyto(stem, value + dynamic, where=error < -closing * static)
+            out[k] = stem
+        return out
 
 
 def main(samples: int = 2000) -> None:
-    """Register the law, simulate a loop that has it, and see what He's law makes of it."""
-    effects.BEHAVIOURS = (*effects.BEHAVIOURS, CreepingStiction)
-    model = LoopModel.load(find_config("flow.loop.yaml"))
-    sticky = model.with_valve_effects({"V1": (CreepingStiction(4.0, 1.5, 0.7),)})
-    print(sticky.to_mapping()["valves"][0]["effects"])
-    valve = identify(simulate(sticky, samples=samples)).valves[0]
-    print(f"{valve.verdict}: as law {valve.law} f_S {valve.static_friction:.2f} %", end=", ")
-    print(f"f_D {valve.dynamic_friction:.2f} % (true of this law: 4 and 1.5, creep 0.7)")
+    """Simulate a loop that has the law, identify all three parameters, and ask for control."""
+    effects.register(LopsidedStiction)
+    model = sr.LoopModel.load(sr.find_config("flow.loop.yaml"))
+    sticky = model.with_valve_effects({"V1": (LopsidedStiction(4.0, 1.5, 1.4),)})
+    moves = sr.SetPoints.load(sr.find_config("flow.set_points.yaml"), model.outputs)
+    record = sr.simulate(sticky, moves, samples=samples)
+    found = sr.identify(record, sr.IdentificationOptions("exact", law="lopsided"))
+    law, design = found.valves[0].behaviour(), sr.ControlSettings().design(model)
+    print(found.valves[0].verdict, law, *found.notes, sep="\n")
+    try:
+        sr.MpcController(design, sr.ControlMode.EMBEDDING, [law])
+    except sr.InputError as error:
+        print(error)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,11 @@
 """Starts a loop: recorder, estimator, controller and plant, as the command ``stiction demo`` does.
 
 ros2 launch stiction_ros stiction.launch.py scenario:=siso speed:=25.0 directory:=run1
+
+With a parameter file of the node opcua that node stands in the place of the plant. It runs in no
+namespace, as its tag map names those of the loops:
+
+ros2 launch stiction_ros stiction.launch.py scenario:=F.scenario.yaml opcua:=F.yaml namespace:=F1
 """
 
 from pathlib import Path
@@ -10,14 +15,21 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from stiction_ros.cli.scenarios import SCENARIOS, find, loop_nodes, write_parameters
+from stiction_ros.cli.runs.scenarios import (
+    SCENARIOS,
+    bridged_nodes,
+    find,
+    loop_nodes,
+    write_parameters,
+)
 
 ARGUMENTS = {
     "scenario": ("siso", f"{' or '.join(SCENARIOS)}, or a *.scenario.yaml file"),
     "directory": ("run", "folder for the parameter file and the bag; there must be no bag in it"),
     "speed": ("max", "simulated seconds per second, or max for lockstep"),
     "seed": ("", "seed of the noise; empty for that of the scenario"),
-    "namespace": ("", "of all nodes"),
+    "namespace": ("", "of all nodes but opcua"),
+    "opcua": ("", "parameter file of the node opcua in place of the plant; empty for none"),
 }
 
 
@@ -26,24 +38,28 @@ def nodes_of(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     directory = Path(given["directory"]).resolve()
     directory.mkdir(parents=True, exist_ok=True)
-    nodes = loop_nodes(
-        find(given["scenario"]),
-        directory,
-        seed=int(given["seed"]) if given["seed"] else None,
-        speed=None if given["speed"] == "max" else float(given["speed"]),
-    )
+    scenario = find(given["scenario"])
+    speed = None if given["speed"] == "max" else float(given["speed"])
+    if given["opcua"]:
+        nodes = bridged_nodes(scenario, directory, speed=speed or 1.0, source="topic:pv")
+    else:
+        seed = int(given["seed"]) if given["seed"] else None
+        nodes = loop_nodes(scenario, directory, seed=seed, speed=speed)
     parameters = directory / "parameters.yaml"
     write_parameters(nodes, parameters, any_namespace=True)
+    files = dict.fromkeys(nodes, parameters)
+    if given["opcua"]:
+        files["opcua"] = Path(given["opcua"]).resolve()
     return [
         Node(
             package="stiction_ros",
             executable=name,
             name=name,
-            namespace=given["namespace"],
-            parameters=[str(parameters)],
+            namespace="" if name == "opcua" else given["namespace"],
+            parameters=[str(file)],
             output="screen",
         )
-        for name in nodes
+        for name, file in files.items()
     ]
 
 

@@ -28,22 +28,22 @@ if TYPE_CHECKING:
     from stiction_ros.control.result import ControlMode as ControlMode
     from stiction_ros.control.result import StepResult as StepResult
     from stiction_ros.control.settings import ControlSettings as ControlSettings
-    from stiction_ros.discrepancy.decide import GapVerdict as GapVerdict
+    from stiction_ros.discrepancy.answer.results import Discrepancy as Discrepancy
+    from stiction_ros.discrepancy.decision.decide import GapVerdict as GapVerdict
     from stiction_ros.discrepancy.options import GapOptions as GapOptions
-    from stiction_ros.discrepancy.results import Discrepancy as Discrepancy
     from stiction_ros.discrepancy.workflow import find_discrepancy as find_gap
     from stiction_ros.effects.behaviour import Behaviour as Behaviour
-    from stiction_ros.effects.stiction_he import HeStiction as HeStiction
+    from stiction_ros.effects.friction.he import HeStiction as HeStiction
     from stiction_ros.errors import InputError as InputError
-    from stiction_ros.identification.linear_fit import LinearOptions as LinearOptions
-    from stiction_ros.identification.linear_fit import fit_linear as fit_linear
-    from stiction_ros.identification.linear_result import (
+    from stiction_ros.identification.linear.fit import LinearOptions as LinearOptions
+    from stiction_ros.identification.linear.fit import fit_linear as fit_linear
+    from stiction_ros.identification.linear.result import (
         LinearIdentification as LinearIdentification,
     )
     from stiction_ros.identification.methods import identify as identify
     from stiction_ros.identification.options import IdentificationOptions as IdentificationOptions
-    from stiction_ros.identification.results import Identification as Identification
-    from stiction_ros.identification.results import VerdictKind as VerdictKind
+    from stiction_ros.identification.result.identification import Identification as Identification
+    from stiction_ros.identification.result.identification import VerdictKind as VerdictKind
     from stiction_ros.intake.options import CsvColumns as CsvColumns
     from stiction_ros.intake.record_file import read as read
     from stiction_ros.loop.closed_loop import simulate as simulate
@@ -55,10 +55,10 @@ if TYPE_CHECKING:
     from stiction_ros.online.session import LiveRun as LiveRun
     from stiction_ros.online.session import Scenario as Scenario
     from stiction_ros.online.session import run_live as run_live
-    from stiction_ros.records.csv_writer import write_csv as write_csv
+    from stiction_ros.records.csv.writer import write_csv as write_csv
     from stiction_ros.records.record import Record as Record
-    from stiction_ros.records.record_to_bag import write_bag as write_bag
-    from stiction_ros.report.record_report import report_record as report_record
+    from stiction_ros.records.run.record_to_bag import write_bag as write_bag
+    from stiction_ros.report.record.report import report_record as report_record
 
 __version__ = "0.1.0"
 
@@ -68,15 +68,15 @@ _HOMES = {
     "ControlMode": "control.result",
     "ControlSettings": "control.settings",
     "CsvColumns": "intake.options",
-    "Discrepancy": "discrepancy.results",
+    "Discrepancy": "discrepancy.answer.results",
     "GapOptions": "discrepancy.options",
-    "GapVerdict": "discrepancy.decide",
-    "HeStiction": "effects.stiction_he",
-    "Identification": "identification.results",
+    "GapVerdict": "discrepancy.decision.decide",
+    "HeStiction": "effects.friction.he",
+    "Identification": "identification.result.identification",
     "IdentificationOptions": "identification.options",
     "InputError": "errors",
-    "LinearIdentification": "identification.linear_result",
-    "LinearOptions": "identification.linear_fit",
+    "LinearIdentification": "identification.linear.result",
+    "LinearOptions": "identification.linear.fit",
     "LiveRun": "online.session",
     "LoopModel": "loop.model",
     "MpcController": "control.controller",
@@ -85,19 +85,19 @@ _HOMES = {
     "Scenario": "online.session",
     "SetPoints": "loop.set_points",
     "StepResult": "control.result",
-    "VerdictKind": "identification.results",
+    "VerdictKind": "identification.result.identification",
     "find_config": "config_files",
     "find_gap": "discrepancy.workflow:find_discrepancy",
-    "fit_linear": "identification.linear_fit",
+    "fit_linear": "identification.linear.fit",
     "identify": "identification.methods",
     "prbs_experiment": "loop.excitation",
     "read": "intake.record_file",
-    "report_record": "report.record_report",
+    "report_record": "report.record.report",
     "run_live": "online.session",
     "simulate": "loop.closed_loop",
     "simulate_closed_loop": "loop.closed_loop",
-    "write_bag": "records.record_to_bag",
-    "write_csv": "records.csv_writer",
+    "write_bag": "records.run.record_to_bag",
+    "write_csv": "records.csv.writer",
 }
 
 __all__ = [

@@ -12,7 +12,8 @@ import typing
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from stiction_ros.errors import InputError, is_finite
+from stiction_ros.checks import number
+from stiction_ros.errors import InputError
 
 T = TypeVar("T")
 
@@ -115,16 +116,8 @@ def _check_one(entry: Setting, value: Any, place: str) -> Any:
         if not isinstance(value, bool):
             raise InputError(f"{value!r} is neither true nor false", where=place)
         return value
-    whole = entry.kind == "int"
-    if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
-        raise InputError(f"{value!r} is no {'whole ' if whole else ''}number", where=place)
     # Only what is infinite when not given, such as a limit, may be.
     defaults = entry.default if isinstance(entry.default, tuple) else (entry.default,)
     unlimited = any(isinstance(d, float) and math.isinf(d) for d in defaults)
-    fits = is_finite(value) or (unlimited and isinstance(value, float))
-    if not fits or not entry.low <= value <= entry.high:
-        shown = f"{value:g}" if fits else "the number"
-        raise InputError(
-            f"{shown} is out of range", where=place, fix=f"use [{entry.low:g}, {entry.high:g}]"
-        )
-    return value if whole else float(value)
+    whole, low, high = entry.kind == "int", entry.low, entry.high
+    return number(value, place, low=low, high=high, whole=whole, unlimited=unlimited)

@@ -5,6 +5,9 @@ import random
 import sys
 from pathlib import Path
 
+import pytest
+from hypothesis import settings
+
 # A domain of its own keeps a test run apart from nodes that run on the same host.
 os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randint(1, 100))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -17,3 +20,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Wheels set no prefix path; a sourced ROS installation does.
 if (Path(sys.prefix) / "share" / "ament_index").is_dir():
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+
+# No example is timed: how long one takes says how busy the machine is.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With ``-m alone`` import only the files that have such tests, a few of hundreds."""
+    if config.option.markexpr != "alone" or collection_path.suffix != ".py":
+        return None
+    return "mark.alone" not in collection_path.read_text(encoding="utf-8") or None

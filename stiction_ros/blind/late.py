@@ -8,21 +8,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.blind.base_loops import PiControllers, base_loop
-from stiction_ros.blind.causes import CAUSES, Draw
-from stiction_ros.blind.circumstances import (
+from stiction_ros.blind.loops.base_loops import PiControllers, base_loop
+from stiction_ros.blind.loops.causes import CAUSES, Draw
+from stiction_ros.blind.loops.circumstances import (
     drawn_noise,
     drawn_regime,
     drawn_set_points,
     pick,
     with_noise,
 )
-from stiction_ros.blind.scoring import Score, score
-from stiction_ros.blind.truth import Hidden, Regime, Truth
+from stiction_ros.blind.loops.truth import Hidden, Regime, Truth
+from stiction_ros.blind.scores.scoring import Score, score
 from stiction_ros.effects import Behaviour, ExtraDelay, Memory, StepDisturbance
 from stiction_ros.loop import LoopModel, simulate_closed_loop
-from stiction_ros.online.gap_finding import GapFinding, find_in_window, standing
-from stiction_ros.online.gap_monitor import GapLook, GapMonitor, MonitorRule
+from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing
+from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
 from stiction_ros.records import Record
 
 SAMPLES, ONSET = 6000, 3000

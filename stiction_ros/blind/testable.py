@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from stiction_ros.blind.families import SHOWN_BY_DATA, Name
-from stiction_ros.blind.generator import BlindLoop
-from stiction_ros.blind.truth import Hidden, Truth
-from stiction_ros.discrepancy.catalogue_scores import all_candidates
-from stiction_ros.discrepancy.free_run import FreeRun
-from stiction_ros.discrepancy.gate import open_gate
+from stiction_ros.blind.loops.generator import BlindLoop
+from stiction_ros.blind.loops.truth import Hidden, Truth
+from stiction_ros.blind.scores.families import SHOWN_BY_DATA, Name
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.decision.scores import all_candidates
+from stiction_ros.discrepancy.fit.search import Baseline, fit_candidate
 from stiction_ros.discrepancy.options import MARGIN
-from stiction_ros.discrepancy.search import Baseline, fit_candidate
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
 
 
 def gains_beyond_margin(seen: BlindLoop, truth: Truth) -> dict[Name, float]:

@@ -17,33 +17,56 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = {
-    "demo": "run a live loop: cycle, identify, swap, record, report",
-    "identify": "identify friction and process from a record",
-    "fit-linear": "fit a linear model, for a controller that knows no friction",
-    "gain": "what service, embedding or retuning would bring",
-    "gap": "find, name and add the effect that a simulation misses",
-    "simulate": "simulate a loop model under its own controller",
-    "example": "identify a loop whose truth is known, and compare",
-    "experiment": "simulate an identification experiment, or the exports of a plant",
-    "convert": "convert a record between CSV and bag",
-    "replay": "run estimator and controller over a bag as they ran live",
-    "report": "make the report of a bag or a record",
-    "repair": "finish a bag whose recorder was killed, or salvage a damaged one",
-    "study": "run a scenario over many seeds, without ROS",
-    "study-change": "run a scenario whose sticky valve changes after the swap, without ROS",
-    "study-control": "the exact embedding on the tank when friction or inputs are not as known",
-    "study-monitor": "the estimator's monitor over loops in which an effect sets in half-way",
-    "survey": "every loop of a plant, ranked by what to service first",
-    "faults": "put faults into a running graph and judge what becomes of it",
-    "soak": "a long run with the real nodes: missed samples, growth of memory",
-    "certificates": "certificates of the link to a control system (OPC UA)",
-    "browse-tags": "make a tag map by browsing a control system (OPC UA)",
-    "fetch-history": "read history from a control system (OPC UA) into CSV records",
-    "listen": "fill the windows of all loops in the graph, in one process",
-    "bench": "measure speed, side by side",
+COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("live.demo", "run a live loop: cycle, identify, swap, record, report"),
+    "identify": ("loop.identify", "identify friction and process from a record"),
+    "fit-linear": (
+        "loop.fit_linear",
+        "fit a linear model, for a controller that knows no friction",
+    ),
+    "gain": ("loop.gain", "what service, embedding or retuning would bring"),
+    "gap": ("loop.gap", "find, name and add the effect that a simulation misses"),
+    "simulate": ("loop.simulate", "simulate a loop model under its own controller"),
+    "example": ("studies.example", "identify a loop whose truth is known, and compare"),
+    "experiment": (
+        "loop.experiment",
+        "simulate an identification experiment, or the exports of a plant",
+    ),
+    "convert": ("bags.convert", "convert a record between CSV and bag"),
+    "replay": ("bags.replay", "run estimator and controller over a bag as they ran live"),
+    "report": ("bags.report", "make the report of a bag or a record"),
+    "repair": ("bags.repair", "finish a bag whose recorder was killed, or salvage a damaged one"),
+    "study": ("studies.scenario", "run a scenario over many seeds, without ROS"),
+    "study-change": (
+        "studies.change",
+        "run a scenario whose sticky valve changes after the swap, without ROS",
+    ),
+    "study-control": (
+        "studies.control",
+        "the exact embedding on the tank when friction or inputs are not as known",
+    ),
+    "study-monitor": (
+        "studies.monitor",
+        "the estimator's monitor over loops in which an effect sets in half-way",
+    ),
+    "study-wear": (
+        "studies.wear",
+        "IAE against moves of the stem, over controllers and the worth of a move",
+    ),
+    "survey": ("plant.survey", "every loop of a plant, ranked by what to service first"),
+    "faults": ("live.faults", "put faults into a running graph and judge what becomes of it"),
+    "soak": ("live.soak", "a long run with the real nodes: missed samples, growth of memory"),
+    "certificates": ("plant.certificates", "certificates of the link to a control system (OPC UA)"),
+    "browse-tags": ("plant.browse_tags", "make a tag map by browsing a control system (OPC UA)"),
+    "fetch-history": (
+        "plant.fetch_history",
+        "read history from a control system (OPC UA) into CSV records",
+    ),
+    "listen": ("plant.listen", "fill the windows of all loops in the graph, in one process"),
+    "paper": ("studies.paper", "every figure and table of the paper, printed beside ours"),
+    "bench": ("benches.command", "measure speed, side by side"),
 }
-"""What ``stiction --help`` says of each command; its module is loaded when it is called."""
+"""Module of each command below this package, loaded when it is called, and what ``--help`` says."""
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
@@ -59,9 +82,9 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"stiction_ros {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, text in COMMANDS.items():
+    for name, (module, text) in COMMANDS.items():
         if only is None or name == only:
-            importlib.import_module(f"stiction_ros.cli.{name.replace('-', '_')}").add(commands)
+            importlib.import_module(f"stiction_ros.cli.{module}").add(commands)
         else:
             commands.add_parser(name, help=text)
     return top

@@ -8,26 +8,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.certificate import CertificateStatus, certify
 from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.embedding import EmbeddingMpc
-from stiction_ros.control.inversion import InversionMpc
-from stiction_ros.control.jump_form import FrictionSpread
-from stiction_ros.control.observer import Observer
-from stiction_ros.control.printed_embedding import PrintedEmbeddingMpc
-from stiction_ros.control.printed_inversion import InvertedPlan, PrintedInversionMpc
+from stiction_ros.control.formulations.unaware import UnawareMpc
+from stiction_ros.control.modes import formulation_of
+from stiction_ros.control.problem.target import Target, TargetSelector
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
-from stiction_ros.control.slip_check import SlipCheck
-from stiction_ros.control.strategies import (
-    Formulation,
-    Proposal,
-    Situation,
-    strategies,
-)
-from stiction_ros.control.target import Target, TargetSelector
-from stiction_ros.control.unaware import UnawareMpc
-from stiction_ros.control.valve_beliefs import ValveBeliefs
+from stiction_ros.control.state.observer import Observer
+from stiction_ros.control.state.passage import Passage
+from stiction_ros.control.strategies import Proposal, Situation, strategies
+from stiction_ros.control.valves.beliefs import ValveBeliefs
+from stiction_ros.control.valves.jump_form import FrictionSpread
+from stiction_ros.control.valves.slip_check import SlipCheck
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
+
+CUT = 1e-6  # %; what a rate limit takes off a move is told from here on
 
 
 class MpcController:
@@ -83,31 +77,17 @@ class MpcController:
         self.raised = ""
         self._target = TargetSelector(design.model, design.target_weights, design.limits.stem)
         unaware = UnawareMpc(design.model, design.unaware, design.limits)
-        self._formulation = self._build_formulation(unaware, known)
+        self._formulation = formulation_of(mode, design, unaware, self.valves)
         stand_in = None if self._formulation is unaware else unaware
         self._new_strategies = functools.partial(
             strategies, self._formulation, stand_in, design.fallback
         )
         self._strategies = self._new_strategies()
         self._check = SlipCheck(m) if design.slip_check else None
+        self._passage = Passage(design.longest_wait)
         self._dv: FloatArray = np.zeros(design.model.e.shape[1])
         self._started = False
         self._decided: tuple[FloatArray, Plan | None] | None = None  # applied in this sample
-
-    def _build_formulation(
-        self, unaware: UnawareMpc, known: tuple[Behaviour | None, ...]
-    ) -> Formulation | None:
-        design = self.design
-        if self.mode is ControlMode.HOLD:
-            return None
-        if self.mode is ControlMode.EMBEDDING:
-            if design.paper is not None:
-                return PrintedEmbeddingMpc(design.model, design.paper, design.limits, known)
-            return EmbeddingMpc(design.model, design.embedding, design.limits, known, design.jumps)
-        if self.mode is ControlMode.INVERSION:
-            inversion = InversionMpc if design.paper is None else PrintedInversionMpc
-            return inversion(unaware, known)
-        return unaware
 
     @property
     def frictions(self) -> tuple[Behaviour | None, ...]:
@@ -138,6 +118,7 @@ class MpcController:
         """Forget the past; the next measurement starts from rest, frictions stay known."""
         self._started, self._decided = False, None
         self._strategies = self._new_strategies()  # no plan of the past is followed on
+        self._passage = Passage(self.design.longest_wait)
         if self._check is not None:
             self._check.drop()
 
@@ -252,21 +233,28 @@ class MpcController:
         applied = self._take_in(pv, dv, applied, known)
         target: Target | None = None
         if not trouble and self._formulation is not None:
+            self._formulation.learn(self.valves, self.stem)
+            sticky = [j for j, _ in self.valves.sticky]
+            self._formulation.waits = self._passage.waits(self.stem[sticky], sp)
+            self._target.limits = self._formulation.reach(self.stem, self.design.limits.stem)
             target = self._select(sp, preview)
             trouble = "" if target is not None else "no steady state within the limits"
         situation = Situation(
             self.observer.state, target, self.stem, applied, self.valves.forms, trouble
         )
         proposal, strategy = self._choose(situation)
-        if proposal.status is StepStatus.FALLBACK:
-            reach = np.inf  # it has a rate of its own
-        op = self._valid(np.clip(proposal.op, applied - reach, applied + reach), applied)
+        op = self._valid(proposal.op, applied)
+        cut: list[int] = []
+        if proposal.status is not StepStatus.FALLBACK:  # which has a rate of its own
+            wanted, rate = np.clip(op, applied - reach, applied + reach), self.design.limits.move
+            op = np.clip(wanted, applied - rate, applied + rate)
+            cut = np.flatnonzero(np.abs(wanted - op) > CUT).tolist()
         self._decide(op, proposal.plan)
         seconds = time.perf_counter() - begin
         miss = np.zeros(len(sp)) if target is None else target.miss
         return StepResult(
             proposal.status,
-            "; ".join([text for text in (proposal.reason, *self._remarks()) if text]),
+            "; ".join([text for text in (proposal.reason, *self._remarks(cut)) if text]),
             proposal.mode or self.mode,
             op,
             proposal.plan,
@@ -305,20 +293,12 @@ class MpcController:
             name = _name(self.design.valve_names, stayed.valve, "valve")
             self.raised = f"{name} stayed where it should have moved: f_S is at least "
             self.raised += f"{stayed.static_friction:.3g} %"
+        self._passage.take_in(self.observer.standard_innovation)
         if not np.isfinite(self.observer.state).all():
             self.observer = Observer(self.design.model, self.design.observer)
             self.observer.rest(self.stem, pv)
 
     def _select(self, sp: FloatArray, preview: FloatArray | None) -> Target | None:
-        formulation = self._formulation
-        if isinstance(formulation, InversionMpc):
-            formulation.forms = self.valves.forms
-        if isinstance(formulation, EmbeddingMpc):
-            formulation.know(self.valves.forms, self.spreads, self.stem_interval)
-            limits = self.design.limits.stem.copy()
-            for j in formulation.immobile:
-                limits[j] = self.stem[j]
-            self._target.limits = limits
         disturbance = self.observer.disturbance
         if preview is None or not len(preview) or not np.isfinite(preview).all():
             return self._target.select(sp, disturbance, self._dv)
@@ -349,10 +329,8 @@ class MpcController:
         if not self._started:
             return
         self._decided = op, plan
-        if isinstance(plan, InvertedPlan):
-            self.stem = plan.process_input
-        else:
-            self.stem = self.valves.expected(op)
+        told = None if plan is None else plan.process_input
+        self.stem = self.valves.expected(op) if told is None else told
 
     def _advance(self, applied: FloatArray, known: bool) -> None:
         """Move valves and observer over the sample that has passed, by what was ``applied``."""
@@ -367,42 +345,36 @@ class MpcController:
             for j, belief in self.valves.sticky if known else ():
                 check.begin(j, self.observer, belief, float(applied[j]))
         stem = self.valves.step(applied)
-        if isinstance(plan, InvertedPlan) and np.array_equal(applied, decided):
-            stem = plan.process_input
+        told = None if plan is None else plan.process_input
+        if told is not None and np.array_equal(applied, decided):
+            stem = told
         self.stem = stem
         self.observer.predict(stem, self._dv)
         if check is not None:
             check.predict(applied, stem, self._dv)
 
-    def _remarks(self) -> list[str]:
+    def _remarks(self, cut: list[int]) -> list[str]:
         remarks = [self.raised]
+        for j in cut:
+            name = _name(self.design.valve_names, j, "valve")
+            remarks.append(f"the move of {name} is cut to its rate limit")
         held_back = np.flatnonzero(self.observer.held_back).tolist()
         if held_back:
             names = ", ".join(_name(self.design.output_names, i, "output") for i in held_back)
             remarks.append(f"the measurement of {names} is held back as an outlier")
-        if isinstance(self._formulation, EmbeddingMpc):
-            for j in self._formulation.immobile:
-                name = _name(self.design.valve_names, j, "valve")
-                remarks.append(f"{name} cannot be moved: its smallest jump exceeds its travel")
+        for j in () if self._formulation is None else self._formulation.immobile:
+            name = _name(self.design.valve_names, j, "valve")
+            remarks.append(f"{name} cannot be moved: its smallest jump exceeds its travel")
         return remarks
 
     def _gap(self, situation: Situation, proposal: Proposal) -> float | None:
-        formulation, plan = self._formulation, proposal.plan
-        wanted = self.design.gap_samples and isinstance(formulation, EmbeddingMpc)
-        if not wanted or plan is None or situation.target is None or proposal.age:
+        formulation, plan, target = self._formulation, proposal.plan, situation.target
+        samples = self.design.gap_samples
+        if not samples or formulation is None or plan is None or target is None or proposal.age:
             return None
         if proposal.status not in (StepStatus.SOLVED, StepStatus.UNREACHABLE, StepStatus.LIMIT):
             return None
-        assert isinstance(formulation, EmbeddingMpc)
-        found = certify(
-            formulation,
-            situation.state,
-            situation.target,
-            situation.last,
-            plan,
-            self.design.gap_samples,
-        )
-        return found.gap if found.status is CertificateStatus.CERTIFIED else None
+        return formulation.optimality_gap(situation.state, target, situation.last, plan, samples)
 
 
 def _unusable(**values: FloatArray) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 
-from stiction_ros.control.embedding import EmbeddingTuning
-from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.observer import ObserverTuning
-from stiction_ros.control.paper_weights import PaperTuning
+import numpy as np
+
+from stiction_ros.control.formulations.embedding import EmbeddingTuning
+from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.problem.paper_weights import PaperTuning
+from stiction_ros.control.state.observer import ObserverTuning
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.processes import LinearModel
@@ -27,6 +29,7 @@ class ControlDesign:
         hand_over_samples: past samples replayed into the observer of a new controller.
         fallback: how long a strategy other than the first may stand in.
         slip_check: whether jumps are watched by a second observer.
+        longest_wait: samples for which a jump waits for the disturbance estimate to come to rest.
         gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
         valve_names, output_names: for messages; numbers stand in where empty.
         paper: the paper's own embedding and inversion; None for those of this package.
@@ -42,10 +45,16 @@ class ControlDesign:
     hand_over_samples: int = 200
     fallback: FallbackRule = FallbackRule()
     slip_check: bool = True
+    longest_wait: int = 0
     gap_samples: int = 0
     valve_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
     paper: PaperTuning | None = None
+
+    def without_rates(self) -> ControlDesign:
+        """Return the design without rate limits, for a controller that moves nothing."""
+        free = np.full_like(self.limits.move, np.inf)
+        return dataclasses.replace(self, limits=dataclasses.replace(self.limits, move=free))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -54,6 +54,8 @@ class Plan:
         jumps: number of valve jumps planned over the horizon.
         converged: whether the solver finished; otherwise the plan was checked instead.
         cost: value of (19a) with the prices of jumps and slacks, NaN when not known.
+        process_input: what the observer takes for the stem at the first sample, shape (m,), %;
+            None for the stem that the valve models expect of ``op``.
     """
 
     op: FloatArray
@@ -63,6 +65,7 @@ class Plan:
     jumps: int = 0
     converged: bool = True
     cost: float = float("nan")
+    process_input: FloatArray | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,7 +82,7 @@ class StepResult:
         strategy: name of the strategy that gave ``op``, see :mod:`.strategies`.
         age: samples since ``plan`` was made; 0 for a plan of this step.
         optimality_gap: cost above the mixed-integer optimum as a share of it; None where it
-            was not asked for or not found, see :mod:`.certificate`.
+            was not asked for or not found, see :mod:`.formulations.certificate`.
 
     Examples:
         >>> import numpy as np

@@ -9,16 +9,18 @@ import math
 import numpy as np
 
 from stiction_ros.control.design import ControlDesign
-from stiction_ros.control.embedding import EmbeddingTuning
-from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.observer import ObserverKind, ObserverTuning
-from stiction_ros.control.paper_weights import (
+from stiction_ros.control.formulations.embedding import EmbeddingTuning
+from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.problem.paper_weights import (
     PaperTuning,
+    ProgrammeCost,
     WarmStart,
     WeightPreset,
     augmented_weights,
+    plain_weights,
     unaware_weights,
 )
+from stiction_ros.control.state.observer import ObserverKind, ObserverTuning
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -54,6 +56,13 @@ class ControlSettings:
     output_weights: tuple[float, ...] = setting(
         (1.0,), "weight of each squared output error in Q", low=0.0
     )
+    look_ahead: int = setting(
+        100,
+        "samples behind the horizon for which what a plan leaves is taken to last, "
+        "stiction-embedding",
+        low=0,
+        high=100_000,
+    )
     state_weight: float = setting(0.0, "weight added to Q on every state", low=0.0)
     terminal_weight: float = setting(0.0, "weight added to V_F on every state", low=0.0)
     move_weights: tuple[float, ...] = setting(
@@ -62,11 +71,19 @@ class ControlSettings:
     embedding_move_weights: tuple[float, ...] = setting(
         (0.01,), "weight of each squared stem move, stiction-embedding", low=1e-9
     )
+    move_worth: tuple[float, ...] = setting(
+        (0.0,),
+        "IAE that is given up rather than make a sticky valve jump once more, PV units of the "
+        "first output × h; larger jumps count as their squares; 0: embedding_move_weights",
+        low=0.0,
+    )
     target_weights: tuple[float, ...] = setting(
         (1.0,), "Q_ss: weight of each output when set-points cannot all be reached", low=1e-9
     )
     op_rate_limits: tuple[float, ...] = setting(
-        (math.inf,), "largest OP move, % per sample; jumps of sticky valves excepted", low=1e-6
+        (math.inf,),
+        "largest OP move, % per sample; a kick that moves a sticky valve must fit in",
+        low=1e-6,
     )
     op_low: tuple[float, ...] = setting(
         (-math.inf,), "lower bound of each OP, %, where it is above that of the valve"
@@ -94,6 +111,12 @@ class ControlSettings:
     )
     luenberger_gain: float = setting(0.2, "K_d of the Luenberger observer", low=1e-6, high=1.0)
     jump_price: float = setting(0.0, "cost added per jump of a sticky valve", low=0.0)
+    kick_limits: tuple[float, ...] = setting(
+        (25.0,),
+        "largest move of OP in one sample at which a sticky valve jumps, %; its smallest jump "
+        "is always allowed",
+        low=1e-6,
+    )
     jump_margin: float = setting(
         0.3,
         "how far a jump exceeds the smallest one, as a share of f_S, without intervals",
@@ -104,6 +127,13 @@ class ControlSettings:
         0.1, "the same where the intervals of the frictions are known, at least", low=0.0, high=2.0
     )
     slip_check: bool = setting(True, "watch every jump by an observer that assumes it failed")
+    longest_wait: int = setting(
+        0,
+        "samples for which a stem at rest waits with its jump while innovations lean to one "
+        "side, as the disturbance estimate is on its way then; 0: never",
+        low=0,
+        high=100_000,
+    )
     gap_samples: int = setting(
         0, "samples free to jump in the optimality gap of each step; 0: none", low=0, high=16
     )
@@ -135,8 +165,13 @@ class ControlSettings:
     )
     warm_start: str = setting(
         WarmStart.COMPENSATION.value,
-        "start of the paper's embedding: its sequence (21), or a small search",
+        "start of the paper's embedding: its sequence (21), a small search, or none",
         choices=tuple(kind.value for kind in WarmStart),
+    )
+    programme_cost: str = setting(
+        ProgrammeCost.REVISED.value,
+        "cost of the paper's embedding: its revised one (22), or the plain (19a)",
+        choices=tuple(kind.value for kind in ProgrammeCost),
     )
     first_move: float = setting(2.1, "a of (21), in multiples of f_S", low=1.0, high=10.0)
 
@@ -170,7 +205,9 @@ class ControlSettings:
                 self.iteration_limit,
             ),
             unaware=weights["move_weights"],
-            embedding=weights["embedding_move_weights"],
+            embedding=dataclasses.replace(
+                weights["embedding_move_weights"], look_ahead=self.look_ahead
+            ),
             target_weights=self._list("target_weights", p),
             observer=ObserverTuning(
                 ObserverKind(self.observer),
@@ -181,15 +218,34 @@ class ControlSettings:
                 self.outlier_gate,
                 self.outlier_samples,
             ),
-            jumps=EmbeddingTuning(self.jump_price, self.jump_margin, self.least_jump_margin),
+            jumps=EmbeddingTuning(
+                self.jump_price,
+                self.jump_margin,
+                self.least_jump_margin,
+                self._list("kick_limits", m),
+                self._move_prices(model),
+            ),
             hand_over_samples=self.hand_over_samples,
             fallback=self._fallback(model),
             slip_check=self.slip_check,
+            longest_wait=self.longest_wait,
             gap_samples=self.gap_samples,
             valve_names=model.valve_names,
             output_names=model.outputs,
         )
         return self._as_printed(self._with_preset(design))
+
+    def _move_prices(self, model: LoopModel) -> FloatArray:
+        """Return what the smallest jump of each valve costs, 0 where its worth is not given.
+
+        An offset e of the first output that lasts for the horizon and what is looked ahead, L
+        samples, costs q e² L and an IAE of e L. The two jumps that mend it, of price p each, are
+        made from where e L is what both are worth: p = 2 q W² / L.
+        """
+        m, p = len(model.valves), len(model.outputs)
+        worth = self._list("move_worth", m) * 3600.0 / model.sample_time
+        lasts = self.horizon + self.look_ahead
+        return np.asarray(2.0 * self._list("output_weights", p)[0] * worth**2 / lasts)
 
     def _fallback(self, model: LoopModel) -> FallbackRule:
         m = len(model.valves)
@@ -224,6 +280,8 @@ class ControlSettings:
         weights = augmented_weights(
             WeightPreset.PRINTED if printed else WeightPreset.CORRECTED, design.model, self.horizon
         )
+        if ProgrammeCost(self.programme_cost) is ProgrammeCost.PLAIN:
+            weights = plain_weights(design.unaware)
         tuning = PaperTuning(weights, WarmStart(self.warm_start), self.first_move)
         return dataclasses.replace(design, paper=tuning)
 

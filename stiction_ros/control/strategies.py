@@ -20,20 +20,11 @@ from typing import Protocol
 
 import numpy as np
 
-from stiction_ros.control.jump_form import JumpForm
+from stiction_ros.control.formulations.formulation import Formulation
+from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import ControlMode, Plan, StepStatus
-from stiction_ros.control.target import Target
+from stiction_ros.control.valves.jump_form import JumpForm
 from stiction_ros.effects.behaviour import FloatArray
-
-
-class Formulation(Protocol):
-    """One way to turn an estimate and a target into a plan."""
-
-    mode: ControlMode
-
-    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
-        """Return a plan, or None when there is none."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,59 +9,69 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidates import Candidate, figures_of
-from stiction_ros.discrepancy.catalogue_scores import (
+from stiction_ros.discrepancy.answer.closing import Ended, closing
+from stiction_ros.discrepancy.answer.results import Discrepancy, Look
+from stiction_ros.discrepancy.candidate.base import Candidate
+from stiction_ros.discrepancy.candidate.valve import departures
+from stiction_ros.discrepancy.data.controller_check import ControllerCheck, check_controller
+from stiction_ros.discrepancy.data.effects import add_data_effects, corrected
+from stiction_ros.discrepancy.data.gate import DataFinding, open_gate
+from stiction_ros.discrepancy.data.long_records import liveliest_parts
+from stiction_ros.discrepancy.decision.chance import stored_threshold
+from stiction_ros.discrepancy.decision.decide import (
+    FRICTION,
+    Decision,
+    confirmed,
+    decide,
+    friction_kind,
+    large_enough,
+)
+from stiction_ros.discrepancy.decision.extend import (
+    AddedEffect,
+    Extension,
+    base_beside,
+    extend,
+    has_friction,
+    left_open,
+    moved_away,
+    refit_together,
+    run_with,
+)
+from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
+from stiction_ros.discrepancy.decision.scores import (
     Progress,
     Scores,
     all_candidates,
     score_candidates,
 )
-from stiction_ros.discrepancy.chance import stored_threshold
-from stiction_ros.discrepancy.controller_check import ControllerCheck, check_controller
-from stiction_ros.discrepancy.data_effects import add_data_effects, corrected
-from stiction_ros.discrepancy.decide import (
-    FRICTION,
-    Decision,
-    GapVerdict,
-    decide,
-    friction_kind,
+from stiction_ros.discrepancy.decision.testable import Testable, testable_effects
+from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.uncertainty import (
+    chance_threshold,
 )
-from stiction_ros.discrepancy.extend import (
-    AddedEffect,
-    Extension,
-    base_beside,
-    extend,
-    left_open,
-    moved_away,
-    run_with,
-)
-from stiction_ros.discrepancy.free_intervals import with_free_process
-from stiction_ros.discrepancy.free_process import in_doubt_of_place, score_with_free_process
-from stiction_ros.discrepancy.free_run import FreeRun, Runs
-from stiction_ros.discrepancy.gate import DataFinding, open_gate
-from stiction_ros.discrepancy.long_records import liveliest_parts
-from stiction_ros.discrepancy.measure import closed_share, measure_gap
-from stiction_ros.discrepancy.measured_stem import not_contradicted
+from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.options import GapOptions
-from stiction_ros.discrepancy.process_refit import (
+from stiction_ros.discrepancy.process.change import ProcessChange
+from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
+from stiction_ros.discrepancy.process.refit import (
     longest_delay,
     refit_process,
     with_common_rows,
+    without_noise,
 )
-from stiction_ros.discrepancy.results import Discrepancy, FoundEffect, Look
-from stiction_ros.discrepancy.say import experiment_for, overall
-from stiction_ros.discrepancy.search import Baseline, CandidateFit, fit_candidate
-from stiction_ros.discrepancy.testable import Testable, testable_effects
-from stiction_ros.discrepancy.uncertainty import (
-    Intervals,
-    bootstrap_intervals,
-    chance_threshold,
-    likelihood_intervals,
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
+from stiction_ros.discrepancy.wholes import (
+    best_whole,
+    best_with_process,
+    suspicious,
+    whole,
+    without_outliers,
 )
-from stiction_ros.discrepancy.valve_candidates import departures
-from stiction_ros.discrepancy.where import locate
+from stiction_ros.effects import about
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
+
+BEHIND = 3  # effects that are tried behind another process where none was found
 
 
 def find_discrepancy(
@@ -128,6 +138,7 @@ class _Workflow:
         if options.free_process:
             self.longest = longest_delay(model)
             self.runs = with_common_rows(self.runs, model)
+            self.bare = without_noise(self.bare)
             self.bare = refit_process(self.bare, self.runs, self.longest)
         first = self.bare if options.free_process else model
         self.base_before = Baseline.of(FreeRun(first, self.runs))
@@ -136,20 +147,94 @@ class _Workflow:
         self.looks: list[Look] = []
         self.added: tuple[AddedEffect, ...] = ()
         self.base = self.base_before
+        self.changes: tuple[ProcessChange, ...] = ()
+        self.opened = 0  # the first look at the process as it is now
 
     def run(self) -> Discrepancy:
         """Look until nothing more is found, then put the answer together."""
+        testable = self._look_on()
+        if not self.options.free_process:
+            self._compare_wholes()
+            if self._mend_process():
+                testable = self._look_on()
+                self._compare_wholes()
+            if len(self.added) > 1:
+                self._tell_friction_again()
+        return closing(self._ended(testable))
+
+    def _look_on(self) -> tuple[Testable, ...]:
+        """Look until nothing more is found; return what the last look could have seen."""
         testable: tuple[Testable, ...] = ()
-        for k in range(self.options.most_effects):
+        for k in range(len(self.added), self.options.most_effects):
             look, testable = self._look(k)
             self.looks.append(look)
             if not look.kept:
                 break
-        while self.added and moved_away(self.base_before, self.base):
+        while self.added and self.earlier and moved_away(self.base_before, self.base):
             self._withdraw()
-        if len(self.added) > 1 and not self.options.free_process:
-            self._tell_friction_again()
-        return self._result(testable)
+        return testable
+
+    def _mend_process(self) -> bool:
+        """Change the given process where that, beside fewer effects, explains more.
+
+        A model that was fitted to another record is never exact: what its errors leave looks
+        like effects. Effects that have a name give way to it by the margin only.
+        """
+        if not suspicious(self.base):
+            return False
+        now = whole(self.bare, self.runs, self.added)
+        behind = [] if self.added else self._singles()[:BEHIND]
+        found = best_with_process(self.bare, self.runs, self.added, behind, self.options.margin)
+        due = self.options.margin if self.added else 0.0
+        if found is None or found.worth >= now.worth(self.options.margin) - due:
+            return False
+        self.bare, self.changes = found.changed.model, found.changed.changes
+        self.added = found.whole.effects if self.added else ()  # else the looks have to find it
+        self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
+        self.earlier, self.opened = [], len(self.looks)
+        return True
+
+    def _singles(self) -> list[AddedEffect]:
+        """Return the effects that explain most alone, the process as it is now."""
+        look = self.looks[min(self.opened, len(self.looks) - 1)]
+        found = []
+        for fit in sorted(look.scores.fits, key=lambda fit: -fit.evidence):
+            behaviour = fit.behaviour(look.scores.base.run)
+            if behaviour is not None and fit.evidence > 0.0 and large_enough(fit):
+                found.append(AddedEffect(fit, behaviour, fit.candidate.twins))
+        return found
+
+    def _compare_wholes(self) -> None:
+        """Keep the best whole explanation: a part of what was found, or one effect alone."""
+        singles = [each for each in self._singles() if confirmed(each.fit)]
+        best = best_whole(self.bare, self.runs, self.added, singles, self.options.margin)
+        self.added, self.base = best.effects, best.base
+        kept = without_outliers(self.added, self.runs.sample_time)
+        if len(kept) < len(self.added):
+            self.added = tuple(refit_together(self.bare, self.runs, kept))
+            self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
+
+    def _ended(self, testable: tuple[Testable, ...]) -> Ended:
+        return Ended(
+            model=self.model,
+            options=self.options,
+            gate=self.gate,
+            controller=self.controller,
+            data=tuple(self.data),
+            runs=self.runs,
+            bare=self.bare,
+            changes=self.changes,
+            longest=self.longest,
+            before=self.base_before,
+            base=self.base,
+            added=self.added,
+            gains=self.gains,
+            looks=tuple(self.looks),
+            testable=testable,
+            random=self.random,
+            report=self.report,
+            begun=self.begun,
+        )
 
     def _withdraw(self) -> None:
         """Take the last effect back: with it the free run is farther from PV than before."""
@@ -163,14 +248,14 @@ class _Workflow:
     def _tell_friction_again(self) -> None:
         """Test for the jump of sticky valves again, with what was found later in the model."""
         for k, effect in enumerate(self.added):
-            if effect.effect not in FRICTION:
+            if about(effect.effect).family != FRICTION:
                 continue
             base = self._beside(k)
             run = base.run
             rivals = [
                 candidate
                 for candidate in all_candidates(base)
-                if candidate.place == effect.place and candidate.effect in FRICTION
+                if candidate.place == effect.place and candidate.about.family == FRICTION
             ]
             fits = sorted(
                 (fit_candidate(base, run.gap, each) for each in rivals),
@@ -201,7 +286,9 @@ class _Workflow:
             chance = chance_threshold(base, candidates, self.random)
         threshold = max(self.options.margin, chance)
         run = base.run
-        allowed = not_contradicted(run, scores.fits)
+        allowed = [
+            fit for fit in not_contradicted(run, scores.fits) if not has_friction(self.added, fit)
+        ]
         decision = decide(
             allowed,
             self.options.margin,
@@ -210,6 +297,7 @@ class _Workflow:
         )
         if self.options.free_process:
             decision = in_doubt_of_place(base, decision)
+        decision = told_by_stem(run, decision, allowed)
         testable = testable_effects(base, list(candidates), self.options.margin)
         where = locate(base)
         kept, reason = False, decision.reason
@@ -248,86 +336,6 @@ class _Workflow:
         new = AddedEffect(chosen, behaviour, decision.alternatives)
         return extend(bare, self.runs, self.added, new, self.base)
 
-    def _intervals(self, k: int, effect: AddedEffect) -> Intervals:
-        base = self._beside(k)
-        found = self._given_process(k, effect, base)
-        if not self.options.free_process:
-            return found
-        return with_free_process(found, base, effect.fit, self.longest)
-
-    def _given_process(self, k: int, effect: AddedEffect, base: Baseline) -> Intervals:
-        if self.options.quick:
-            return likelihood_intervals(base, effect.fit)
-        done = self.options.most_effects / (self.options.most_effects + 1)
-        part = (1.0 - done) / len(self.added)
-        return bootstrap_intervals(
-            base,
-            effect.fit,
-            self.options.resamples,
-            self.random,
-            lambda share: self.report(done + (k + share) * part),
-        )
-
-    def _result(self, testable: tuple[Testable, ...]) -> Discrepancy:
-        before, after = measure_gap(self.base_before), measure_gap(self.base)
-        effects = [_data_effect(finding) for finding in self.data]
-        effects += [self._effect(k, effect) for k, effect in enumerate(self.added)]
-        verdict, alternatives = overall(effects, self.looks, testable)
-        model = self.bare
-        for shown, added in zip(effects[len(self.data) :], self.added, strict=True):
-            model = model.with_effect(added.place, added.behaviour, **self._provenance(shown))
-        where = [sentence for look in self.looks[:1] for sentence in look.where.sentences]
-        where += [
-            look.decision.reason
-            for look in self.looks[-1:]
-            if look.decision.verdict is GapVerdict.UNKNOWN
-        ]
-        self.report(1.0)
-        return Discrepancy(
-            verdict=verdict,
-            effects=tuple(effects),
-            alternatives=alternatives,
-            experiment=experiment_for(verdict, effects, alternatives, testable),
-            where=tuple(where),
-            untestable=tuple(t for t in testable if not t.testable),
-            before=before,
-            after=after,
-            closed=closed_share(before, after) if self.added else 0.0,
-            model_before=self.model,
-            model_after=model,
-            looks=tuple(self.looks),
-            gate=self.gate,
-            controller=self.controller,
-            runs=self.runs,
-            base_before=self.base_before,
-            base_after=self.base,
-            seconds=time.perf_counter() - self.begun,
-            notes=(*self.gate.notes, *(n for r in self.runs.records for n in r.notes)),
-        )
-
-    def _effect(self, k: int, effect: AddedEffect) -> FoundEffect:
-        verdict = GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED
-        return FoundEffect(
-            effect.place,
-            effect.effect,
-            figures_of(effect.behaviour),
-            self._intervals(k, effect),
-            self.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
-            verdict,
-            effect.alternatives,
-        )
-
-    def _provenance(self, effect: FoundEffect) -> dict[str, object]:
-        return {
-            "what": effect.effect,
-            "at": effect.place,
-            "by": "stiction gap",
-            "records": [record.name for record in self.runs.records],
-            "delta_bic": round(effect.delta_bic, 2),
-            "verdict": effect.verdict.value,
-            "alternatives": [f"{place} {name}" for place, name in effect.alternatives],
-        }
-
 
 def _departures(run: FreeRun, fit: CandidateFit) -> int:
     return departures(run, fit.candidate, fit.point)
@@ -338,10 +346,3 @@ def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
     document = model.to_mapping()
     document["process"] = other.to_mapping()["process"]
     return LoopModel.from_mapping(document, model.name)
-
-
-def _data_effect(finding: DataFinding) -> FoundEffect:
-    values = figures_of(finding.behaviour)
-    return FoundEffect(
-        finding.place, finding.effect, values, {}, finding.delta_bic, GapVerdict.NAMED
-    )

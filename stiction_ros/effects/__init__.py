@@ -1,6 +1,6 @@
 """Behaviours of valves, sensors and disturbances: one effect, one file.
 
-To add an effect, write its file and name its class in :data:`BEHAVIOURS`.
+To add an effect, write its file; :mod:`.discovery` says where it is looked for.
 
 Examples:
     >>> from stiction_ros import effects
@@ -14,76 +14,62 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.effects.backlash import Backlash
 from stiction_ros.effects.behaviour import (
     Behaviour,
     DrivenByNoise,
     Filter,
-    FloatArray,
     LinearFilter,
     Memory,
     Parameter,
+    parameter,
 )
-from stiction_ros.effects.bias_step import BiasStep
-from stiction_ros.effects.characteristic import Characteristic
-from stiction_ros.effects.delay import ExtraDelay, TimeShift
-from stiction_ros.effects.disturbance import (
-    DriftDisturbance,
-    SineDisturbance,
-    StepDisturbance,
+from stiction_ros.effects.data.time_shift import TimeShift
+from stiction_ros.effects.data.tuning import Tuning
+from stiction_ros.effects.discovery import behaviours, register
+from stiction_ros.effects.disturbance.coloured import ColouredDisturbance
+from stiction_ros.effects.disturbance.drift import DriftDisturbance
+from stiction_ros.effects.disturbance.random_walk import RandomWalkDisturbance
+from stiction_ros.effects.disturbance.sine import SineDisturbance
+from stiction_ros.effects.disturbance.square import SquareDisturbance
+from stiction_ros.effects.disturbance.step import StepDisturbance
+from stiction_ros.effects.disturbance.triangle import TriangleDisturbance
+from stiction_ros.effects.friction.choudhury import ChoudhuryStiction
+from stiction_ros.effects.friction.he import HeStiction
+from stiction_ros.effects.friction.he_smoothed import SmoothedHeStiction
+from stiction_ros.effects.friction.jump_form import JumpForm
+from stiction_ros.effects.friction.kano import KanoStiction
+from stiction_ros.effects.friction.kano_smoothed import SmoothedKanoStiction
+from stiction_ros.effects.friction.parameters import (
+    FrictionLaw,
+    FrictionPair,
+    SlipJumpPair,
+    Stiction,
 )
-from stiction_ros.effects.disturbance_coloured import ColouredDisturbance
-from stiction_ros.effects.freeze import Freeze
-from stiction_ros.effects.friction_parameters import FrictionLaw
-from stiction_ros.effects.lag import ExtraPole, Lag
-from stiction_ros.effects.leak import Leak
-from stiction_ros.effects.offset import Offset
-from stiction_ros.effects.process_gain import ProcessGain
-from stiction_ros.effects.quantisation import Quantisation
-from stiction_ros.effects.saturation import Clip, Saturation
-from stiction_ros.effects.slew import Slew
-from stiction_ros.effects.stiction_choudhury import ChoudhuryStiction
-from stiction_ros.effects.stiction_he import HeStiction
-from stiction_ros.effects.stiction_he_smoothed import SmoothedHeStiction
-from stiction_ros.effects.stiction_kano import KanoStiction
-from stiction_ros.effects.stiction_kano_smoothed import SmoothedKanoStiction
-from stiction_ros.effects.stiction_semi_physical import SemiPhysicalStiction
-from stiction_ros.effects.stiction_xch import XchStiction
-from stiction_ros.effects.tuning import Tuning
+from stiction_ros.effects.friction.semi_physical import SemiPhysicalStiction
+from stiction_ros.effects.friction.xch import XchStiction
+from stiction_ros.effects.process.delay import ExtraDelay
+from stiction_ros.effects.process.gain import ProcessGain
+from stiction_ros.effects.process.leak import Leak
+from stiction_ros.effects.process.pole import ExtraPole
+from stiction_ros.effects.seen import Axis, FloatArray, Seen
+from stiction_ros.effects.sensor.bias_step import BiasStep
+from stiction_ros.effects.sensor.clip import Clip
+from stiction_ros.effects.sensor.freeze import Freeze
+from stiction_ros.effects.sensor.quantisation import Quantisation
+from stiction_ros.effects.valve.backlash import Backlash
+from stiction_ros.effects.valve.characteristic import Characteristic
+from stiction_ros.effects.valve.lag import Lag
+from stiction_ros.effects.valve.offset import Offset
+from stiction_ros.effects.valve.saturation import Saturation
+from stiction_ros.effects.valve.slew import Slew
 from stiction_ros.errors import InputError
 
-BEHAVIOURS: tuple[type[Behaviour], ...] = (
-    HeStiction,
-    SmoothedHeStiction,
-    SemiPhysicalStiction,
-    KanoStiction,
-    SmoothedKanoStiction,
-    ChoudhuryStiction,
-    XchStiction,
-    Backlash,
-    Slew,
-    Lag,
-    Saturation,
-    Characteristic,
-    Offset,
-    ProcessGain,
-    ExtraDelay,
-    ExtraPole,
-    Leak,
-    StepDisturbance,
-    DriftDisturbance,
-    SineDisturbance,
-    ColouredDisturbance,
-    BiasStep,
-    Quantisation,
-    Freeze,
-    Clip,
-    Tuning,
-    TimeShift,
-)
+DEFAULT_LAW = "he"
+"""Of stiction, where YAML names none."""
 
 __all__ = [
-    "BEHAVIOURS",
+    "DEFAULT_LAW",
+    "Axis",
     "Backlash",
     "Behaviour",
     "BiasStep",
@@ -99,7 +85,9 @@ __all__ = [
     "FloatArray",
     "Freeze",
     "FrictionLaw",
+    "FrictionPair",
     "HeStiction",
+    "JumpForm",
     "KanoStiction",
     "Lag",
     "Leak",
@@ -109,17 +97,27 @@ __all__ = [
     "Parameter",
     "ProcessGain",
     "Quantisation",
+    "RandomWalkDisturbance",
     "Saturation",
+    "Seen",
     "SemiPhysicalStiction",
     "SineDisturbance",
     "Slew",
+    "SlipJumpPair",
     "SmoothedHeStiction",
     "SmoothedKanoStiction",
+    "SquareDisturbance",
     "StepDisturbance",
+    "Stiction",
     "TimeShift",
+    "TriangleDisturbance",
     "Tuning",
     "XchStiction",
+    "about",
+    "behaviours",
     "from_mapping",
+    "parameter",
+    "register",
 ]
 
 
@@ -134,14 +132,25 @@ def from_mapping(values: Mapping[str, Any]) -> Behaviour:
     rest = dict(values)
     effect = rest.pop("effect")
     law = rest.pop("law", None)
-    same_effect = [kind for kind in BEHAVIOURS if kind.effect == effect]
+    kinds = behaviours()
+    same_effect = [kind for kind in kinds if kind.effect == effect]
     if not same_effect:
-        names = sorted({kind.effect for kind in BEHAVIOURS})
+        names = sorted({kind.effect for kind in kinds})
         raise InputError(f"unknown effect {effect!r}", fix=f"known effects: {', '.join(names)}")
-    if law is None:
+    if law is None and len(same_effect) == 1:
         return same_effect[0].from_mapping(rest)
+    wanted = DEFAULT_LAW if law is None and effect == Stiction.effect else law
     for kind in same_effect:
-        if kind.law == law:
+        if kind.law == wanted:
             return kind.from_mapping(rest)
     laws = ", ".join(str(kind.law) for kind in same_effect)
     raise InputError(f"unknown law {law!r} of effect {effect}", fix=f"known laws: {laws}")
+
+
+def about(effect: str) -> type[Behaviour]:
+    """Return the class that says what is known of an effect, whatever its law.
+
+    Args:
+        effect: its name; of one that is in no catalogue nothing is known.
+    """
+    return next((kind for kind in behaviours() if kind.effect == effect), Behaviour)

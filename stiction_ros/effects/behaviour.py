@@ -15,9 +15,12 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.errors import InputError, is_finite
+from stiction_ros.checks import number
+from stiction_ros.effects.seen import Axis, Seen
+from stiction_ros.effects.seen import FloatArray as FloatArray
+from stiction_ros.errors import InputError
 
-FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 Memory = float | tuple[float, ...]
 NO_SAMPLE = -1.0  # in a memory that holds the time of the last sample: there was none
 
@@ -71,15 +74,27 @@ class Behaviour(ABC):
     """An effect on one signal, one sample at a time.
 
     Subclasses set :attr:`effect` (and :attr:`law` where one effect has several), declare
-    their parameters with :func:`parameter` and write :meth:`step`.
+    their parameters with :func:`parameter` and write :meth:`step`. All else may be left out: it
+    is then simulated, and ``stiction gap`` says that it does not consider it.
 
     Attributes:
         effect: name in YAML.
         law: which of several laws of one effect, or None.
         places: where it can act: ``valve``, ``process``, ``disturbance``, ``sensor``, ``data``.
-        signature: what a record of the loop shows, one sentence.
-        minimum_data: what a record must hold to tell its size, one sentence.
-        confusable: places and effects, such as ``sensor lag``, that look alike.
+        signature: what a record of the loop shows, one sentence without a full stop.
+        minimum_data: what a record must hold to tell its size, one sentence without a full stop.
+        confusable: places and effects, such as ``sensor lag``, that look alike; none where
+            nothing does.
+        experiment: what to record so that it shows, in the imperative.
+        separation: what tells it from what looks alike, in the imperative.
+        family: effects of one family at one place are told apart by a test of their own, or
+            serve for each other: ``friction``, ``lag``.
+        least: size of its first figure from which on it matters.
+        absorbed: whether another linear process would do as well.
+        bends: whether it bends the way from OP to PV, without memory.
+        in_values: whether the values of PV show it without any model.
+        told_of_step: members that hold for one :meth:`step` alone, not for that of a subclass.
+        not_searched: why ``stiction gap`` does not search it, one clause.
 
     Raises:
         InputError: a parameter that is not finite or lies outside its range.
@@ -100,20 +115,39 @@ class Behaviour(ABC):
     signature: ClassVar[str] = ""
     minimum_data: ClassVar[str] = ""
     confusable: ClassVar[tuple[str, ...]] = ()
+    # For `stiction gap`.
+    experiment: ClassVar[str] = ""
+    separation: ClassVar[str] = ""
+    family: ClassVar[str] = ""
+    least: ClassVar[float] = 0.0
+    absorbed: ClassVar[bool] = False
+    bends: ClassVar[bool] = False
+    in_values: ClassVar[bool] = False
+    not_searched: ClassVar[str] = "it names no axes on which its figures are searched"
+    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid",)
+
+    def __init_subclass__(cls) -> None:
+        """Take back what a base class said of its own :meth:`step` where this one has another.
+
+        So a law that is derived from a neighbour is never simulated on grids, certified or
+        controlled as that neighbour.
+        """
+        super().__init_subclass__()
+        if "step" not in cls.__dict__:
+            return
+        for name in cls.told_of_step:
+            if name not in cls.__dict__:
+                safe = [kind.__dict__[name] for kind in cls.__mro__ if name in kind.__dict__]
+                setattr(cls, name, safe[-1])
+        if "filter" not in cls.__dict__ and hasattr(cls, "filter"):
+            cls.filter = None  # no LinearFilter
 
     def __post_init__(self) -> None:
         for entry in self.parameters():
             value = getattr(self, entry.attribute)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise InputError(f"{value!r} is no number", where=entry.key)
-            if not is_finite(value):
-                raise InputError("the value is not finite", where=entry.key)
-            if not entry.low <= value <= entry.high:
-                raise InputError(
-                    f"{value:g} lies outside [{entry.low:g}, {entry.high:g}] {entry.unit}",
-                    where=entry.key,
-                )
-            object.__setattr__(self, entry.attribute, float(value))
+            low, high, unit = entry.low, entry.high, entry.unit if entry.unit != "1" else ""
+            checked = number(value, entry.key, low=low, high=high, unit=unit)
+            object.__setattr__(self, entry.attribute, checked)
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
@@ -192,6 +226,53 @@ class Behaviour(ABC):
             memory, out[k] = self.step(memory, value, k * sample_time)
         return out
 
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return outputs, shape (N, G), for ``grid`` of shape (G, parameters).
+
+        One after the other, by :meth:`step`; who is searched often does better.
+
+        Args:
+            grid: one set of parameters a row.
+            values: the incoming signal, shape (N,).
+            start: where it had rested before, one for all or shape (G,).
+            sample_time: s; only behaviours with a time of their own take notice.
+        """
+        rows = zip(grid.tolist(), starts(start, len(grid)).tolist(), strict=True)
+        return np.stack([cls(*row).simulate(values, at, sample_time) for row, at in rows], axis=1)
+
+    @classmethod
+    def axes(cls, seen: Seen) -> tuple[Axis, ...]:
+        """Return on which figures ``stiction gap`` searches it: one per parameter, in order.
+
+        Args:
+            seen: the signal that it would act on.
+
+        Returns:
+            Nothing for what is not searched; :attr:`not_searched` then says why.
+        """
+        return ()
+
+    @classmethod
+    def reference(cls, seen: Seen) -> tuple[float, ...]:
+        """Return figures of engineering size, in the order of the axes; what is left out is 0.
+
+        ``stiction gap`` says of a record whether an effect of this size would show in it.
+
+        Args:
+            seen: the signal that it would act on.
+        """
+        return tuple(
+            float(axis.outer(np.array([0.5 * (axis.inner(axis.low) + axis.inner(axis.high))]))[0])
+            for axis in cls.axes(seen)
+        )
+
 
 @runtime_checkable
 class SimulatesGrid(Protocol):
@@ -242,7 +323,11 @@ class Filter:
 
 @runtime_checkable
 class DrivenByNoise(Protocol):
-    """A behaviour that is random: whoever simulates it draws its numbers."""
+    """A behaviour that is random: whoever simulates it draws its numbers.
+
+    A plant takes :meth:`step_with` in the place of ``step`` and draws from its own seed, the same
+    numbers in every run of that seed. ``step`` still says what it does where nothing is drawn.
+    """
 
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float

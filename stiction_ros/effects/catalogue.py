@@ -9,12 +9,13 @@ import inspect
 import math
 import re
 
-from stiction_ros.effects import BEHAVIOURS
+from stiction_ros.effects import DEFAULT_LAW, Stiction, behaviours
 from stiction_ros.effects.behaviour import Behaviour, Parameter
 
 PLACES = {
     "valve": "Valves",
     "process": "Process",
+    "load": "Loads",
     "disturbance": "Disturbances",
     "sensor": "Sensors",
     "data": "Data",
@@ -30,15 +31,18 @@ An effect acts at a place, `KIND:TAG`, and stands there in the loop model:
 |---|---|---|
 | `valve:V1` | `valves: [{name: V1, effects: [...]}]` | OP in %, to the stem |
 | `process:PV1` | `process: {outputs: [{name: PV1, effects: [...]}]}` | output less `pv0` |
+| `load:V1` | `disturbances: [{load: V1, effect: ...}]` | 0, added to the stem in % |
 | `disturbance:PV1` | `disturbances: [{output: PV1, effect: ...}]` | 0, added to PV |
 | `sensor:PV1` | `sensors: [{name: PV1, effects: [...]}]` | PV with its noise |
 | `data` | none; a wrong tuning is mended in `controller:` | the record |
 
 Effects on a process act on its output without noise, whatever its kind, less the operating
 point `pv0`. A disturbance may also name a further input of the process instead of an output,
-`input: F_B`. A sensor takes PV with its noise. Effects of one place stand in signal order.
+`input: F_B`. A load enters through the process as the stem of its valve does, but stands in no
+stem. A sensor takes PV with its noise. Effects of one place stand in signal order.
 `time` counts seconds since the first sample, and `signal` is the unit of the signal. The laws
-of stiction are compared in [friction.md](friction.md).
+of stiction are compared in [friction.md](friction.md). How to add an effect of your own is said in
+`CONTRIBUTING.md`; its page in the [API](api/effects.md) has the names that it needs.
 
 *Minimum data* is what a record must hold to tell the size. *Confusable with* names what leaves
 nearly the same traces in OP and PV.
@@ -49,7 +53,8 @@ def page() -> str:
     """Return the page, Markdown."""
     parts = [_HEAD]
     for place, title in PLACES.items():
-        kinds = [kind for kind in BEHAVIOURS if place in kind.places]
+        kinds = [kind for kind in behaviours() if place in kind.places]
+        kinds.sort(key=lambda kind: (kind.effect != Stiction.effect, kind.law != DEFAULT_LAW))
         parts.append(f"## {title}\n\n" + "\n".join(_entry(kind, place) for kind in kinds))
     return "\n".join(parts)
 
@@ -59,13 +64,18 @@ def _entry(kind: type[Behaviour], place: str) -> str:
     rows = [f"| `{p.key}` | {p.unit} | {_range(p)} | {p.description} |" for p in kind.parameters()]
     head = f"### {name}\n\n{_summary(kind)}\n\n"
     table = "| parameter | unit | range | meaning |\n|---|---|---|---|\n" + "\n".join(rows)
-    if kind.law not in (None, "he"):
+    if kind.law not in (None, DEFAULT_LAW):
         return f"{head}{table}\n\nOtherwise as law `he`.\n"
+    if place == "load":
+        return f"{head}{table}\n\nOtherwise as a disturbance of an output.\n"
     others = [other for other in kind.confusable if other != f"{place} {kind.effect}"]
-    return (
-        f"{head}{table}\n\n- Signature: {kind.signature}.\n- Minimum data: {kind.minimum_data}.\n"
-        f"- Confusable with: {', '.join(others)}.\n"
-    )
+    told = {
+        "Signature": kind.signature,
+        "Minimum data": kind.minimum_data,
+        "Confusable with": ", ".join(others),
+    }
+    lines = [f"- {what}: {said}.\n" for what, said in told.items() if said]
+    return f"{head}{table}\n" + ("\n" if lines else "") + "".join(lines)
 
 
 def _summary(kind: type[Behaviour]) -> str:

@@ -93,3 +93,22 @@ def xch_stems(
                 stem[g] = value - direction[g] * dynamic[g]
             out[k, g] = stem[g]
     return out
+
+
+@compiled
+def he_stems(
+    static: FloatArray, dynamic: FloatArray, u: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Return stems by (4), shape (N, G), of valves (f_S, f_D) that rest at ``start``, (G,)."""
+    count, size = len(u), len(static)
+    stems = np.empty((count, size))
+    stem = start.copy()
+    for k in range(count):
+        value = u[k]
+        for g in range(size):
+            error = value - stem[g]
+            up, down = value - dynamic[g], value + dynamic[g]
+            moved = up if error > static[g] else (down if error < -static[g] else stem[g])
+            stem[g] = moved
+            stems[k, g] = moved
+    return stems

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, MpcController, StepResult
-from stiction_ros.control.paper_weights import WarmStart, WeightPreset
-from stiction_ros.control.printed_embedding import PrintedPlan
-from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.control import ControlMode, FrictionSpread, MpcController, StepResult
+from stiction_ros.control.printed.embedding import PrintedPlan
+from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart, WeightPreset
+from stiction_ros.effects import HeStiction, KanoStiction, Stiction, XchStiction
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.examples.paper import PLANTS
 from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
 from stiction_ros.online.session import Scenario
 
 SCHEDULES = ("held-out", "scenario")
+LAWS: Mapping[str, Any] = {"he": HeStiction, "kano": KanoStiction, "xch": XchStiction}
 FIRST_HOLD = 20  # samples at the operating point
 MOVES = 5
 # Held-out set-points lie this far from the operating point at most; valves then stay well
@@ -67,6 +69,12 @@ class StudyOptions:
         preset: weights of SU, SI and of the loop without friction; ``own`` are those of the
             scenario. The exact embedding always has those of the scenario.
         warm_start: of the embedding as printed.
+        programme_cost: of the embedding as printed.
+        law: of the sticky valves, and what the controllers take it for; with the frictions of the
+            scenario.
+        move_scale: of S of SU and SI, preset ``own``: 10 moves OP ten times as dear.
+        known: (f_S, f_D) of every valve, %, as the controllers know them, (0, 0) for a healthy
+            one; None for the truth.
         schedule: ``held-out`` draws set-points for each seed, ``scenario`` takes those of the
             scenario, on which its weights were chosen.
         hold: samples between set-point moves of ``held-out``.
@@ -78,6 +86,10 @@ class StudyOptions:
     plant: str = "tank"
     preset: WeightPreset = WeightPreset.OWN
     warm_start: WarmStart = WarmStart.COMPENSATION
+    programme_cost: ProgrammeCost = ProgrammeCost.REVISED
+    law: str = "he"
+    move_scale: float = 1.0
+    known: tuple[tuple[float, float], ...] | None = None
     schedule: str = "held-out"
     hold: int = 120
 
@@ -85,6 +97,7 @@ class StudyOptions:
         for value, known, where in (
             (self.plant, PLANTS, "plant"),
             (self.schedule, SCHEDULES, "schedule"),
+            (self.law, tuple(LAWS), "law"),
         ):
             if value not in known:
                 raise InputError(
@@ -96,6 +109,13 @@ class StudyOptions:
                 where="hold",
                 fix=f"use {2 * FIRST_HOLD} or more",
             )
+        for static, dynamic in self.known or ():
+            if not 0.0 <= dynamic <= static:
+                raise InputError(
+                    f"{static:g}, {dynamic:g} is no friction",
+                    where="known",
+                    fix="give f_S, f_D with 0 <= f_D <= f_S",
+                )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,24 +149,34 @@ class Trial:
 
 
 def run_trial(
-    options: StudyOptions, seed: int, progress: Callable[[float], None] | None = None
+    options: StudyOptions,
+    seed: int,
+    progress: Callable[[float], None] | None = None,
+    columns: Sequence[Column] = COLUMNS,
 ) -> Trial:
     """Run every column with the same noise and the same set-points.
 
-    The controllers know the true friction. Same options and seed give the same signals.
+    The controllers know the true friction unless ``options.known`` gives another. Same options
+    and seed give the same signals.
 
     Args:
         options: what is compared.
         seed: of noise and of held-out set-points.
         progress: called with the share done.
+        columns: to run.
     """
     scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    valves = len(scenario.plant.valves)
+    if options.known is not None and len(options.known) != valves:
+        raise InputError(
+            f"{len(options.known)} frictions for {valves} valves", where="known", fix="give each"
+        )
     schedule, samples = _schedule(scenario, options, seed)
     runs = {}
-    for done, column in enumerate(COLUMNS):
+    for done, column in enumerate(columns):
         runs[column.key] = _run(scenario, column, options, schedule, samples, seed)
         if progress is not None:
-            progress((done + 1) / len(COLUMNS))
+            progress((done + 1) / len(columns))
     sticky = tuple(valve.name for valve in scenario.plant.valves if valve.effects)
     return Trial(options, seed, sticky, runs)
 
@@ -197,7 +227,7 @@ def _run(
     samples: int,
     seed: int,
 ) -> ColumnRun:
-    plant = _plant(scenario, options.plant)
+    plant = _plant(scenario, options)
     controller = _controller(scenario, column, options, plant)
     if not column.sticky:
         plant = plant.with_ideal_valves()
@@ -217,11 +247,22 @@ def _run(
     return ColumnRun(run, times, dict(chosen), dict(statuses))
 
 
-def _plant(scenario: Scenario, name: str) -> LoopModel:
-    if name == "tank":
+def _plant(scenario: Scenario, options: StudyOptions) -> LoopModel:
+    if options.plant == "tank" and options.law == "he":
         return scenario.plant
-    effects = {valve.name: valve.effects for valve in scenario.plant.valves}
-    return scenario.process.with_valve_effects(effects)
+    effects = {
+        valve.name: tuple(_of_law(effect, options.law) for effect in valve.effects)
+        for valve in scenario.plant.valves
+    }
+    model = scenario.plant if options.plant == "tank" else scenario.process
+    return model.with_valve_effects(effects)
+
+
+def _of_law(effect: Behaviour, law: str) -> Behaviour:
+    if not isinstance(effect, HeStiction):
+        return effect
+    made: Behaviour = LAWS[law].from_frictions(effect.static_friction, effect.dynamic_friction)
+    return made
 
 
 def _controller(
@@ -229,13 +270,21 @@ def _controller(
 ) -> MpcController:
     settings = scenario.controller
     if column.key != "exact":
-        settings = dataclasses.replace(settings, preset=options.preset.value)
+        moves = tuple(options.move_scale * weight for weight in settings.move_weights)
+        settings = dataclasses.replace(settings, preset=options.preset.value, move_weights=moves)
     if column.printed:
         settings = dataclasses.replace(
-            settings, formulation="printed", warm_start=options.warm_start.value
+            settings,
+            formulation="printed",
+            warm_start=options.warm_start.value,
+            programme_cost=options.programme_cost.value,
         )
-    frictions = [
-        next((effect for effect in valve.effects if isinstance(effect, HeStiction)), None)
+    frictions: list[Stiction | None] = [
+        next((effect for effect in valve.effects if isinstance(effect, Stiction)), None)
         for valve in plant.valves
     ]
-    return MpcController(settings.design(scenario.process), column.mode, frictions)
+    if options.known is not None:
+        kind = LAWS[options.law]
+        frictions = [kind.from_frictions(*pair) if max(pair) else None for pair in options.known]
+    known = [None if friction is None else FrictionSpread(0.0, 0.0) for friction in frictions]
+    return MpcController(settings.design(scenario.process), column.mode, frictions, known)

@@ -56,7 +56,7 @@ def coupled_loop(seed: int, valves: int = 3, samples: int = SAMPLES) -> Example:
     loop = _loop(valves)
     schedule = _set_points(np.random.default_rng([seed, 1]), loop.outputs, samples)
     run = simulate_closed_loop(loop, _Controllers(valves), schedule, samples, seed)
-    options = IdentificationOptions(output_order=2, input_order=2, delay=(0, 4))
+    options = IdentificationOptions("exact", output_order=2, input_order=2, delay=(0, 4))
     return Example("coupled", f"{valves} valves", seed, run.record, loop, options)
 
 

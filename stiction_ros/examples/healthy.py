@@ -104,7 +104,7 @@ def healthy_loop(seed: int, family: str = "tight") -> Example:
     schedule = _set_points(random, samples, sample_time, abs(process.gain))
     record = _run(loop, schedule, disturbance, samples, int(random.integers(2**31)))
     record = _scaled(record, float(random.uniform(2.0, 10.0)))
-    return Example("healthy", family, seed, record, loop, IdentificationOptions())
+    return Example("healthy", family, seed, record, loop, IdentificationOptions("exact"))
 
 
 def _disturbance(

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import OutputModel
-from stiction_ros.identification.equation_error import ArxOrders, fit_arx
+from stiction_ros.identification.problem.equation_error import ArxOrders, fit_arx
 from stiction_ros.records import Record
 
 

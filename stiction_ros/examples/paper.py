@@ -8,6 +8,7 @@ from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.examples.example import Example
 from stiction_ros.identification import IdentificationOptions
+from stiction_ros.identification.friction.grid import laws
 from stiction_ros.loop import LoopModel, SetPoints
 from stiction_ros.online.session import Scenario, run_live
 from stiction_ros.processes import NoiseEntry
@@ -20,7 +21,9 @@ EXAMPLE2_ROUND = 620
 EXAMPLE2_SAMPLES = 2 * EXAMPLE2_ROUND
 
 
-def example1(seed: int, noise: str = "measurement", samples: int = EXAMPLE1_SAMPLES) -> Example:
+def example1(
+    seed: int, noise: str = "measurement", samples: int = EXAMPLE1_SAMPLES, law: str = "he"
+) -> Example:
     """Return Example 1: process (18), He's valve with f_S = 5 and f_D = 2, 2500 samples of 1 s.
 
     The stiction-unaware MPC (19) controls; the set-point moves every 250 s, as the cycle
@@ -30,20 +33,24 @@ def example1(seed: int, noise: str = "measurement", samples: int = EXAMPLE1_SAMP
         seed: of the white noise, σ = 0.01.
         noise: ``measurement`` adds it to PV as in (2), ``equation`` is v of (9).
         samples: N; a longer record repeats the set-points every 2500 s.
+        law: of the valve, one that is given by f_S and f_D.
 
     Raises:
-        InputError: unknown ``noise``.
+        InputError: unknown ``noise`` or ``law``.
     """
     _check(noise, NOISES, "noise")
     scenario = Scenario.load(find_config("siso.scenario.yaml"))
     document = scenario.plant.to_mapping()
     document["process"]["outputs"][0]["noise"]["enters"] = noise
     plant = LoopModel.from_mapping(document)
+    if law != "he":
+        _check(law, tuple(laws()), "law")
+        plant = plant.with_valve_effects({"V1": [laws()[law].from_frictions(5.0, 2.0)]})
     schedule = SetPoints.load(find_config("example1.set_points.yaml"), plant.outputs)
     schedule = dataclasses.replace(schedule, repeat=EXAMPLE1_SAMPLES * plant.sample_time)
     scenario = dataclasses.replace(scenario, plant=plant, set_points=schedule)
     record = _record(scenario, seed, samples)
-    options = IdentificationOptions(output_order=3, input_order=3, delay=(0, 10))
+    options = IdentificationOptions("exact", output_order=3, input_order=3, delay=(0, 10))
     return Example("example1", noise, seed, record, plant, options)
 
 
@@ -72,7 +79,9 @@ def example2(seed: int, plant: str = "linear", samples: int = EXAMPLE2_SAMPLES) 
     schedule = dataclasses.replace(scenario.set_points, repeat=EXAMPLE2_ROUND * model.sample_time)
     scenario = dataclasses.replace(scenario, plant=model, set_points=schedule)
     record = _record(scenario, seed, samples)
-    return Example("example2", plant, seed, record, model, IdentificationOptions(delay=(0, 0)))
+    return Example(
+        "example2", plant, seed, record, model, IdentificationOptions("exact", delay=(0, 0))
+    )
 
 
 def example2_of_one_round(seed: int, plant: str = "linear") -> Example:

@@ -97,6 +97,9 @@ def _example2(comparisons: Sequence[Comparison]) -> tuple[Finding, ...]:
 
 def _healthy(comparisons: Sequence[Comparison]) -> tuple[Finding, ...]:
     found = [_verdicts(comparisons, 0, kind) for kind in VerdictKind]
+    with_friction = sum(VerdictKind(c.valves[0].verdict).has_friction for c in comparisons)
+    name = comparisons[0].valves[0].name
+    found.append(Finding(f"{name}: sticky or backlash", with_friction, len(comparisons)))
     return tuple(
         dataclasses.replace(f, wanted=0.02, at_most=True) if "sticky" in f.text else f
         for f in found

@@ -6,15 +6,15 @@ import dataclasses
 import time
 from pathlib import Path
 
-from stiction_ros.faults.bag_check import check_bag
 from stiction_ros.faults.fault import Bag, Fault, Pace, Phase
-from stiction_ros.faults.flow import CALM, new_ops, recovered
-from stiction_ros.faults.judge import LOOP, Outcome, judge
-from stiction_ros.faults.notices import GONE_WITHIN, SHOWN_WITHIN, level_at, look_for
-from stiction_ros.faults.observation import BagFound, Ended, Known, Observation
-from stiction_ros.faults.reference import allowed_move
-from stiction_ros.faults.running import RunningLoop
-from stiction_ros.faults.setting_up import HAND_OVER, SETTLING, WARM_UP
+from stiction_ros.faults.judgement.bag_check import check_bag
+from stiction_ros.faults.judgement.flow import CALM, new_ops, recovered
+from stiction_ros.faults.judgement.judge import LOOP, Outcome, judge
+from stiction_ros.faults.judgement.notices import GONE_WITHIN, SHOWN_WITHIN, level_at, look_for
+from stiction_ros.faults.judgement.observation import BagFound, Ended, Known, Observation
+from stiction_ros.faults.loop.reference import allowed_move
+from stiction_ros.faults.loop.running import RunningLoop
+from stiction_ros.faults.loop.setting_up import HAND_OVER, SETTLING, WARM_UP
 
 START = 90.0  # s until the first samples; a first start compiles
 SWAP = 20.0  # s until the controller has taken the prepared model

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stiction_ros.errors import InputError
-from stiction_ros.faults import (
+from stiction_ros.faults.fault import BOTH_PACES, BOTH_PHASES, Bag, Fault
+from stiction_ros.faults.kinds import (
     commanders,
     lost_signals,
     offered_models,
@@ -11,7 +11,7 @@ from stiction_ros.faults import (
     signal_junk,
     stopped_nodes,
 )
-from stiction_ros.faults.fault import BOTH_PACES, BOTH_PHASES, Bag, Fault
+from stiction_ros.faults.named import named
 
 FAULTS: tuple[Fault, ...] = (
     *stopped_nodes.FAULTS,
@@ -29,15 +29,7 @@ def find(name: str) -> Fault:
     Raises:
         InputError: there is none.
     """
-    for fault in FAULTS:
-        if fault.name == name:
-            return fault
-    close = [fault.name for fault in FAULTS if name in fault.name]
-    raise InputError(
-        f"unknown fault {name!r}",
-        where="--only",
-        fix=f"use {', '.join(close)}" if close else "stiction faults --list shows all",
-    )
+    return named(FAULTS, name, "stiction faults --list")
 
 
 def table() -> str:

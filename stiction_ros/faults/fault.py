@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stiction_ros.faults.running import RunningLoop
+    from stiction_ros.faults.loop.running import RunningLoop
 
 
 class Pace(enum.StrEnum):

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.node_processes import ros_environment
-from stiction_ros.faults.node_process import NodeProcess
-from stiction_ros.online.live_controller import HISTORY_SAMPLES
+from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.faults.loop.node_process import NodeProcess
+from stiction_ros.online.controller.live import HISTORY_SAMPLES
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.settings import from_mapping
 
@@ -138,7 +138,7 @@ def soak(
         seconds: wall time; infinite for as long as the samples take.
         progress: told the share that is done.
     """
-    from stiction_ros.nodes.fault_probe import Probe
+    from stiction_ros.nodes.probes.fault_probe import Probe
 
     environment = ros_environment()
     probe = Probe(environment, topics=())

@@ -154,7 +154,7 @@ class Circumstances:
         return tuple(name for name, there in told if there)
 
 
-def _choice(random: np.random.Generator, shares: dict[T, float]) -> T:
+def choice(random: np.random.Generator, shares: dict[T, float]) -> T:
     """Return one of the keys by its share."""
     total = sum(shares.values())
     at = random.choice(len(shares), p=[share / total for share in shares.values()])
@@ -163,9 +163,9 @@ def _choice(random: np.random.Generator, shares: dict[T, float]) -> T:
 
 def draw_circumstances(random: np.random.Generator) -> Circumstances:
     """Return circumstances that go together."""
-    friction = _choice(random, {Friction.MUCH: 48, Friction.FEW_SLIPS: 6, Friction.NONE: 46})
-    law = _choice(random, {Law.HE: 30, Law.KARNOPP: 28, Law.LUGRE: 22, Law.BACKLASH: 20})
-    plant = _choice(
+    friction = choice(random, {Friction.MUCH: 48, Friction.FEW_SLIPS: 6, Friction.NONE: 46})
+    law = choice(random, {Law.HE: 30, Law.KARNOPP: 28, Law.LUGRE: 22, Law.BACKLASH: 20})
+    plant = choice(
         random,
         {
             Plant.FLOW: 26,
@@ -178,10 +178,10 @@ def draw_circumstances(random: np.random.Generator) -> Circumstances:
             Plant.COLUMN: 8,
         },
     )
-    sampling = _choice(random, {Sampling.USUAL: 68, Sampling.FAST: 18, Sampling.SLOW: 14})
+    sampling = choice(random, {Sampling.USUAL: 68, Sampling.FAST: 18, Sampling.SLOW: 14})
     if friction is Friction.FEW_SLIPS and random.random() < 0.7:
         sampling = Sampling.FAST
-    keeping = _choice(
+    keeping = choice(
         random,
         {
             Keeping.AS_READ: 40,
@@ -202,8 +202,8 @@ def draw_circumstances(random: np.random.Generator) -> Circumstances:
         sampling=sampling,
         scan_ratio=_scan_ratio(random, sampling, keeping),
         keeping=keeping,
-        hole=_choice(random, {Hole.NOTHING: 82, Hole.ROWS: 7, Hole.BAD: 5, Hole.GAP: 6}),
-        unit=_choice(
+        hole=choice(random, {Hole.NOTHING: 82, Hole.ROWS: 7, Hole.BAD: 5, Hole.GAP: 6}),
+        unit=choice(
             random,
             {Unit.PERCENT: 80, Unit.CENTRED: 6, Unit.SHARE: 5, Unit.CURRENT: 4, Unit.OTHER: 5},
         ),
@@ -221,13 +221,13 @@ def _outside(random: np.random.Generator, friction: Friction, law: Law, plant: P
     if friction is Friction.NONE:
         if random.random() < QUIET:
             return Outside.NOTHING
-        return _choice(random, {**waves, Outside.RINGING: 16, Outside.SET_POINT: 9})
+        return choice(random, {**waves, Outside.RINGING: 16, Outside.SET_POINT: 9})
     if friction is Friction.FEW_SLIPS:
         return Outside.NOTHING
     # A deadband moves by itself in loops that integrate twice; elsewhere something moves it.
     moved = law is Law.BACKLASH and plant is not Plant.LEVEL
     if moved or random.random() < SECOND_CAUSE:
-        return _choice(random, {**waves, Outside.SET_POINT: 15})
+        return choice(random, {**waves, Outside.SET_POINT: 15})
     return Outside.NOTHING
 
 

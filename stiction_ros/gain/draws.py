@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.results import ValveEstimate
+from stiction_ros.identification.result.identification import ValveEstimate
 
 DRAWS = 20
 """Loops drawn, the estimate itself among them."""

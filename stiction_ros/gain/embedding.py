@@ -16,6 +16,7 @@ All weights follow from the identified loop, in units of OP's and PV's own movem
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,8 @@ class EmbeddingDesign:
             disturbance_noise=(walk,),
             measurement_noise=(noise,),
             jump_price=PRICED * noise,
+            look_ahead=0,
+            kick_limits=(math.inf,),
         )
         return cls(model, settings, friction, spread)
 
@@ -158,6 +161,7 @@ class EmbeddingDesign:
         settings, pv, op = self.settings, pv_scale**2, op_scale**2
         return {
             "horizon": float(settings.horizon),
+            "look_ahead": float(settings.look_ahead),
             "output_weights": 1.0 / pv,
             "embedding_move_weights": settings.embedding_move_weights[0] / op,
             "jump_price": settings.jump_price,

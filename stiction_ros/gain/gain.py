@@ -16,8 +16,8 @@ from stiction_ros.gain.embedding import EmbeddingDesign, embedded
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.gain.retuning import UNCHANGED, best_tuning
-from stiction_ros.identification.closed_loop.cause import CauseKind
-from stiction_ros.identification.results import Identification, VerdictKind
+from stiction_ros.identification.result.cause import CauseKind
+from stiction_ros.identification.result.identification import Identification, VerdictKind
 from stiction_ros.records.record import Record
 
 HARDER = (1.0, 1.3, 1.6)
@@ -37,9 +37,6 @@ as recorded is not the loop that was recorded."""
 
 FEWEST = 3
 """Drawn loops that must repeat the record, for anything to be said."""
-
-FOUND = ("sticky", "backlash")
-"""Verdicts by which a friction is known well enough to plan jumps by it."""
 
 RETUNED = (CauseKind.VALVE, CauseKind.TUNING)
 """Causes by which a loop shows its process well enough to be tuned by it: what comes from outside
@@ -249,8 +246,7 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
 
 def _embedding(loop: RecordedLoop, found: Identification) -> Option:
     cause = found.outputs[loop.output].cause
-    known = loop.estimate.to_json()["verdict"] in FOUND
-    if not known or cause is None or cause.kind is not CauseKind.VALVE:
+    if not loop.estimate.verdict.has_friction or cause is None or cause.kind is not CauseKind.VALVE:
         note = "The record does not show a valve whose friction makes the loop cycle."
         return Option(What.EMBEDDING, None, {}, f"{note} Nothing is promised of embedding it.")
     estimate = np.array([loop.estimate.static_friction, loop.estimate.dynamic_friction])

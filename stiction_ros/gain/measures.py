@@ -3,7 +3,7 @@
 - *Amplitude*: √2 × RMS of the spectral line of PV − SP at the period at which the loop cycles
   now, see :mod:`stiction_ros.identification.closed_loop.oscillation`.
 - *IAE per hour*: ∫|PV − SP| dt per hour with time in hours, which is the mean |PV − SP|.
-- *Travel*: Σ|Δχ|, %; *reversals*: changes of the direction in which the stem moves; both an hour.
+- *Travel*, *moves* and *reversals* of the stem, an hour: :mod:`stiction_ros.records.valve_work`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,7 @@ from stiction_ros.identification.closed_loop.oscillation import (
     Oscillation,
     amplitude,
 )
-
-STANDS = 1e-9
-"""Share of the stem's range up to which a move is rounding."""
+from stiction_ros.records.valve_work import ValveWork
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,12 +32,14 @@ class Measures:
             is no period to look at.
         iae_per_hour: engineering units of PV.
         travel_per_hour: of the stem, %.
+        moves_per_hour: of the stem.
         reversals_per_hour: of the stem.
     """
 
     amplitude: float | None
     iae_per_hour: float
     travel_per_hour: float
+    moves_per_hour: float
     reversals_per_hour: float
 
     def to_json(self) -> dict[str, float | None]:
@@ -70,16 +70,8 @@ class Yardstick:
         """
         hours = len(error) * self.sample_time / 3600.0
         line = None if self.period is None else amplitude(error, self.stretches, self.period)
-        travel, reversals = work(stem)
-        return Measures(line, float(np.abs(error).mean()), travel / hours, reversals / hours)
-
-
-def work(stem: FloatArray) -> tuple[float, int]:
-    """Return the travel, %, and the reversals of a stem, shape (n,)."""
-    moves = np.diff(stem)
-    moves = moves[np.abs(moves) > STANDS * max(float(np.ptp(stem)), 1e-300)]
-    turns = int(np.count_nonzero(np.diff(np.signbit(moves)))) if len(moves) else 0
-    return float(np.abs(moves).sum()), turns
+        work = ValveWork.of(stem).per_hour(hours)
+        return Measures(line, float(np.abs(error).mean()), work.travel, work.moves, work.reversals)
 
 
 def cycle_period(swing: Oscillation | None) -> float | None:

@@ -28,7 +28,11 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
     scaled,
     scaled_process,
 )
-from stiction_ros.identification.results import FitStatus, Identification, ValveEstimate
+from stiction_ros.identification.result.identification import (
+    FitStatus,
+    Identification,
+    ValveEstimate,
+)
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 

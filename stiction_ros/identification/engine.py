@@ -9,12 +9,18 @@ from functools import partial
 
 import numpy as np
 
-from stiction_ros.identification.certificate import certificates
+from stiction_ros.effects import HeStiction
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.conclusion import Findings, conclude
-from stiction_ros.identification.intervals import friction_intervals
-from stiction_ros.identification.long_records import carried_over, liveliest_part
-from stiction_ros.identification.models import (
+from stiction_ros.identification.exact.further_fit import begun, settled, with_further_estimates
+from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
+from stiction_ros.identification.exact.one_step_best import one_step_best, seen
+from stiction_ros.identification.exact.search import SearchOutcome, improve, search
+from stiction_ros.identification.inference.certificate import certificates
+from stiction_ros.identification.inference.conclusion import Findings, conclude
+from stiction_ros.identification.inference.intervals import friction_intervals
+from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.problem.models import (
     Data,
     Model,
     improve_delays,
@@ -22,21 +28,18 @@ from stiction_ros.identification.models import (
     refit,
     settle_delays,
 )
-from stiction_ros.identification.one_step_best import one_step_best, seen
-from stiction_ros.identification.options import IdentificationOptions
-from stiction_ros.identification.output_error import Orders
-from stiction_ros.identification.patterns import has_cells
-from stiction_ros.identification.preparation import prepare, windows
-from stiction_ros.identification.results import (
+from stiction_ros.identification.problem.output_error import Orders
+from stiction_ros.identification.problem.preparation import prepare, windows
+from stiction_ros.identification.result.identification import (
     Identification,
     OrderRow,
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.search import SearchOutcome, improve, search
-from stiction_ros.identification.search_log import SearchLog
+from stiction_ros.identification.result.search_log import SearchLog
+from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
-from stiction_ros.identification.verdict import evidence, judge
+from stiction_ros.identification.switching.patterns import has_cells
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -65,13 +68,15 @@ def identify(
     data = prepare(record, options)
     report(0.02)
     part = liveliest_part(data) if has_cells(data.law) else data
-    orders, linear, outcome, table = choose(part, options)
+    part, orders, linear, outcome, table = choose(part, options)
+    data = dataclasses.replace(data, further=part.further)
     model = outcome.model
     report(0.4)
     if part is not data:
         linear = linear_model(data, orders)
         model = carried_over(data, linear, model, orders)
     report(0.5)
+    data, model = settled(data, model, orders)
     model, delays = settle_delays(data, model, orders)
     (valves, final), one_step = at_once(
         lambda: judged_valves(record, data, model, linear, orders, options),
@@ -79,6 +84,7 @@ def identify(
     )
     if one_step is not None and (final.friction[:, 0] == 0.0).any():
         one_step = also_from(one_step, record, data, (model, final), orders)
+    valves = with_further_estimates(data, final, orders, valves, options.confidence)
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(final, valves, table, told, one_step)
@@ -103,7 +109,7 @@ def least_one_step(
     record: Record, data: Data, model: Model, orders: Orders, options: IdentificationOptions
 ) -> SearchLog | None:
     """Return the least one-step SE, where it is asked for and the law has it."""
-    if not options.one_step_best or options.law != "he":
+    if not options.one_step_best or data.law is not HeStiction:
         return None
     return one_step_best(record, data, model, orders)
 
@@ -124,14 +130,18 @@ def also_from(
 
 def choose(
     data: Data, options: IdentificationOptions
-) -> tuple[Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
-    """Return the orders, the friction-free model, the one with friction and all orders tried."""
+) -> tuple[Data, Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
+    """Return data, orders, friction-free model, the one with friction and all orders tried.
+
+    The data hold the law's further parameters where they begin.
+    """
     orders_list = windows(options)
     start = orders_list[len(orders_list) // 2]
     linear = linear_model(data, start)
+    data = begun(data, linear, start)
     found = search(data, linear, start)
     if len(orders_list) == 1:
-        return start, linear, found, (order_row(start, found.model),)
+        return data, start, linear, found, (order_row(start, found.model),)
     models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
     table = tuple(order_row(*rival) for rival in rivals)
@@ -141,7 +151,7 @@ def choose(
         found = search(data, linear, orders, growing=False)
         best = improve(data, best, orders)
     better = min(best, found.model, key=lambda candidate: candidate.loss)
-    return orders, linear, dataclasses.replace(found, model=better), table
+    return data, orders, linear, dataclasses.replace(found, model=better), table
 
 
 def order_row(orders: Orders, model: Model) -> OrderRow:
@@ -206,22 +216,22 @@ def estimate_valves(
         model = intervals.model
         span = float(np.ptp(data.u[j]))
         figures = evidence(data, model, rivals[j], j, span)
+        figures["deadband_loss"] = intervals.deadband_loss
         doubted = figures["delta_bic"] <= options.bic_margin
         static = (0.0, intervals.static[1]) if doubted else intervals.static
         dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
-        verdict = judge(figures, static, span, options)
+        verdict = judge(figures, static, dynamic, span, options)
         estimate = (intervals.static_estimate, intervals.dynamic_estimate)
         if doubted and (figures["delta_bic"] < 0.0 or verdict is VerdictKind.HEALTHY):
             estimate = (0.0, 0.0)
             model = without_friction(data, model, orders, j)
-        figures["deadband_loss"] = intervals.deadband_loss
         if record.stem is not None:
             error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
             figures["stem_error"] = float(np.mean(error**2))
         figures["patterns"] = float(intervals.patterns)
         figures["patterns_closed"] = float(intervals.closed)
         found.append((estimate, static, dynamic, verdict, figures, intervals.profile))
-    valves = tuple(_valve(record, model, j, *entry, options.law) for j, entry in enumerate(found))
+    valves = tuple(_valve(record, model, j, *entry, options) for j, entry in enumerate(found))
     return valves, model
 
 
@@ -244,20 +254,22 @@ def _valve(
     verdict: VerdictKind,
     figures: dict[str, float],
     profile: tuple[tuple[float, float], ...],
-    law: str,
+    options: IdentificationOptions,
 ) -> ValveEstimate:
     f_s, f_d = estimate
+    unheard = options.bic_margin if verdict is VerdictKind.HEALTHY else None
     return ValveEstimate(
         name=record.valves[j],
         verdict=verdict,
-        law=law,
+        law=options.law,
         static_friction=f_s,
         static_interval=(min(static[0], f_s), max(static[1], f_s)),
         dynamic_friction=f_d,
         dynamic_interval=(min(dynamic[0], f_d), max(dynamic[1], f_d)),
-        jump=0.0 if figures["deadband_loss"] < 4.0 else f_s - f_d,
+        jump=0.0 if is_deadband(figures["deadband_loss"], static, dynamic) else f_s - f_d,
         stem_start=float(record.op[0, j] + model.start[j]),
         moves=int(np.count_nonzero(np.diff(model.stems[j]))),
         evidence=figures,
         profile=profile,
+        stability=Stability(halves((figures["half_1"], figures["half_2"]), unheard)),
     )

@@ -1,10 +1,9 @@
 """Identification by any method.
 
-- ``exact``: the default search, :mod:`.engine`.
-- ``evidence``: friction by the marginal likelihood under any smooth process,
+- ``evidence``, the default: friction by the marginal likelihood under any smooth process,
   :mod:`.evidence.engine`; it needs neither orders nor delays for that.
-- ``nlp``: the paper's nonlinear programme (12), :mod:`.nlp`.
-- ``grid``: the grid search that the paper compares with, :mod:`.grid_search`.
+- ``exact``: friction and an ARX process of chosen order together, down to the best switching
+  pattern, :mod:`.engine`. It takes the process at its word, and is several times as fast.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.input_checks import Evidence, swapped_columns
 from stiction_ros.identification.options import IdentificationOptions
-from stiction_ros.identification.results import Identification
+from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
+from stiction_ros.identification.result.identification import Identification
 from stiction_ros.identification.side_by_side import at_once
 from stiction_ros.records.record import Record
 
@@ -39,8 +38,6 @@ def _in_module(name: str) -> Method:
 METHODS: Mapping[str, Method] = {
     "exact": _in_module("engine"),
     "evidence": _in_module("evidence.engine"),
-    "nlp": _in_module("nlp"),
-    "grid": _in_module("grid_search"),
 }
 
 
@@ -64,8 +61,8 @@ def identify(
         A verdict, f_S and f_D in % with intervals for every valve, and the process behind it.
         It is a value also where no trustworthy model was found: see its ``status``.
 
-    The valve is He's (4) by default, the process (7)–(9); f_S, f_D, delays and orders are those
-    whose free run explains PV best under autoregressive noise.
+    The valve is He's (4) by default; f_S and f_D are those that leave PV least to explain under
+    any smooth response and autoregressive noise. The process (7)–(9) is fitted to their stems.
 
     Examples:
         >>> from stiction_ros import IdentificationOptions, LoopModel
@@ -81,22 +78,15 @@ def identify(
     found: Identification | InputError
     if options.check_columns and options.method == "exact":  # as long as the check itself
         found, evidence = at_once(partial(_attempt, record, options, progress), checked)
-        _refuse_swapped(record, evidence)
+        refuse_swapped(record, evidence)
     else:
-        _refuse_swapped(record, checked() if options.check_columns else None)
+        refuse_swapped(record, checked() if options.check_columns else None)
         found = _attempt(record, options, progress)
     if isinstance(found, InputError):
         raise found
-    return found
+    from stiction_ros.identification.answer.advice import advised  # slow to import, now loaded
 
-
-def _refuse_swapped(record: Record, evidence: Evidence | None) -> None:
-    if evidence is not None:
-        raise InputError(
-            f"OP and PV look swapped: {evidence.reason}",
-            where=record.name,
-            fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
-        )
+    return advised(record, found, options)
 
 
 def _attempt(

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.signal import lfilter
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.identification.methods import identify
+from stiction_ros.identification.methods import METHODS, identify
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
 
 SAMPLES = 240
 
 
-def compile_loops() -> None:
-    """Identify a short made-up record.
+def compile_loops(methods: Sequence[str] = tuple(METHODS)) -> None:
+    """Identify a short made-up record by each of ``methods``.
 
     The first call on a machine compiles for many seconds and keeps the result; later ones
     take a fraction of a second.
@@ -24,4 +26,5 @@ def compile_loops() -> None:
     stem = HeStiction(4.0, 1.0).simulate(op)
     pv = lfilter([0.0, 0.0, 0.2], [1.0, -0.8], stem) + 0.1 * generator.standard_normal(SAMPLES)
     record = Record("made up", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
-    identify(record, IdentificationOptions(delay=(0, 2), output_order=1, input_order=1))
+    for method in methods:
+        identify(record, IdentificationOptions(method, output_order=1, input_order=1, delay=(0, 2)))

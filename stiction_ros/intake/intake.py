@@ -16,9 +16,9 @@ from stiction_ros.intake.tables.block import Block
 from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
 from stiction_ros.intake.tables.tags import TagList, read_tag_list
-from stiction_ros.records.bag_reader import read_bag_loops, read_bag_parts
 from stiction_ros.records.record import Record
-from stiction_ros.records.storage_files import METADATA
+from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
+from stiction_ros.records.storage.files import METADATA
 
 OTHERS = 8
 """Loops that an error lists."""

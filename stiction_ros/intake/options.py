@@ -78,7 +78,7 @@ _TIME_UNITS = {
 class CsvColumns:
     """Which column is what; a tag to its column, None for the default names.
 
-    In a file that :func:`stiction_ros.records.csv_writer.write_csv` wrote the default is what
+    In a file that :func:`stiction_ros.records.csv.writer.write_csv` wrote the default is what
     is written there, ``TAG.OP``, ``TAG.PV`` … included.
 
     Attributes:

@@ -83,7 +83,7 @@ def refuse_swapped(block: Block) -> None:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
     measurement and its Δ at the same sample, and not the other way round. Rounding and
     compression leave some of that. Of records with a set-point, and of exact controllers,
-    :mod:`stiction_ros.identification.input_checks` knows more.
+    :mod:`stiction_ros.identification.problem.input_checks` knows more.
 
     Raises:
         InputError: OP and PV look swapped.

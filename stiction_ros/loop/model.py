@@ -14,11 +14,11 @@ import yaml
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError
-from stiction_ros.loop.effect_reading import read_effects
 from stiction_ros.loop.instrument import Instrument
-from stiction_ros.loop.places import append_effect
-from stiction_ros.loop.process_reading import read_instruments, read_process
-from stiction_ros.loop.reading import Section, load_yaml, parse_yaml
+from stiction_ros.loop.yaml.effects import at_place, read_effects
+from stiction_ros.loop.yaml.places import append_effect
+from stiction_ros.loop.yaml.process import read_instruments, read_process
+from stiction_ros.loop.yaml.reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process
 
 
@@ -33,10 +33,17 @@ class Valve:
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """An unmeasured effect that adds to an output or to a further input of the process."""
+    """An unmeasured effect that adds to an output, a further input, or the stem of a valve.
+
+    Attributes:
+        place: tag of the output, the input or the valve.
+        behaviour: what is added.
+        load: whether it enters the process beside the stem of a valve.
+    """
 
     place: str
     behaviour: Behaviour
+    load: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -232,8 +239,8 @@ class LoopModel:
         """Return the loop with one more effect, the last in signal order at its place.
 
         Args:
-            place: ``valve:TAG``, ``process:TAG``, ``sensor:TAG``, or ``disturbance:TAG`` with
-                the tag of an output or of a further input of the process.
+            place: ``valve:TAG``, ``load:TAG``, ``process:TAG``, ``sensor:TAG``, or
+                ``disturbance:TAG`` with the tag of an output or of a further input.
             effect: what acts there.
             provenance: if any, one entry of the provenance.
 
@@ -275,7 +282,7 @@ def _read_valve(section: Section) -> Valve:
                 fix="write [low, high]",
             )
         limits = (float(low), float(high))
-    effects = read_effects(section)
+    effects = read_effects(section, "valve")
     section.finish()
     return Valve(name, limits, effects)
 
@@ -290,24 +297,27 @@ def _read_sensors(top: Section, outputs: tuple[str, ...]) -> tuple[tuple[Behavio
                 where=section.at("name"),
                 fix="put all its effects into one list",
             )
-        found[name] = read_effects(section)
+        found[name] = read_effects(section, "sensor")
         section.finish()
     return tuple(found.get(name, ()) for name in outputs)
 
 
 def _read_disturbance(section: Section, process: Process) -> Disturbance:
     values = dict(section.values)
-    keys = [key for key in ("output", "input") if key in values]
+    known = {"output": process.outputs, "input": process.upsets, "load": process.valves}
+    keys = [key for key in known if key in values]
     if len(keys) != 1:
         raise InputError(
-            "a disturbance acts on one output or one input",
+            "a disturbance acts on one output or one input, or is the load of one valve",
             where=section.where,
             fix=f"add output: {' | '.join(process.outputs)}",
         )
-    section.choice(keys[0], process.outputs if keys[0] == "output" else process.upsets)
-    place = values.pop(keys[0])
+    (key,) = keys
+    section.choice(key, known[key])
+    place = values.pop(key)
     try:
-        return Disturbance(place, effect_from_mapping(values))
+        effect = at_place(effect_from_mapping(values), "load" if key == "load" else "disturbance")
+        return Disturbance(place, effect, load=key == "load")
     except InputError as error:
         raise error.within(section.where) from None
 

@@ -92,7 +92,14 @@ class Plant:
             for effects, start in zip(model.sensors, model.pv_start, strict=True)
         ]
         self._disturbances = [
-            (d.place, _Chain((d.behaviour,), 0.0, random_effects)) for d in model.disturbances
+            (d.place, _Chain((d.behaviour,), 0.0, random_effects))
+            for d in model.disturbances
+            if not d.load
+        ]
+        self._loads = [
+            (model.valve_names.index(d.place), _Chain((d.behaviour,), 0.0, random_effects))
+            for d in model.disturbances
+            if d.load
         ]
         self._measurement_std = process.noise_std(NoiseEntry.MEASUREMENT)
         self._equation_std = process.noise_std(NoiseEntry.EQUATION)
@@ -118,7 +125,10 @@ class Plant:
             asked = min(max(float(op[j]), low), high)
             stem[j] = min(max(chain.step(asked, time), low), high)
         noise = self._equation_std * self._random.standard_normal(len(self._equation_std))
-        self._state = self.model.process.advance(self._state, stem, self._upset, noise)
+        moved = stem.copy() if self._loads else stem
+        for j, chain in self._loads:
+            moved[j] += chain.step(0.0, time)
+        self._state = self.model.process.advance(self._state, moved, self._upset, noise)
         self._stem = stem
         self.sample += 1
         self._now = self._look()

@@ -9,8 +9,8 @@ import yaml
 
 from stiction_ros.effects import Behaviour
 from stiction_ros.errors import InputError
-from stiction_ros.loop.effect_reading import read_effects
-from stiction_ros.loop.reading import Section, parse_yaml
+from stiction_ros.loop.yaml.effects import read_effects
+from stiction_ros.loop.yaml.reading import Section, parse_yaml
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +57,7 @@ def read_valve_changes(
         section = Section(entry, f"{where}[{i}]")
         time, valve = section.number("time", low=0.0), section.choice("valve", valves)
         section.raw("effects")  # a change to no effects is said, not left out
-        changes.append(ValveChange(time, valve, read_effects(section)))
+        changes.append(ValveChange(time, valve, read_effects(section, "valve")))
         section.finish()
     return tuple(sorted(changes, key=lambda change: change.time))
 

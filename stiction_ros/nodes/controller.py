@@ -6,6 +6,7 @@ import time
 from collections import deque
 from typing import Any
 
+from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -14,30 +15,32 @@ from stiction_ros.config_files import find_config
 from stiction_ros.control import StepResult
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.controller_inputs import ControllerInputs
-from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
-from stiction_ros.nodes.peers import publishers_of
-from stiction_ros.nodes.runner import run
-from stiction_ros.online.background import AtOnce, Beside
-from stiction_ros.online.input_port import InputPort
-from stiction_ros.online.live_controller import LiveController
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, to_ns, trajectory
+from stiction_ros.nodes.shared.peers import publishers_of
+from stiction_ros.nodes.shared.runner import run
+from stiction_ros.nodes.topics.controller_inputs import ControllerInputs
+from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.rehearsal import rehearse
+from stiction_ros.online.handover.background import AtOnce, Beside
+from stiction_ros.online.input.port import InputPort
+from stiction_ros.online.input.port_health import PortHealth, keys
+from stiction_ros.online.input.samples import PortRules, Sample
 from stiction_ros.online.node_settings import ControllerNodeSettings
-from stiction_ros.online.port_health import PortHealth, keys
-from stiction_ros.online.rehearsal import rehearse
-from stiction_ros.online.samples import PortRules, Sample
 
 QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
 GRAPH_PERIOD = 1.0  # s between two looks at who commands
 
 
 class ControllerNode(ControllerInputs):
-    """Thin shell around :class:`stiction_ros.online.live_controller.LiveController`."""
+    """Thin shell around :class:`stiction_ros.online.controller.live.LiveController`."""
+
+    settings: ControllerNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``controller``; ``kwargs`` go to the ROS node."""
         super().__init__("controller", ControllerNodeSettings, **kwargs)
-        self._late_timer: Any = None
+        self._late_timer: Timer | None = None
         self.listening = False
 
     def configure(self) -> None:
@@ -68,7 +71,7 @@ class ControllerNode(ControllerInputs):
         self._port_health = PortHealth(lockstep)
         self.fits, self.models, self.reading = {}, {""}, deque()
         self._last_op: JointState | None = None
-        self._waiting_since: int | None = None
+        self._waiting_since: float | None = None
         self._told = self._doubts = 0
         self._result: StepResult | None = None
         self._sent_at: float | None = None
@@ -125,7 +128,7 @@ class ControllerNode(ControllerInputs):
         self._running_since = time.monotonic()
         self.go()
 
-    def retune(self, settings: Any) -> None:
+    def retune(self, settings: ControllerNodeSettings) -> None:
         self.live.retune(settings)
         if settings.speed != self.settings.speed:
             period = self.model.sample_time / settings.speed
@@ -196,17 +199,19 @@ class ControllerNode(ControllerInputs):
             if in_force is None:
                 in_force = self.model.stem_start if own is None else own
                 shown = ", ".join(f"{value:g}" for value in in_force)
-                self.get_logger().warning(f"nobody tells the op in force, taken to be {shown}")
+                self.log.warning(f"nobody tells the op in force, taken to be {shown}")
             self.live.begin(in_force)
-            self.get_logger().info(f"sample {sample.number}: a run begins")
+            self.log.info(f"sample {sample.number}: a run begins")
         elif given.op is not None:
-            self.live.applied(given.op)
+            self.live.applied(given.op, ours=given.ours)
         elif not given.known and own is not None:
             self.live.applied(own, known=False)
 
     def _answer(self, sample: Sample) -> None:
         stamp, coming = sample.stamp, self.port.preview
-        ahead = coming and coming.ahead(sample.sp, stamp, self._step, self.settings.horizon)
+        ahead = None
+        if coming is not None:
+            ahead = coming.ahead(sample.sp, stamp, self._step, self.settings.horizon)
         result = self.live.step(sample.pv, sample.sp, sample.dv, ahead)
         self.stamp = stamp
         self._last_op = joint_state(stamp, self.model.valve_names, result.op)
@@ -229,12 +234,12 @@ class ControllerNode(ControllerInputs):
         for change in self.live.changes[self._told :]:
             self.stamp = self.port.stamp_of(change.sample)
             self._mode.publish(String(data=change.mode.value))
-            self.get_logger().info(f"sample {change.sample}: {change.mode}, {change.reason}")
+            self.log.info(f"sample {change.sample}: {change.mode}, {change.reason}")
             told = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
             self.report([("mode", change.mode.value, [*told, *self.live.known_friction()])])
         self._told = len(self.live.changes)
         for sample, reason in self.live.doubts[self._doubts :]:
-            self.get_logger().warning(f"sample {sample}: offered model not taken, {reason}")
+            self.log.warning(f"sample {sample}: offered model not taken, {reason}")
         self._doubts = len(self.live.doubts)
 
     # ---- lockstep --------------------------------------------------------------------------

@@ -8,32 +8,42 @@ from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from stiction_ros.config_files import find_config
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
 from stiction_ros.loop import LoopModel
-from stiction_ros.nodes.estimates import figures_of, fit_status, friction_message, verdicts_of
-from stiction_ros.nodes.gap_status import finding_status, look_status, monitor_status
-from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.messages import SECOND, to_ns, values_of
-from stiction_ros.nodes.peers import PLANTS
-from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.messages import SECOND, to_ns, values_of
+from stiction_ros.nodes.shared.peers import PLANTS
+from stiction_ros.nodes.shared.runner import run
+from stiction_ros.nodes.shared.typed import trigger
+from stiction_ros.nodes.topics.estimates import (
+    figures_of,
+    fit_status,
+    friction_message,
+    verdicts_of,
+)
+from stiction_ros.nodes.topics.gap_status import finding_status, look_status, monitor_status
+from stiction_ros.online.estimator.live import FitUpdate, LiveEstimator, fit
+from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.live_estimator import FitUpdate, LiveEstimator, fit
-from stiction_ros.online.monitoring import Monitoring
+from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
-from stiction_ros.online.pairing import NEW_RUN, PairedSample
-from stiction_ros.online.worker import FitWorker
+from stiction_ros.online.window.pairing import NEW_RUN, PairedSample
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second
 
 
 class EstimatorNode(ManagedNode):
-    """Thin shell around :class:`stiction_ros.online.live_estimator.LiveEstimator`."""
+    """Thin shell around :class:`stiction_ros.online.estimator.live.LiveEstimator`."""
+
+    settings: EstimatorNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``estimator``; ``kwargs`` go to the ROS node."""
@@ -80,7 +90,7 @@ class EstimatorNode(ManagedNode):
     def hardware(self) -> str:
         return str(self.settings.loop)
 
-    def retune(self, settings: Any) -> None:
+    def retune(self, settings: EstimatorNodeSettings) -> None:
         settings.options()
         if self.live is not None:
             self.live.retune(settings)
@@ -117,7 +127,7 @@ class EstimatorNode(ManagedNode):
         self._end_worker()
         super().finish()
 
-    def on_cleanup(self, state: Any) -> Any:
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._end_worker()
         self.destroy_guard_condition(self._done)
         return super().on_cleanup(state)
@@ -131,42 +141,43 @@ class EstimatorNode(ManagedNode):
     # ---- samples in ------------------------------------------------------------------------
 
     def _on_pv(self, message: JointState) -> None:
-        if self._agree("pv", message, self._outputs):
+        pv = self._values("pv", message, self._outputs)
+        if pv is not None:
             self._outputs = self._outputs or tuple(message.name)
-            pv = values_of(message, self._outputs)
             self._take(self._pairs.add_pv(to_ns(message.header.stamp), pv))
 
     def _on_op(self, message: JointState) -> None:
-        if self._agree("op", message, self._valves):
+        op = self._values("op", message, self._valves)
+        if op is not None:
             self._valves = self._valves or tuple(message.name)
-            op = values_of(message, self._valves)
             self._take(self._pairs.add_op(to_ns(message.header.stamp), op))
 
     def _on_applied(self, message: JointState) -> None:
-        if self._agree("op", message, self._valves):
+        op = self._values("op", message, self._valves)
+        if op is not None:
             self._valves = self._valves or tuple(message.name)
-            op = values_of(message, self._valves)
             self._take(self._pairs.add_applied(to_ns(message.header.stamp), op))
 
-    def _agree(self, topic: str, message: JointState, names: tuple[str, ...]) -> bool:
-        """Return whether a message has a value for each of ``names``; when not, count it.
+    def _values(self, topic: str, message: JointState, names: tuple[str, ...]) -> FloatArray | None:
+        """Return the values of ``names``; None, and counted, where a message lacks one.
 
         The first message tells the tags. When many in succession have others, the first was
         a stray, or the loop is another one: all begins anew.
         """
         self._heard[topic] = time.monotonic()
         given = tuple(message.name)
-        if given and values_of(message, names) is not None:
+        values = values_of(message, names or given) if given else None
+        if values is not None:
             self._strange = Counter({k: n for k, n in self._strange.items() if k[0] != topic})
-            return True
+            return values
         self._refused[topic] += 1
         self.notice(f"tags of {topic}", "warn", f"{topic} without a value for each tag is left out")
         if given and len(given) == len(message.position):
             self._strange[topic, *given] += 1
         if self._strange[topic, *given] >= NEW_RUN:
-            self.get_logger().warning(f"{topic} has other tags now: all begins anew")
+            self.log.warning(f"{topic} has other tags now: all begins anew")
             self._forget_loop()
-        return False
+        return None
 
     def _take(self, samples: list[PairedSample]) -> None:
         for found in samples:
@@ -176,7 +187,7 @@ class EstimatorNode(ManagedNode):
                 self.live = LiveEstimator(settings, *names, settings.sample_time)
                 self.monitoring = Monitoring(settings, self.live, self._watched, self._queue)
             if found.begins:
-                self.get_logger().info(f"a new run begins at stamp {found.stamp} ns")
+                self.log.info(f"a new run begins at stamp {found.stamp} ns")
             if found.missed or found.begins:
                 self._skip(found)
             elif not np.isfinite(found.pv).all():
@@ -197,7 +208,7 @@ class EstimatorNode(ManagedNode):
             future.cancel()
             return future
         future = self._worker.call(work, *arguments)
-        future.add_done_callback(lambda _future: self._done.trigger())
+        future.add_done_callback(lambda _future: trigger(self._done))
         return future
 
     def _skip(self, found: PairedSample) -> None:
@@ -232,13 +243,13 @@ class EstimatorNode(ManagedNode):
                 self._said = f"window not usable: {error}"
                 if not isinstance(error, InputError):
                     self._said = f"fit failed: {error!r}"
-                    self.get_logger().error(self._said)
+                    self.log.error(self._said)
                 self._publish(stamp, None)
                 continue
             self._fits += 1
             self._announce(stamp, update)
         for finding in () if self.live is None else self.monitoring.collect():
-            self.get_logger().warning(f"window to sample {finding.end}: {finding.text}")
+            self.log.warning(f"window to sample {finding.end}: {finding.text}")
             self.report([finding_status(finding, self._pairs.stamp_of)])
 
     def _announce(self, stamp: int, update: FitUpdate) -> None:
@@ -251,7 +262,7 @@ class EstimatorNode(ManagedNode):
             self._model.publish(String(data=text))
         self._publish(stamp, update.identification)
         self._said = f"last window: {verdicts_of(update)}"
-        self.get_logger().info(f"window to sample {update.end}: {figures_of(update)}")
+        self.log.info(f"window to sample {update.end}: {figures_of(update)}")
         self.report([fit_status(stamp, update)])
 
     def _publish(self, stamp: int, found: Identification | None) -> None:

@@ -11,10 +11,11 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-from stiction_ros.nodes.managed import READER_QOS
-from stiction_ros.nodes.messages import to_ns
-from stiction_ros.nodes.peers import Inlet
-from stiction_ros.online.loop_windows import LoopWindow
+from stiction_ros.nodes.shared.managed import READER_QOS
+from stiction_ros.nodes.shared.messages import to_ns
+from stiction_ros.nodes.shared.peers import Inlet
+from stiction_ros.nodes.shared.typed import leave
+from stiction_ros.online.window.loop_windows import LoopWindow
 
 LOOK = 0.2  # s between two looks at what has come; 5000 messages of a topic may wait
 SEARCH = 2.0  # s between two looks for loops that are new
@@ -51,8 +52,7 @@ class Listener:
 
     def close(self) -> None:
         """Leave the graph."""
-        self.node.destroy_node()
-        rclpy.try_shutdown()
+        leave(self.node)
 
     def _find_loops(self) -> None:
         kinds = dict(self.node.get_topic_names_and_types())

@@ -7,22 +7,24 @@ import random
 import time
 from typing import Any
 
+from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.loop_topics import LoopTopics, grant_keys
-from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.messages import to_ns, values_of
-from stiction_ros.nodes.peers import publishers_of
-from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.messages import to_ns, values_of
+from stiction_ros.nodes.shared.peers import publishers_of
+from stiction_ros.nodes.shared.runner import run
+from stiction_ros.nodes.shared.typed import trigger
+from stiction_ros.nodes.topics.loop_topics import LoopTopics, grant_keys
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.heartbeat import IDENTITIES
 from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, WriteOrder
-from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Written
+from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Refused, Written
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.tag_map import LoopTags, TagMap, check_address
 
@@ -35,11 +37,13 @@ GRAPH_LOOKS = 10  # looks at the loop until the next one at who commands
 class OpcuaNode(ManagedNode):
     """Thin shell around :class:`stiction_ros.opcua.loop_bridge.LoopBridge`, one a loop."""
 
+    settings: OpcuaNodeSettings
+
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``opcua``; ``kwargs`` go to the ROS node."""
         super().__init__("opcua", OpcuaNodeSettings, **kwargs)
         self._link: PlantLink | None = None
-        self._pacer: Any = None
+        self._pacer: Timer | None = None
         self._woken = False
         self._graph_services: list[Any] = []
 
@@ -65,6 +69,7 @@ class OpcuaNode(ManagedNode):
         self._credentials.check(bool(self._writes))
         self._said = "not connected yet"
         self._losses = 0
+        self._refused: set[str] = set()
         self._graph_looks = 0
         identity = random.SystemRandom().randrange(1, IDENTITIES)
         self.bridges: dict[str, LoopBridge] = {}
@@ -147,12 +152,11 @@ class OpcuaNode(ManagedNode):
 
     def activate(self) -> None:
         read = [tag for tags in self._loops for tag in tags.read_tags()]
-        written = [
-            tag for tags in self._loops if tags.loop in self._writes for tag in tags.written_tags()
-        ]
+        writing = [tags for tags in self._loops if tags.loop in self._writes]
+        written = {tag: use for tags in writing for tag, use in tags.uses()}
         publishing = self.settings.publishing
         tags = tuple(dict.fromkeys(read))
-        settings = LinkSettings(self._url, self._credentials, tags, tuple(written), publishing)
+        settings = LinkSettings(self._url, self._credentials, tags, written, publishing)
         self._link = PlantLink(settings, self._wake)
         self._link.start()
         shortest = min(bridge.period for bridge in self.bridges.values())
@@ -182,7 +186,12 @@ class OpcuaNode(ManagedNode):
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         alive = self._link is not None and self._link.alive(time.monotonic())
-        values = [("connected", alive), ("losses", self._losses), ("loops", len(self.bridges))]
+        values: list[tuple[str, object]] = [
+            ("connected", alive),
+            ("losses", self._losses),
+            ("loops", len(self.bridges)),
+            ("refused_tags", len(self._refused)),
+        ]
         return ("ok" if alive else "error"), self._said, values
 
     def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
@@ -210,7 +219,7 @@ class OpcuaNode(ManagedNode):
         """Called by the link's thread."""
         if not self._woken:
             self._woken = True
-            self._wakeup.trigger()
+            trigger(self._wakeup)
 
     def _serve(self) -> None:
         """Take in what the plant said, publish what is due, write what is to be written."""
@@ -224,6 +233,8 @@ class OpcuaNode(ManagedNode):
                     self._submit(self.bridges[name].hear(event.tag, event.reading, event.at))
             elif isinstance(event, Written):
                 self._on_written(event)
+            elif isinstance(event, Refused):
+                self._on_refused(event)
             else:
                 self._on_linked(event)
         now = time.monotonic()
@@ -232,7 +243,9 @@ class OpcuaNode(ManagedNode):
             for sample in bridge.samples(now):
                 self.stamp = sample.stamp
                 if self.running:
-                    self._topics[name].publish(sample)
+                    ours = bridge.grant.may_write  # else OP is the plant's own, as we read it
+                    by = bridge.op_port.commander if ours else self.get_fully_qualified_name()
+                    self._topics[name].publish(sample, by)
             self._submit(bridge.linked(alive, now))
         self._tell_grants()
 
@@ -242,10 +255,22 @@ class OpcuaNode(ManagedNode):
         if event.reason == before:
             return
         if event.connected:  # rclpy wants one severity a line
-            self.get_logger().info(event.reason)
+            self.log.info(event.reason)
         else:
-            self.get_logger().warning(event.reason)
+            self.log.warning(event.reason)
         self.report()
+
+    def _on_refused(self, event: Refused) -> None:
+        now, before = time.monotonic(), self._refused
+        for bridge in self.bridges.values():
+            self._submit(bridge.refuse(event.read, event.written, now))
+        self._refused = {
+            f"tag {tag} {why}" for tag, why in (*event.read.items(), *event.written.items())
+        }
+        for text in sorted(self._refused - before):
+            self.log.warning(text)
+        if self._refused != before:
+            self.report()
 
     def _on_written(self, event: Written) -> None:
         bridge, now = self.bridges[event.order.loop], time.monotonic()
@@ -260,7 +285,7 @@ class OpcuaNode(ManagedNode):
         for name in self._writes:
             grant = self._topics[name].changed_grant(self.bridges[name])
             if grant is not None:
-                self.get_logger().info(f"loop {name}: {grant.state.value}, {grant.reason}")
+                self.log.info(f"loop {name}: {grant.state.value}, {grant.reason}")
                 self.report([(f"grant {name}", grant.state.value, grant_keys(grant))])
                 if grant.lost:
                     self.notice(f"grant {name}", "warn", f"loop {name}: {grant.reason}")
@@ -279,12 +304,19 @@ class OpcuaNode(ManagedNode):
             self.notice(found.value, "warn", complaint)
         self._submit(orders)
 
-    def _on_ask(self, name: str, _request: Any, response: Any) -> Any:
-        why_not = self.bridges[name].ask(time.monotonic())
-        response.success, response.message = not why_not, why_not or "asked for"
+    def _on_ask(
+        self, name: str, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        bridge, now = self.bridges[name], time.monotonic()
+        why_not = bridge.ask(now)
+        self._submit(bridge.look(now))
+        waits = f"; {bridge.grant.reason}" if bridge.grant.wanted else ""
+        response.success, response.message = not why_not, why_not or f"asked for{waits}"
         return response
 
-    def _on_give_back(self, name: str, _request: Any, response: Any) -> Any:
+    def _on_give_back(
+        self, name: str, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
         self._submit(self.bridges[name].give_back(time.monotonic(), "given back by service"))
         self._tell_grants()
         response.success, response.message = True, "given back"

@@ -6,20 +6,23 @@ import time
 from typing import Any
 
 import numpy as np
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant, SetPoints, read_valve_changes
-from stiction_ros.nodes.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
-from stiction_ros.nodes.messages import SECOND, joint_state, to_ns, to_stamp, values_of
-from stiction_ros.nodes.peers import publishers_of
-from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared.managed import LOOKS, READER_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns, to_stamp, values_of
+from stiction_ros.nodes.shared.peers import publishers_of
+from stiction_ros.nodes.shared.runner import run
+from stiction_ros.nodes.shared.typed import restart
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.online.plain_settings import PlantNodeSettings
 from stiction_ros.online.round_trips import RoundTrips
+from stiction_ros.online.tick_grid import TickGrid
 
 AGAIN = 1.0  # s after which a sample in lockstep is shown again
 UNEASY = 3.0  # s without op after which a run in lockstep says so
@@ -28,10 +31,12 @@ UNEASY = 3.0  # s without op after which a run in lockstep says so
 class PlantNode(ManagedNode):
     """Thin shell around :class:`stiction_ros.loop.Plant`."""
 
+    settings: PlantNodeSettings
+
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``plant``; ``kwargs`` go to the ROS node."""
         super().__init__("plant", PlantNodeSettings, **kwargs)
-        self._pacer: Any = None
+        self._pacer: Timer | None = None
 
     def configure(self) -> None:
         settings = self.settings
@@ -95,7 +100,7 @@ class PlantNode(ManagedNode):
             self.destroy_timer(self._pacer)
             self._pacer = None
 
-    def retune(self, settings: Any) -> None:
+    def retune(self, settings: PlantNodeSettings) -> None:
         if self._pacer is not None and settings.speed != self.settings.speed:
             self.deactivate()
             self._set_pace(settings.speed)
@@ -175,18 +180,20 @@ class PlantNode(ManagedNode):
 
     def _set_pace(self, speed: float) -> None:
         period = self.model.sample_time / speed
-        self._period, self._due = period, time.monotonic() + period
+        self._grid = TickGrid(period, time.monotonic())
         self._pacer = self.create_timer(period, self._tick)
 
     def _tick(self) -> None:
-        """Go on by one sample; ticks keep to a grid of wall time, missed ones are left out."""
+        """Go on by one sample; ticks keep to a grid of wall time that a late one begins anew."""
         if not self.running:
             return
-        missed = max(int((time.monotonic() - self._due) / self._period), 0)
-        self._due += (missed + 1) * self._period
-        if missed:
-            self._missed += missed
-            self.notice("pace", "warn", "the plant is slower than its speed asks for")
+        before = self._grid.missed
+        if self._grid.tick(time.monotonic()):
+            if self._pacer is not None:
+                restart(self._pacer)
+            if self._grid.missed > before:
+                self._missed += self._grid.missed - before
+                self.notice("pace", "warn", "the plant is slower than its speed asks for")
         self._advance()
 
     def _advance(self) -> None:
@@ -200,7 +207,7 @@ class PlantNode(ManagedNode):
         else:
             self._show_with_clock()
         if self._every and self.plant.sample % self._every == 0:
-            self.get_logger().info(f"sample {self.plant.sample} of {self.settings.samples}")
+            self.log.info(f"sample {self.plant.sample} of {self.settings.samples}")
 
     def _show_with_clock(self) -> None:
         self._clock_out.publish(Clock(clock=to_stamp(self.stamp)))

@@ -5,21 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from rclpy.clock import Clock as RosClock
-from rclpy.clock import ClockType
+from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.endpoints import message_class
-from stiction_ros.nodes.managed import SIGNAL_QOS, ManagedNode, Outlet
-from stiction_ros.nodes.messages import SECOND, to_stamp
-from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared.endpoints import message_class
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.messages import SECOND, to_stamp
+from stiction_ros.nodes.shared.peers import Outlet
+from stiction_ros.nodes.shared.runner import run
+from stiction_ros.nodes.shared.typed import quality
 from stiction_ros.online.plain_settings import PlayerNodeSettings
-from stiction_ros.records.bag_metadata import BagTopic, Qos
-from stiction_ros.records.mcap_scan import RawMessage
-from stiction_ros.records.playback import Playback, PlaybackOptions, bag_content, offered_qos
+from stiction_ros.records.bag.playback import Playback, PlaybackOptions, bag_content, offered_qos
+from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
+from stiction_ros.records.storage.mcap_scan import RawMessage
 
 PERIOD = 0.002  # s between two looks at what is due
 BURST = 80  # messages at one look, less than any reader's history
@@ -28,13 +32,15 @@ CLOCK = "/clock"
 
 
 class PlayerNode(ManagedNode):
-    """Thin shell around :class:`stiction_ros.records.playback.Playback`."""
+    """Thin shell around :class:`stiction_ros.records.bag.playback.Playback`."""
+
+    settings: PlayerNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``player``; ``kwargs`` go to the ROS node."""
         super().__init__("player", PlayerNodeSettings, **kwargs)
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
-        self._pacer: Any = None
+        self._pacer: Timer | None = None
         self._offered: list[Any] = []
 
     def configure(self) -> None:
@@ -56,7 +62,7 @@ class PlayerNode(ManagedNode):
             self._clock_out = self.outlet(Clock, CLOCK, SIGNAL_QOS)
         self._resumes = not settings.paused
         for note in content.notes:
-            self.get_logger().warning(note)
+            self.log.warning(note)
         self._offered = [
             self.create_service(Trigger, f"~/{name}", call)
             for name, call in (
@@ -75,7 +81,7 @@ class PlayerNode(ManagedNode):
         self._resumes = not self.playback.paused
         self.playback.pause()
 
-    def retune(self, settings: Any) -> None:
+    def retune(self, settings: PlayerNodeSettings) -> None:
         self.playback.rate = settings.rate
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
@@ -90,8 +96,10 @@ class PlayerNode(ManagedNode):
         level = "warn" if self._skipped else "ok"
         return level, "finished" if playback.finished else text, keys
 
-    def on_cleanup(self, state: Any) -> Any:
-        self.destroy_timer(self._pacer)
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        if self._pacer is not None:
+            self.destroy_timer(self._pacer)
+            self._pacer = None
         for service in self._offered:
             self.destroy_service(service)
         self._offered = []
@@ -107,7 +115,7 @@ class PlayerNode(ManagedNode):
             kind, qos = message_class(topic.type), _profile(offered_qos(topic))
         except InputError as error:
             self._skipped[topic.name] = str(error)
-            self.get_logger().warning(f"{topic.name} is not played: {error}")
+            self.log.warning(f"{topic.name} is not played: {error}")
             return
         # Diagnostics of the player itself go out there already.
         known = self.outlets.get(topic.name)
@@ -125,7 +133,7 @@ class PlayerNode(ManagedNode):
             for name in {message.topic.name for message in found} & self._topics.keys():
                 self._topics[name].publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
         if self.playback.finished:
-            self.get_logger().info(f"played {self.playback.played} messages")
+            self.log.info(f"played {self.playback.played} messages")
             self.finished, self.running = True, False
 
     def _send(self, messages: list[RawMessage]) -> None:
@@ -141,17 +149,17 @@ class PlayerNode(ManagedNode):
 
     # ---- services --------------------------------------------------------------------------
 
-    def _on_pause(self, _request: Any, response: Any) -> Any:
+    def _on_pause(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.running:
             self.playback.pause()
         return self._answer(response)
 
-    def _on_resume(self, _request: Any, response: Any) -> Any:
+    def _on_resume(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.running:
             self.playback.resume()
         return self._answer(response)
 
-    def _on_step(self, _request: Any, response: Any) -> Any:
+    def _on_step(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.running and not self.playback.paused:
             response.success, response.message = False, "it is playing, pause it first"
             return response
@@ -159,7 +167,7 @@ class PlayerNode(ManagedNode):
             self._send(self.playback.step())
         return self._answer(response)
 
-    def _answer(self, response: Any) -> Any:
+    def _answer(self, response: Trigger.Response) -> Trigger.Response:
         """Fill the answer in: the time that is being played."""
         response.success = bool(self.running)
         time = f"at {self.playback.time / SECOND:.9f} s"
@@ -169,11 +177,11 @@ class PlayerNode(ManagedNode):
 
 
 def _profile(qos: Qos) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy[qos.history.upper()],
-        depth=qos.depth,
-        reliability=ReliabilityPolicy[qos.reliability.upper()],
-        durability=DurabilityPolicy[qos.durability.upper()],
+    return quality(
+        qos.depth,
+        ReliabilityPolicy[qos.reliability.upper()],
+        DurabilityPolicy[qos.durability.upper()],
+        HistoryPolicy[qos.history.upper()],
     )
 
 

@@ -5,28 +5,31 @@ from __future__ import annotations
 import itertools
 import struct
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stiction_ros.errors import InputError
-from stiction_ros.nodes.endpoints import message_class, offered_qos, reader_qos
-from stiction_ros.nodes.managed import READER_QOS, ManagedNode
-from stiction_ros.nodes.messages import SECOND
-from stiction_ros.nodes.runner import run
+from stiction_ros.nodes.shared.endpoints import message_class, offered_qos, reader_qos
+from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
+from stiction_ros.nodes.shared.messages import SECOND
+from stiction_ros.nodes.shared.runner import run
+from stiction_ros.nodes.shared.typed import RawTake, subscribe_raw
 from stiction_ros.online.health import Noticed
 from stiction_ros.online.plain_settings import RecorderNodeSettings
-from stiction_ros.records.bag_finish import CLOCK
-from stiction_ros.records.bag_writer import BagWriter, Packing, Splitting
-from stiction_ros.records.log_time import SIMULATED, LogTime
-from stiction_ros.records.loop_signals import JOINT_STATE
-from stiction_ros.records.message_definitions import definition
-from stiction_ros.records.topic_choice import OWN, TopicChoice
+from stiction_ros.records.bag.finish import CLOCK
+from stiction_ros.records.bag.message_definitions import definition
+from stiction_ros.records.bag.topic_choice import OWN, TopicChoice
+from stiction_ros.records.bag.writer import BagWriter, Packing, Splitting
+from stiction_ros.records.run.loop_signals import JOINT_STATE
+from stiction_ros.records.storage.log_time import SIMULATED, LogTime
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
@@ -34,7 +37,9 @@ _STAMP = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encap
 
 
 class RecorderNode(ManagedNode):
-    """Thin shell around :class:`stiction_ros.records.bag_writer.BagWriter`."""
+    """Thin shell around :class:`stiction_ros.records.bag.writer.BagWriter`."""
+
+    settings: RecorderNodeSettings
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the node ``recorder``; ``kwargs`` go to the ROS node."""
@@ -53,7 +58,7 @@ class RecorderNode(ManagedNode):
         self.writer = BagWriter(directory, Packing(settings.compression), splitting)
         self._bags.append(directory)
         if len(self._bags) > 1:
-            self.get_logger().info(f"recording into {directory}")
+            self.log.info(f"recording into {directory}")
         self._topics: dict[str, QoSProfile] = {}
         self._skipped: dict[str, str] = {}
         self._unheard: dict[str, str] = {}
@@ -96,11 +101,11 @@ class RecorderNode(ManagedNode):
         except (OSError, InputError) as error:
             why = error.strerror if isinstance(error, OSError) else error.what
             self.failure = f"{writer.directory}: not finished ({why}); repair it later"
-            self.get_logger().error(self.failure)
+            self.log.error(self.failure)
         else:
-            self.get_logger().info(f"bag finished: {writer.directory}")
+            self.log.info(f"bag finished: {writer.directory}")
 
-    def on_cleanup(self, state: Any) -> Any:
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.close()
         return super().on_cleanup(state)
 
@@ -120,7 +125,7 @@ class RecorderNode(ManagedNode):
                 self._record(name, types[0], offered)
             except InputError as error:
                 self._skipped[name] = str(error)
-                self.get_logger().warning(f"{name} is not recorded: {error}")
+                self.log.warning(f"{name} is not recorded: {error}")
             except OSError as error:  # tried again at the next look
                 self._refused(error)
 
@@ -130,12 +135,12 @@ class RecorderNode(ManagedNode):
         self.writer.add_topic(name, kind, text, type_hash, [offered_qos(i) for i in offered])
         qos = reader_qos(offered, READER_QOS.depth)
         self._topics[name] = qos
-        self.create_subscription(
+        subscribe_raw(
+            self,
             message_class(kind),
             name,
             self._writing(name, kind),
             qos,
-            raw=True,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
@@ -154,14 +159,14 @@ class RecorderNode(ManagedNode):
         else:
             self._put_back += bool(said)
         if said and self._noticed.notice("removed", "error", said):
-            self.get_logger().error(said)
+            self.log.error(said)
 
     def _refused(self, error: OSError) -> None:
         """Note that the storage refused something."""
         assert self.writer is not None
         said = f"{self.writer.directory}: {error.strerror}; {self._lost} messages lost so far"
         if self._noticed.notice("storage", "error", said):
-            self.get_logger().error(said)
+            self.log.error(said)
 
     def _look_for_unheard(self) -> None:
         """Tell of publishers that came later and offer less than the subscription asks for."""
@@ -172,10 +177,10 @@ class RecorderNode(ManagedNode):
                 compatibility, why = qos_check_compatible(info.qos_profile, asked)
                 if compatibility == QoSCompatibility.ERROR:  # equal, not the same object
                     self._unheard[name] = f"{info.node_name}: {why.strip()}"
-                    self.get_logger().warning(f"{name} of {self._unheard[name]} is not recorded")
+                    self.log.warning(f"{name} of {self._unheard[name]} is not recorded")
                     break
 
-    def _writing(self, topic: str, kind: str) -> Callable[[bytes, dict[str, int]], None]:
+    def _writing(self, topic: str, kind: str) -> RawTake:
         """Return the callback of one topic; log time is simulated time where there is any."""
         tells_time = (topic, kind) in {(CLOCK, CLOCK_TYPE), (self._own_pv, JOINT_STATE)}
 

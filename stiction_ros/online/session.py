@@ -25,14 +25,15 @@ from stiction_ros.loop import (
     read_valve_changes,
     simulate_closed_loop,
 )
-from stiction_ros.loop.reading import Section, load_yaml
 from stiction_ros.loop.valve_changes import valve_changes_text
-from stiction_ros.online.controller_settings import LiveControllerSettings
-from stiction_ros.online.gap_finding import GapFinding
-from stiction_ros.online.gap_monitor import GapLook, MonitorRule
-from stiction_ros.online.live_controller import LiveController, ModeChange
-from stiction_ros.online.live_estimator import EstimatorSettings, FitUpdate, LiveEstimator, fit
-from stiction_ros.online.monitoring import Monitoring, check_model
+from stiction_ros.loop.yaml.reading import Section, load_yaml
+from stiction_ros.online.controller.live import LiveController, ModeChange
+from stiction_ros.online.controller.settings import LiveControllerSettings
+from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator, fit
+from stiction_ros.online.input.signal_check import SignalCheck
+from stiction_ros.online.monitor.gap_finding import GapFinding
+from stiction_ros.online.monitor.gap_monitor import GapLook, MonitorRule
+from stiction_ros.online.monitor.monitoring import Monitoring, check_model
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.plain_settings import (
     NodeSettings,
@@ -40,7 +41,6 @@ from stiction_ros.online.plain_settings import (
     RecorderNodeSettings,
 )
 from stiction_ros.online.schedule import FitSchedule
-from stiction_ros.online.signal_check import SignalCheck
 from stiction_ros.records import Record
 from stiction_ros.settings import from_mapping as settings_from_mapping
 
@@ -50,6 +50,35 @@ NODE_SETTINGS: Mapping[str, type[NodeSettings]] = {
     "estimator": EstimatorNodeSettings,
     "recorder": RecorderNodeSettings,
 }
+
+
+def read_nodes(path: Path, without: str = "") -> dict[str, dict[str, Any]]:
+    """Return the parameters of all nodes of a scenario file, by name, as written.
+
+    A node may be named as ``controller``, or as ``/**/controller`` where the same file is for
+    nodes in a namespace too.
+
+    Args:
+        path: the file.
+        without: a node that may lack, and is left out.
+
+    Raises:
+        InputError: a node that lacks or is unknown, a parameter that it does not know.
+    """
+    top = Section(load_yaml(path), str(path))
+    nodes: dict[str, dict[str, Any]] = {}
+    for name, settings in NODE_SETTINGS.items():
+        key = f"/**/{name}" if f"/**/{name}" in top else name
+        if name == without and key not in top:
+            continue
+        values = dict(top.section(key).section("ros__parameters").values)
+        if "valve_changes" in values:
+            values["valve_changes"] = valve_changes_text(values["valve_changes"])
+        settings_from_mapping(settings, values, f"{path}: {name}")
+        if name != without:
+            nodes[name] = values
+    top.finish()
+    return nodes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,16 +132,11 @@ class Scenario:
             path: the scenario, ``*.scenario.yaml`` by custom.
         """
         path = Path(path)
-        top = Section(load_yaml(path), str(path))
-        nodes: dict[str, dict[str, Any]] = {}
-        checked: dict[str, Any] = {}
-        for name, cls_of_node in NODE_SETTINGS.items():
-            values = dict(top.section(name).section("ros__parameters").values)
-            if "valve_changes" in values:
-                values["valve_changes"] = valve_changes_text(values["valve_changes"])
-            nodes[name] = values
-            checked[name] = settings_from_mapping(cls_of_node, values, f"{path}: {name}")
-        top.finish()
+        nodes = read_nodes(path)
+        checked: dict[str, Any] = {
+            name: settings_from_mapping(NODE_SETTINGS[name], values, f"{path}: {name}")
+            for name, values in nodes.items()
+        }
         plant, controller = checked["plant"], checked["controller"]
         if plant.samples < 1 or not plant.set_points:
             raise InputError("a scenario needs samples ≥ 1 and set_points", where=f"{path}: plant")

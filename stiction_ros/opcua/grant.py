@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import enum
 
+FOREIGN = "another one lets the heartbeat rise"
+
 
 class GrantState(enum.Enum):
     """Where the handshake stands."""
@@ -89,7 +91,7 @@ class Grant:
             return self
         if self.state is GrantState.IDLE:
             if facts.fault or facts.foreign:
-                why = facts.fault or "another one lets the heartbeat rise"
+                why = FOREIGN if facts.foreign else facts.fault
                 return dataclasses.replace(self, reason=f"waits: {why}")
             if facts.granted:
                 why = "the mode grants what was not asked for"
@@ -98,7 +100,7 @@ class Grant:
         if facts.fault:
             return self.give_back(facts.now, facts.fault)
         if facts.foreign:
-            return self.give_back(facts.now, "another one lets the heartbeat rise")
+            return self.give_back(facts.now, FOREIGN)
         if self.state is GrantState.ASKED and facts.granted:
             return Grant(GrantState.GRANTED, facts.now, "granted by the mode")
         if self.state is GrantState.GRANTED and not facts.granted:

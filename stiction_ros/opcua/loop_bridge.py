@@ -5,15 +5,16 @@ from __future__ import annotations
 import dataclasses
 import enum
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.online.health import stopped_after
-from stiction_ros.online.op_port import CommandRules, OpPort, Reception
+from stiction_ros.online.input.op_port import CommandRules, OpPort, Reception
 from stiction_ros.opcua.grant import Facts, GrantState, begin
 from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
-from stiction_ros.opcua.op_limits import OpLimits
+from stiction_ros.opcua.op_limits import OpLimits, RateWatch
 from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.sampling import LoopSampler, PlantSample
 from stiction_ros.opcua.tag_map import GrantTags, LoopTags
@@ -21,6 +22,7 @@ from stiction_ros.opcua.tag_map import GrantTags, LoopTags
 PATIENCE = 3  # samples of bad quality in succession before the plant takes over
 BEATS = 5  # beats in the time of the watchdog
 SLOW = 2  # a part of the watchdog's time: an answer may take that long
+IN_TIME = 0.5  # s, or a sample where that is longer, in which an OP must be written
 AGAIN = 1.0  # s between two attempts to take a request back
 MODE_REFUSES = "the mode does not grant it"
 
@@ -80,13 +82,18 @@ class LoopBridge:
     writes nothing: it returns orders, and is told by :meth:`written` what became of each.
 
     What speaks against writing (and gives a grant back at once): no connection or no keep-alive;
+    a tag of the loop that the server refuses;
     the plant's own heartbeat standing still; three samples in succession with a bad PV; OP in
     force, mode or limits of bad quality; OP in force beyond the limits; no OP from the commander
-    for three samples; a write that is refused, or that takes longer than half the watchdog's time.
+    for three samples; an OP that is not taken in time; a write that is refused, or that takes
+    longer than half the watchdog's time.
     """
 
     def __init__(self, tags: LoopTags, rules: BridgeRules, now: float) -> None:
-        """Begin to listen; ``rules.writes`` needs ``tags.grant``."""
+        """Begin to listen; ``rules.writes`` needs ``tags.grant``.
+
+        ``refused`` names the tags of the loop that the server refuses, each with why.
+        """
         self.tags, self.rules = tags, rules
         self.sampler = LoopSampler(tags, rules.speed)
         self.grant = begin(now, rules.writes and tags.grant is not None)
@@ -94,6 +101,10 @@ class LoopBridge:
             self.grant = self.grant.ask()
         self.op_port = OpPort(CommandRules(rules.commander, tags.step, exact=False))
         self.counts: Counter[str] = Counter()
+        self.refused: tuple[str, ...] = ()
+        valves = tags.valves
+        names, rates = [v.name for v in valves], [v.rate for v in valves]
+        self.rate_watch = RateWatch(names, rates, tags.sample_time)
         self._beat, self._foreign, self._plant = OwnBeat(rules.identity), HeardBeat(), HeardBeat()
         self._alive = False
         self._alive_since = self._command_at = self._beat_at = now
@@ -101,7 +112,8 @@ class LoopBridge:
         self._tried: tuple[float, float] | None = None  # a request that is under way, and when
         self._bad = 0  # samples of bad quality in succession
         self._stamp: int | None = None
-        self._writing: FloatArray | None = None  # an OP that is under way
+        self._writing: FloatArray | None = None  # an OP that is under way, and until when
+        self._writing_until = now
         self._last: tuple[FloatArray, float] | None = None  # OP written in this grant, and when
         self._read_at: dict[str, float] = {}
 
@@ -119,6 +131,23 @@ class LoopBridge:
         if not alive:
             self._writing = None  # nobody will tell what became of it
         self._alive = alive
+        return self.look(now)
+
+    def refuse(
+        self, read: Mapping[str, str], written: Mapping[str, str], now: float
+    ) -> list[WriteOrder]:
+        """Take in which tags the server refuses now, and return what is to be written.
+
+        Args:
+            read: tags that are not listened to, of any loop, and why each.
+            written: the same of tags that are not written.
+            now: s on our clock.
+        """
+        found = [f"tag {tag} {read[tag]}" for tag in self.tags.read_tags() if tag in read]
+        if self.rules.writes:
+            mine = [tag for tag in self.tags.written_tags() if tag in written]
+            found += [f"tag {tag} {written[tag]}" for tag in mine]
+        self.refused = tuple(dict.fromkeys(found))
         return self.look(now)
 
     def hear(self, tag: str, reading: TagReading, now: float) -> list[WriteOrder]:
@@ -198,6 +227,8 @@ class LoopBridge:
         assert told is not None
         if not self._alive:
             return "nothing is heard of the server"
+        if self.refused:
+            return self.refused[0]
         since = self._alive_since
         if told.alive and self._plant.silent_for(now, since) > told.watchdog:
             return "the plant's heartbeat stands still"
@@ -211,10 +242,17 @@ class LoopBridge:
         limits = self.limits()
         if limits is None:
             return "limits of bad quality"
+        crossed = limits.crossed([valve.name for valve in self.tags.valves])
+        if crossed:
+            return crossed
         if not limits.within(self._op_read()):
             return "OP in force beyond its limits"
         if now - self._command_at > stopped_after(self.period):
             return f"no op from {self.op_port.commander or 'anyone'}"
+        if self._writing is not None and now > self._writing_until:
+            return "the server does not take an OP in time"
+        if not self.grant.requesting and self._told:
+            return "the last request is being taken back"
         if not self.grant.requesting and now - since < told.watchdog / SLOW:
             return "listens for other writers"
         return ""
@@ -292,10 +330,14 @@ class LoopBridge:
         op = limits.allowed(wanted, in_force, elapsed)
         if (np.abs(op - wanted) > 1e-9).any():
             self.counts["op_limited"] += 1
+        if self._last is None:  # the first OP of a grant is the one in force
+            self.rate_watch.begin(limits, wanted, in_force)
+        elif self.rate_watch.note(limits, wanted, in_force, op):
+            self.counts["op_cut_by_rate"] += 1
         self._writing = op
         values = tuple((v.op, float(x)) for v, x in zip(self.tags.valves, op, strict=True))
         modes = tuple(valve.mode for valve in self.tags.valves)
-        expires = now + max(self.period, 0.1)
+        self._writing_until = expires = now + max(self.period, IN_TIME)
         return [WriteOrder(self.tags.loop, OrderKind.OP, values, expires, modes, told.granted)]
 
     def written(

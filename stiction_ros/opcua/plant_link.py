@@ -9,30 +9,25 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.errors import InputError
-from stiction_ros.opcua.loop_bridge import WriteOrder
+from stiction_ros.opcua.loop_bridge import OrderKind, WriteOrder
 from stiction_ros.opcua.reading import TagReading
 from stiction_ros.opcua.security import Credentials
-from stiction_ros.opcua.session import (
-    ANSWER,
-    describe,
-    kinds_of,
-    node_ids,
-    open_client,
-    reading_of,
-    write,
-)
+from stiction_ros.opcua.server_tags import ServerTags
+from stiction_ros.opcua.session import ANSWER, describe, is_open, open_client, reading_of, write
+from stiction_ros.opcua.tag_map import Use
 
 if TYPE_CHECKING:
-    from asyncua import Client, ua
+    from asyncua import Client
 
 KEEP_ALIVE = 1.0  # s after which a server that has nothing to tell says that it lives
 SILENCE = 3.5  # s without a word after which the server is given up
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 5.0  # s between two attempts to connect
-QUEUE = 100  # changes of one tag that the server keeps between two publications
+LOST = "the connection was lost"
+ASKED_AGAIN = 60.0  # s until tags that the server refuses are tried again
 ROOM = 200_000  # changes that wait here
 
 
@@ -44,15 +39,17 @@ class LinkSettings:
         url: of the server.
         credentials: of the session.
         tags: that are subscribed to.
-        written: tags that may be written; empty for none.
+        written: tags that may be written, and what for; empty for none.
         publishing: s between two publications of the server.
+        asked_again: s until tags that the server refuses are tried again.
     """
 
     url: str
     credentials: Credentials
     tags: tuple[str, ...]
-    written: tuple[str, ...] = ()
+    written: Mapping[str, Use] = dataclasses.field(default_factory=dict)
     publishing: float = 0.1
+    asked_again: float = ASKED_AGAIN
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -81,7 +78,20 @@ class Written:
     seconds: float
 
 
-LinkEvent = Heard | Linked | Written
+@dataclasses.dataclass(frozen=True, slots=True)
+class Refused:
+    """Tags that the server refuses now, each with why; the others are listened to, or written.
+
+    Attributes:
+        read: tags that are not listened to.
+        written: tags that are not written.
+    """
+
+    read: Mapping[str, str]
+    written: Mapping[str, str]
+
+
+LinkEvent = Heard | Linked | Written | Refused
 
 
 class PlantLink:
@@ -119,10 +129,10 @@ class PlantLink:
         self._thread.join(2 * ANSWER)
 
     def submit(self, orders: Sequence[WriteOrder]) -> None:
-        """Write, one order after the other."""
+        """Write, one order after the other; a request goes before all that its loop waits for."""
         if self._loop is not None and self._thread is not None and self._thread.is_alive():
             for order in orders:
-                self._loop.call_soon_threadsafe(self._orders.put_nowait, order)
+                self._loop.call_soon_threadsafe(self._put, order)
 
     def drain(self) -> list[LinkEvent]:
         """Return what has happened since the last call, in its order."""
@@ -175,33 +185,51 @@ class PlantLink:
                 await asyncio.wait_for(client.disconnect(), ANSWER)
 
     async def _session(self, client: Client) -> str:
-        resolve = await node_ids(client, (*self.settings.tags, *self.settings.written))
-        kinds = await kinds_of(client, {tag: resolve[tag] for tag in self.settings.written})
+        tags = ServerTags(client, self.settings.tags, self.settings.written)
+        await tags.find()
         self._forget_orders()
         self._heard_at = time.monotonic()
-        subscription = await self._subscribe(client, resolve)
+        subscription = await self._subscribe(client)
+        await tags.subscribe(subscription, self._sampling)
+        self._tell(Refused(*tags.refused))
         self._connected = True
         self._tell(Linked(True, f"connected to {self.settings.url}"))
-        listening = asyncio.create_task(self._listen(subscription, resolve))
-        writing = asyncio.create_task(self._write_orders(client, resolve, kinds))
+        listening = asyncio.create_task(self._listen(subscription, tags))
+        writing = asyncio.create_task(self._write_orders(client, tags))
         watching = asyncio.create_task(self._watch(client, subscription))
+        mending = asyncio.create_task(self._ask_again(subscription, tags))
         stopping = asyncio.create_task(self._stop.wait())
-        tasks = (listening, writing, watching, stopping)
+        tasks = (listening, writing, watching, mending, stopping)
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             if stopping.done():
                 await self._write_the_rest(writing)
                 return "stopped"
-            for task in (listening, writing, watching):
-                if task.done():
-                    return str(task.result())
-            return "ended"
+            told = [str(task.result()) for task in tasks[:-1] if task.done()]
+            return told[0] if is_open(client) else LOST
         finally:
             for one in tasks:
                 one.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _subscribe(self, client: Client, resolve: dict[str, ua.NodeId]) -> Any:
+    async def _ask_again(self, subscription: Any, tags: ServerTags) -> str:
+        """Try refused tags again from time to time: somebody may mend them at the server."""
+        while True:
+            await asyncio.sleep(self.settings.asked_again)
+            before = tags.refused
+            if not any(before):
+                continue
+            await tags.find()
+            await tags.subscribe(subscription, self._sampling)
+            if tags.refused != before:
+                self._tell(Refused(*tags.refused))
+
+    @property
+    def _sampling(self) -> float:
+        """How often the server looks at a tag, ms."""
+        return 500.0 * self.settings.publishing
+
+    async def _subscribe(self, client: Client) -> Any:
         from asyncua import ua
 
         interval = 1000.0 * self.settings.publishing
@@ -213,30 +241,19 @@ class PlantLink:
             PublishingEnabled=True,
             Priority=0,
         )
-        subscription = await client.create_subscription(wanted, queue_maxsize=ROOM)
-        nodes = [client.get_node(resolve[tag]) for tag in self.settings.tags]
-        found = await subscription.subscribe_data_change(
-            nodes, queuesize=QUEUE, sampling_interval=interval / 2
-        )
-        for tag, handle in zip(self.settings.tags, found, strict=True):
-            if isinstance(handle, ua.StatusCode):
-                raise InputError(f"is refused ({handle.name})", where=f"tag {tag}")
-        return subscription
+        return await client.create_subscription(wanted, queue_maxsize=ROOM)
 
-    async def _listen(self, subscription: Any, resolve: dict[str, ua.NodeId]) -> str:
+    async def _listen(self, subscription: Any, tags: ServerTags) -> str:
         """Hand on every change; the first of each tag tells the present."""
         from asyncua.common.subscription import DataChangeEvent
 
-        tags: dict[ua.NodeId, list[str]] = {}
-        for tag in self.settings.tags:
-            tags.setdefault(resolve[tag], []).append(tag)
         seen: set[str] = set()
         async for event in subscription:
             self._heard_at = now = time.monotonic()
             if not isinstance(event, DataChangeEvent):
                 return "the server ended the subscription"
             value = event.data.monitored_item.Value
-            for tag in tags[event.node.nodeid]:
+            for tag in tags.of(event.node.nodeid):
                 self._events.append(Heard(tag, reading_of(value, tag not in seen), now))
                 seen.add(tag)
             self._wake()
@@ -252,21 +269,31 @@ class PlantLink:
             if time.monotonic() - self._heard_at > SILENCE:
                 return f"nothing was heard for {SILENCE:g} s"
             await asyncio.sleep(0.05)
-        return "the connection was lost"
+        return LOST
 
     # ---- writing ---------------------------------------------------------------------------
 
-    async def _write_orders(
-        self, client: Client, resolve: dict[str, ua.NodeId], kinds: dict[str, ua.VariantType]
-    ) -> str:
+    async def _write_orders(self, client: Client, tags: ServerTags) -> str:
         while True:
             order = await self._orders.get()
             begin = time.monotonic()
             try:
-                failure = await write(client, order, resolve, kinds)
+                failure = await write(client, order, tags.nodes, tags.kinds)
             finally:
                 self._orders.task_done()
             self._tell(Written(order, failure, time.monotonic() - begin))
+
+    def _put(self, order: WriteOrder) -> None:
+        """Queue an order; what its loop wanted before a request is not written any more."""
+        if order.kind is OrderKind.REQUEST:
+            waiting = [self._orders.get_nowait() for _ in range(self._orders.qsize())]
+            for one in waiting:
+                self._orders.task_done()
+                if one.loop == order.loop and one.kind is not OrderKind.REQUEST:
+                    self._tell(Written(one, "a request came after it", 0.0))
+                else:
+                    self._orders.put_nowait(one)
+        self._orders.put_nowait(order)
 
     async def _write_the_rest(self, writing: asyncio.Task[str]) -> None:
         """Let what waits be written before the end, as a request that is taken back."""

@@ -16,6 +16,7 @@ KEPT = 4096  # changes of one tag between two samples
 JITTER = 10  # a part of a sample: scans of a control system are that regular
 SETTLE = 2  # a part of a sample: so late may a change come
 FAR = 3  # samples: a stamp that much ahead of the plant's time is another clock
+UNREPORTED = 10  # samples after which a PV that was never reported is waited for no more
 LOST = 100  # samples: no more of them are told again after the plant's clock has jumped
 DOUBTED = 3  # refused stamps of a tag in succession: what it said before holds no more
 SUCCESSION = 10  # refused stamps, or scans beside the grid, in succession are believed
@@ -86,9 +87,9 @@ class LoopSampler:
       otherwise T/2 after t_k. What comes later for it is ``late`` and counts for the next.
     - OP in force in sample k is the last value with a stamp up to t_k + T/2: what acted for most
       of it. It is told with sample k + 1.
-    - t_0 is the stamp of the first PV that changes (after three samples without any: the newest
-      stamp heard). The grid follows slow shifts of the PV's stamps, and moves when ten
-      in succession lie beside it by the same amount.
+    - t_0 is the stamp of the first PV that changes (after three samples without any, or ten while
+      a PV has not been reported at all: the newest stamp heard). The grid follows slow shifts of
+      the PV's stamps, and moves when ten in succession lie beside it by the same amount.
     - A stamp before the last one of its tag is of the past, one more than 3 samples ahead of the
       plant's time of the future: refused and counted. After three in succession the tag has no
       value; the tenth is believed, and begins a new run when it is that of a PV. The first
@@ -200,10 +201,15 @@ class LoopSampler:
         self.counts["new_runs"] += 1
 
     def _begin_without_change(self, now: float) -> None:
-        """Begin at the newest stamp when no PV has changed for three samples."""
+        """Begin at the newest stamp when no PV has changed for three samples.
+
+        A server may report the tags of a new subscription in several parts, so a PV that was
+        not reported yet is given longer.
+        """
         if self._next is not None or self._heard_at is None:
             return
-        if (now - self._heard_at) * self._speed < FAR * self.tags.sample_time:
+        patience = FAR if all(self._changes[tag] for tag in self._pv) else UNREPORTED
+        if (now - self._heard_at) * self._speed < patience * self.tags.sample_time:
             return
         newest = max((c[-1].stamp for c in self._changes.values() if c), default=0)
         if newest:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import datetime
 import logging
+import socket
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,13 +14,26 @@ from typing import TYPE_CHECKING
 from stiction_ros.errors import InputError
 from stiction_ros.opcua.loop_bridge import MODE_REFUSES, WriteOrder, mode_text
 from stiction_ros.opcua.reading import TagQuality, TagReading, quality_of
-from stiction_ros.opcua.security import CLIENT_URI, Credentials, check_dates, load_certificate
+from stiction_ros.opcua.security import (
+    CLIENT_URI,
+    Credentials,
+    check_dates,
+    fingerprint,
+    load_certificate,
+)
 
 if TYPE_CHECKING:
     from asyncua import Client, ua
+    from cryptography import x509
 
 ANSWER = 6.0  # s for which an answer of the server is waited for
+LOOK, CLOSED = 0.1, 3  # s between looks at a connection; looks at which it may be closed
 PROBE = 5.0  # s between two questions whether the server still answers
+SAID = {
+    ConnectionRefusedError: "nobody listens at that address",
+    ConnectionResetError: "the server closes the connection",
+    socket.gaierror: "no machine of that name is known",
+}
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
@@ -50,8 +64,74 @@ async def open_client(url: str, credentials: Credentials) -> Client:
     if credentials.user:
         client.set_user(credentials.user)
         client.set_password(credentials.password())
-    await asyncio.wait_for(client.connect(), 2 * ANSWER)
+    try:
+        await asyncio.wait_for(_connect(client), 2 * ANSWER)
+    except TimeoutError:  # a server cannot read, and does not answer, what is not for its key
+        if credentials.security != "none":
+            await _compare(url, Path(credentials.server_certificate))
+        raise
     return client
+
+
+def is_open(client: Client) -> bool:
+    """Return whether the connection of a client stands."""
+    from asyncua.client.ua_client import UASocketState
+
+    protocol = client.uaclient.protocol
+    return protocol is not None and protocol.state is not UASocketState.CLOSED
+
+
+async def shown_certificate(url: str) -> x509.Certificate | None:
+    """Return what a server shows for signed and encrypted sessions; None where it has none.
+
+    Raises:
+        OSError, TimeoutError, asyncua.ua.UaError: the server cannot be asked.
+    """
+    from asyncua import Client, ua
+    from asyncua.crypto.uacrypto import x509_from_der
+
+    for point in await Client(url, timeout=ANSWER).connect_and_get_server_endpoints():
+        secured = point.SecurityMode == ua.MessageSecurityMode.SignAndEncrypt
+        if secured and point.SecurityPolicyUri.endswith("#Basic256Sha256"):
+            found: x509.Certificate = x509_from_der(point.ServerCertificate)
+            return found
+    return None
+
+
+async def _compare(url: str, pinned: Path) -> None:
+    """Raise InputError when the server shows another certificate than the pinned one."""
+    from asyncua import ua
+
+    try:
+        shown = await shown_certificate(url)
+    except (OSError, TimeoutError, ua.UaError):
+        return  # it does not tell
+    if shown is not None and fingerprint(shown) != fingerprint(load_certificate(pinned)):
+        raise InputError(
+            f"is not what the server shows now ({fingerprint(shown)[:23]}…)",
+            where=str(pinned),
+            fix="ask the control engineer, then pin it again",
+        )
+
+
+async def _connect(client: Client) -> None:
+    """Connect; a connection that the other side has closed is not waited for.
+
+    The library waits for the answer to a question that it puts to a closed connection.
+    """
+    opening, closed = asyncio.create_task(client.connect()), 0
+    try:
+        while not opening.done() and closed < CLOSED:
+            await asyncio.wait((opening,), timeout=LOOK)
+            closed += client.uaclient.protocol is not None and not is_open(client)
+    finally:
+        opening.cancel()  # nothing where it is done
+    if not opening.done():
+        raise ConnectionError("the server closes the connection")
+    error = opening.exception()
+    if type(error) is ConnectionError:  # the library's own, for a connection that went away
+        raise ConnectionError("the server closes the connection") from error
+    opening.result()
 
 
 async def node_ids(client: Client, tags: Sequence[str]) -> dict[str, ua.NodeId]:
@@ -60,22 +140,28 @@ async def node_ids(client: Client, tags: Sequence[str]) -> dict[str, ua.NodeId]:
     Raises:
         InputError: a namespace that the server does not have, or no node id.
     """
+    spaces = await client.get_namespace_array()
+    return {tag: node_id(tag, spaces) for tag in dict.fromkeys(tags)}
+
+
+def node_id(tag: str, spaces: Sequence[str]) -> ua.NodeId:
+    """Return the node id of a tag, ``nsu=URI;`` looked up in the server's namespaces.
+
+    Raises:
+        InputError: a namespace that the server does not have, or no node id.
+    """
     from asyncua import ua
 
-    spaces = await client.get_namespace_array()
-    found = {}
-    for tag in dict.fromkeys(tags):
-        text = tag
-        if tag.startswith("nsu="):
-            uri, _, rest = tag[4:].partition(";")
-            if uri not in spaces:
-                raise InputError(f"the server has no namespace {uri}", where=f"tag {tag}")
-            text = f"ns={spaces.index(uri)};{rest}"
-        try:
-            found[tag] = ua.NodeId.from_string(text)
-        except ua.UaError:
-            raise InputError("is no node id", where=f"tag {tag}") from None
-    return found
+    text = tag
+    if tag.startswith("nsu="):
+        uri, _, rest = tag[4:].partition(";")
+        if uri not in spaces:
+            raise InputError(f"is of no namespace of the server, {uri}", where=f"tag {tag}")
+        text = f"ns={spaces.index(uri)};{rest}"
+    try:
+        return ua.NodeId.from_string(text)
+    except ua.UaError:
+        raise InputError("is no node id", where=f"tag {tag}") from None
 
 
 def reading_of(value: ua.DataValue | None, first: bool) -> TagReading:
@@ -103,15 +189,24 @@ def describe(error: BaseException) -> str:
         return f"the server answers {ua.StatusCode(error.code).name}"
     if isinstance(error, TimeoutError):
         return "the server does not answer"
+    for kind, words in SAID.items():
+        if isinstance(error, kind):
+            return words
     return " ".join(str(error).split()) or type(error).__name__
 
 
 async def kinds_of(client: Client, written: dict[str, ua.NodeId]) -> dict[str, ua.VariantType]:
     """Return the type of number that each written tag takes."""
-    return {
-        tag: await client.get_node(node).read_data_type_as_variant_type()
-        for tag, node in written.items()
-    }
+    return {tag: await kind_of(client, node) for tag, node in written.items()}
+
+
+async def kind_of(client: Client, node: ua.NodeId) -> ua.VariantType:
+    """Return the type of value that a node takes.
+
+    Raises:
+        OSError, TimeoutError, asyncua.ua.UaError: there is no such node, or the session is lost.
+    """
+    return await client.get_node(node).read_data_type_as_variant_type()
 
 
 async def write(
@@ -123,6 +218,10 @@ async def write(
     """Write one order, if the modes still grant it; return why not, empty when it is written."""
     from asyncua import ua
 
+    lacking = [tag for tag, _ in order.values if tag not in kinds]
+    lacking += [mode for mode in order.modes if mode not in resolve]
+    if lacking:
+        return f"tag {lacking[0]} is refused"
     try:
         if order.modes:
             modes = await client.read_attributes([client.get_node(resolve[m]) for m in order.modes])

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.loop.reading import Section, load_yaml
+from stiction_ros.loop.yaml.reading import Section, load_yaml
 
 _NODE = re.compile(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+HIGHEST_PORT = 65_535
 WATCHDOG = 5.0  # s without a beat after which the other side is given up
+
+
+class Use(enum.Enum):
+    """What a tag is written for."""
+
+    REQUEST = "request"
+    HEARTBEAT = "heartbeat"
+    OP = "op"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,9 +120,14 @@ class LoopTags:
 
     def written_tags(self) -> Iterator[str]:
         """Yield the tags that may be written."""
+        yield from (tag for tag, _ in self.uses())
+
+    def uses(self) -> Iterator[tuple[str, Use]]:
+        """Yield the tags that may be written, each with what for."""
         if self.grant is not None:
-            yield from (self.grant.request, self.grant.heartbeat)
-            yield from (valve.op for valve in self.valves)
+            yield self.grant.request, Use.REQUEST
+            yield self.grant.heartbeat, Use.HEARTBEAT
+            yield from ((valve.op, Use.OP) for valve in self.valves)
 
     @property
     def step(self) -> int:
@@ -155,13 +170,25 @@ class TagMap:
 
 
 def check_address(address: str, where: str) -> None:
-    """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it."""
+    """Raise InputError unless ``address`` is one of OPC UA over TCP without a password in it.
+
+    Its port, where it names one, is 1 to 65535.
+    """
     if not re.fullmatch(r"opc\.tcp://[^\s/]+(/\S*)?", address):
         raise InputError("is no address of a server", where=where, fix="write opc.tcp://HOST:PORT")
     if "@" in address:
         raise InputError(
             "holds a user", where=where, fix="name user and password_file as parameters"
         )
+    place = address.removeprefix("opc.tcp://").partition("/")[0]
+    host, colon, port = place.rpartition(":")
+    if place.endswith("]"):  # of an address of IPv6
+        host, colon, port = place, "", ""
+    if colon and not (port.isascii() and port.isdigit() and 0 < int(port[:9]) <= HIGHEST_PORT):
+        raise InputError(f"{port!r} is no port", where=where, fix=f"use 1 to {HIGHEST_PORT}")
+    bare = host if colon else place
+    if not bare or (re.search(r"[\[\]:]", bare) and not re.fullmatch(r"\[[0-9a-fA-F:.]+\]", bare)):
+        raise InputError("is no address of a server", where=where, fix="write opc.tcp://HOST:PORT")
 
 
 def _loop(section: Section) -> LoopTags:
@@ -180,6 +207,14 @@ def _loop(section: Section) -> LoopTags:
     section.finish()
     if not outputs or not valves:
         raise InputError("needs outputs and valves", where=section.where)
+    in_force = {valve.op_read for valve in valves}
+    for i, valve in enumerate(valves):
+        if valve.op in in_force:
+            raise InputError(
+                f"op is {valve.op}, which is the op_read of a valve as well",
+                where=f"{section.at('valves')}[{i}]",
+                fix="name the tag that takes a remote OP",
+            )
     _once([one.name for one in outputs], section.at("outputs"), "name")
     _once([one.name for one in valves], section.at("valves"), "name")
     if grant is not None:

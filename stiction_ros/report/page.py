@@ -64,6 +64,7 @@ sub { font-size: 0.72em; line-height: 0; }
 .warn { border-left: 5px solid var(--bad); background: var(--panel); padding: 10px 14px;
   border-radius: 6px; }
 footer { margin-top: 56px; color: var(--soft); font-size: 0.85rem; }
+@media (max-width: 640px) { figure img { width: 640px; } }
 @media print { main { padding: 0; max-width: none; } figure { break-inside: avoid; } }
 </style>
 </head>
@@ -136,8 +137,8 @@ def embedded(drawing: Drawing, png: bytes) -> str:
     """Return a figure with its picture inside the page."""
     data = base64.b64encode(png).decode("ascii")
     return (
-        f'<figure id="{text(drawing.name)}"><img alt="{text(drawing.title)}" '
-        f'src="data:image/png;base64,{data}"><figcaption><b>{text(drawing.title)}.</b> '
+        f'<figure id="{text(drawing.name)}"><div class="scroll"><img alt="{text(drawing.title)}" '
+        f'src="data:image/png;base64,{data}"></div><figcaption><b>{text(drawing.title)}.</b> '
         f"{text(drawing.caption)}</figcaption></figure>"
     )
 

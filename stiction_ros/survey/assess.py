@@ -12,7 +12,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.gain import gain_of
-from stiction_ros.gain.measures import work
 from stiction_ros.identification import Identification, identify
 from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.identification.closed_loop.recovered_controller import LoopSignals, recover
@@ -20,6 +19,7 @@ from stiction_ros.intake.loop import Loop
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
+from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.survey.beats import beats
 from stiction_ros.survey.entry import Cycling, Entry, Status
 from stiction_ros.survey.options import SurveyOptions
@@ -136,7 +136,8 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
     if cause is not None and cause["period"] is not None:
         cycling = Cycling(cause["period"], cause["regularity"], cause["amplitude"])
     hours = len(record) * record.sample_time / 3600.0
-    travel, turns = work(found.stem[:, chosen]) if found.stem.shape == record.op.shape else (0.0, 0)
+    stems = found.stem if found.stem.shape == record.op.shape else np.zeros_like(record.op)
+    work = ValveWork.of(stems[:, chosen])
     entry = dataclasses.replace(
         entry,
         status=Status.OK,
@@ -148,9 +149,9 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
         f_d=valve["f_d"],
         f_d_interval=tuple(valve["f_d_interval"]),
         band_share=valve["band_share"],
-        travel_per_hour=travel / hours,
-        reversals_per_hour=turns / hours,
-        confidence=confidence(valve, kind, turns),
+        travel_per_hour=work.travel / hours,
+        reversals_per_hour=work.reversals / hours,
+        confidence=confidence(valve, kind, round(work.reversals)),
         notes=notes,
         beats=_beats(record, outputs.index(output), cycling),
     )

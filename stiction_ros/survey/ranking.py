@@ -15,8 +15,7 @@
 point, .5 for an interval as wide as twice its middle), how often it was seen (n/(n + 3) for a stem
 that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees
 (1 where it says the valve is the cause, .8 where it does not tell, .6 where it names another
-one), and how well the answer held still over variants of the record, where identification says
-that.
+one), and the share of the rates and halves of the record that agree.
 """
 
 from __future__ import annotations
@@ -54,8 +53,7 @@ def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> f
         reversals: of the estimated stem in the record.
     """
     stability = valve.get("stability")
-    steady = float(stability) if isinstance(stability, int | float) else 1.0
-    steady = min(max(steady, 0.0), 1.0)
+    steady = len(stability["agreed"]) / len(stability["tried"]) if stability else 1.0
     if valve["verdict"] == "undecided":
         return OPEN * steady
     if valve["verdict"] == "healthy":

@@ -12,7 +12,7 @@ from typing import IO, Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
-from stiction_ros.survey.engine import Engine, Task
+from stiction_ros.survey.engines.engine import Engine, Task
 from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.groups import Group, grouped
 from stiction_ros.survey.journal import Journal, key_of

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.blind.late import ONSET, SAMPLES, Late, late_loop, watch
-from stiction_ros.blind.scoring import Score
+from stiction_ros.blind.scores.scoring import Score
 from stiction_ros.effects import Backlash, ExtraDelay, HeStiction, Lag
-from stiction_ros.online.gap_monitor import MonitorRule
+from stiction_ros.online.monitor.gap_monitor import MonitorRule
 
 QUIET = MonitorRule(monitor=True, monitor_growth=10.0)
 

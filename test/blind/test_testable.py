@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from stiction_ros.blind.generator import blind_loop
+from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.blind.testable import gains_beyond_margin
 
 SINE, STICTION = 19, 7  # seeds of single loops

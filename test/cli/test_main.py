@@ -54,7 +54,7 @@ def test_identify_lists_the_friction_laws(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit):
         parser().parse_args(["identify", "--help"])
     told = " ".join(capsys.readouterr().out.split())
-    assert "he | semi_physical | kano | choudhury | xch" in told
+    assert "friction law: choudhury | he | kano | semi_physical | xch (default: he)" in told
 
 
 def test_identify_prints_the_contract_as_json(
@@ -84,6 +84,17 @@ def test_identify_by_the_paper_s_methods(
     assert found["model"]["method"] == method[0]
     assert found["model"]["search"]["squared_error"] > 0.0
     assert found["valves"][0]["f_s"] == pytest.approx(4.0, abs=0.5)
+
+
+@pytest.mark.parametrize("method", ["exact", "grid"])
+def test_the_largest_friction_can_be_chosen(
+    method: str, record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    orders = ["--na", "1", "--nb", "1", "--delay", "0", "--method", method, "--json", "-"]
+    assert main(["identify", str(record), *orders, "--friction-limit", "2"]) == 0
+    assert json.loads(capsys.readouterr().out)["valves"][0]["f_s"] <= 2.0
+    assert main(["identify", str(record), *orders, "--friction-limit", "2,3"]) == 2
+    assert "friction_limit: 2 limits for 1 valves" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", [["--starts", "3"], ["--method", "nlp", "--grid-step", "1"]])

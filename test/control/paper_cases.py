@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from loops import stable_model, target_at
 
-from stiction_ros.control.augmented_cost import PlanProblem
-from stiction_ros.control.paper_weights import (
+from stiction_ros.control.printed.augmented_cost import PlanProblem
+from stiction_ros.control.problem.paper_weights import (
     AugmentedWeights,
     PaperTuning,
     WarmStart,

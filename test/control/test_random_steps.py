@@ -13,6 +13,7 @@ from stiction_ros.control import ControlMode, FrictionSpread, MpcController, Ste
 from stiction_ros.control.result import StepResult
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects import HeStiction, KanoStiction, SemiPhysicalStiction, XchStiction
+from stiction_ros.errors import InputError
 
 STEPS = int(os.environ.get("STICTION_RANDOM_STEPS", "600"))
 STEPS_A_MODEL = 20
@@ -31,7 +32,7 @@ class Trial:
             model = dataclasses.replace(model, e=random.normal(size=(model.order, 1)))
         self.low = float(random.uniform(0.0, 45.0))
         self.high = float(random.uniform(55.0, 100.0))
-        move = float(random.choice([np.inf, 0.5, 5.0]))
+        move = float(random.choice([np.inf, 0.5, 5.0, 30.0]))
         output = (-1.0, 1.0) if random.random() < 0.3 else (-np.inf, np.inf)
         limits = limits_for(model, self.low, self.high, move, output)
         self.limits = dataclasses.replace(limits, iterations=int(random.choice([1, 8, 2000])))
@@ -47,7 +48,15 @@ class Trial:
             np.ones(self.m),
         )
         design = dataclasses.replace(design, fallback=rule)
-        self.controller = MpcController(design, self.mode, self.frictions(), self.spreads())
+        frictions, spreads = self.frictions(), self.spreads()
+        try:
+            self.controller = MpcController(design, self.mode, frictions, spreads)
+        except InputError as error:  # no kick fits in
+            if error.where != "op_rate_limits" or move == np.inf:
+                raise
+            design = design.without_rates()
+            self.limits = design.limits
+            self.controller = MpcController(design, self.mode, frictions, spreads)
         self.applied = random.uniform(self.low, self.high, self.m)
         self.d = model.e.shape[1]
 
@@ -83,6 +92,7 @@ class Trial:
         applied = self.applied
         if self.random.random() < 0.1:
             applied = self.values(self.m)
+        self.told = applied
         return self.controller.step(
             self.values(self.p), self.values(self.p), self.values(self.d), applied, preview
         )
@@ -106,7 +116,11 @@ def check(trial: Trial, result: StepResult) -> None:
         assert (result.status is StepStatus.UNREACHABLE) == bool(result.miss.any())
         assert result.plan is not None
         assert result.plan.converged
-        assert result.plan.op == pytest.approx(result.op)
+        if "rate limit" not in result.reason:
+            assert result.plan.op == pytest.approx(result.op)
+    if result.strategy != "fallback" and np.isfinite(trial.told).all():
+        before = np.clip(trial.told, trial.low, trial.high)
+        assert np.all(np.abs(result.op - before) <= trial.limits.move + 1e-9)
 
 
 @pytest.mark.parametrize("part", range(4))

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,8 @@ LISTS = (
     "output_weights",
     "move_weights",
     "embedding_move_weights",
+    "move_worth",
+    "kick_limits",
     "target_weights",
     "op_rate_limits",
     "pv_low",
@@ -77,3 +80,16 @@ def test_bounds_of_op_that_leave_nothing_are_refused() -> None:
     with pytest.raises(InputError) as caught:
         ControlSettings(op_low=(60.0,), op_high=(50.0,)).design(TANK)
     assert caught.value.where == "op_low"
+
+
+def test_two_moves_cost_as_much_as_the_offset_whose_iae_they_are_worth() -> None:
+    settings = ControlSettings(horizon=30, look_ahead=70, output_weights=(4.0, 1.0))
+    design = dataclasses.replace(settings, move_worth=(0.05, 0.0)).design(TANK)
+    samples, worth = 100, 0.05 * 3600.0 / TANK.sample_time
+    offset = 2.0 * worth / samples  # its IAE is what two moves are worth
+    prices = design.jumps.move_prices
+    assert prices is not None
+    assert 2.0 * prices[0] == pytest.approx(4.0 * offset**2 * samples)
+    assert prices[1] == 0.0
+    assert design.embedding.look_ahead == 70
+    assert design.unaware.look_ahead == 0

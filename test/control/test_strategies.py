@@ -8,9 +8,9 @@ import pytest
 from loops import design_of, first_order, kalman, limits_for, weights_for
 
 from stiction_ros.control import ControlDesign, ControlMode, MpcController, StepStatus
+from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import Plan, StepResult
 from stiction_ros.control.strategies import FallbackRule, Solve, Unaware, strategies
-from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction
 
 FRICTION = HeStiction(8.0, 1.0)
@@ -230,6 +230,6 @@ def test_after_a_failure_the_solver_starts_anew() -> None:
     qp = solve.formulation._qp  # type: ignore[attr-defined]
     it.step(PV, np.array([24.9]), NO_DV, np.array([50.0]))
     assert qp.limit_reached
-    assert not qp._ready
+    assert not qp._hard._ready
     it.step(PV, PV, NO_DV, np.array([50.0]))
-    assert qp._ready
+    assert qp._hard._ready

@@ -12,14 +12,20 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from stiction_ros.config_files import find_config
-from stiction_ros.discrepancy.candidates import Response
-from stiction_ros.discrepancy.free_run import FreeRun, join_records
-from stiction_ros.discrepancy.misfit import misfit
-from stiction_ros.discrepancy.misfit_kernels import whitened_shifts
-from stiction_ros.discrepancy.noise import Blocks, autoregression, fit_noise, projector, whiten
-from stiction_ros.discrepancy.noise_kernels import least_squares, turn
-from stiction_ros.discrepancy.response_kernels import filtered
-from stiction_ros.discrepancy.search import Baseline
+from stiction_ros.discrepancy.candidate.base import Response
+from stiction_ros.discrepancy.fit.misfit import misfit
+from stiction_ros.discrepancy.fit.misfit_kernels import whitened_shifts
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.likelihood.kernels import least_squares, turn
+from stiction_ros.discrepancy.likelihood.noise import (
+    Blocks,
+    autoregression,
+    fit_noise,
+    projector,
+    whiten,
+)
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
+from stiction_ros.discrepancy.simulation.response_kernels import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel, simulate_open_loop
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stiction_ros.effects import BEHAVIOURS, Behaviour, from_mapping
+from stiction_ros.effects import Behaviour, behaviours, from_mapping
 from stiction_ros.errors import InputError
 
-every_behaviour = pytest.mark.parametrize("kind", BEHAVIOURS, ids=lambda kind: kind.title())
+every_behaviour = pytest.mark.parametrize("kind", behaviours(), ids=lambda kind: kind.title())
 
 
 def example(kind: type[Behaviour]) -> dict[str, Any]:

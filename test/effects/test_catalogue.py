@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from stiction_ros.effects import BEHAVIOURS, Behaviour
+from stiction_ros.effects import Behaviour, behaviours
 from stiction_ros.effects.catalogue import PLACES, page
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
-every_behaviour = pytest.mark.parametrize("kind", BEHAVIOURS, ids=lambda kind: kind.title())
+every_behaviour = pytest.mark.parametrize("kind", behaviours(), ids=lambda kind: kind.title())
 
 
 def test_the_page_is_current() -> None:
@@ -33,7 +33,7 @@ def test_every_effect_says_how_it_shows_and_what_it_needs(kind: type[Behaviour])
 
 @every_behaviour
 def test_what_it_is_confused_with_is_in_the_catalogue(kind: type[Behaviour]) -> None:
-    known = {(place, other.effect) for other in BEHAVIOURS for place in other.places}
+    known = {(place, other.effect) for other in behaviours() for place in other.places}
     assert kind.confusable
     for text in kind.confusable:
         assert tuple(text.split()[:2]) in known
@@ -41,5 +41,5 @@ def test_what_it_is_confused_with_is_in_the_catalogue(kind: type[Behaviour]) -> 
 
 def test_names_of_one_place_are_one_effect() -> None:
     for place in PLACES:
-        here = [kind for kind in BEHAVIOURS if place in kind.places]
+        here = [kind for kind in behaviours() if place in kind.places]
         assert len({(kind.effect, kind.law) for kind in here}) == len(here)

@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.effects import DriftDisturbance, SineDisturbance, StepDisturbance
+from stiction_ros.effects import (
+    DriftDisturbance,
+    RandomWalkDisturbance,
+    SineDisturbance,
+    SquareDisturbance,
+    StepDisturbance,
+    TriangleDisturbance,
+)
+from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
 from stiction_ros.errors import InputError
 
 signal = st.floats(-1e3, 1e3)
@@ -39,3 +47,55 @@ def test_a_sine_that_does_not_swing_is_refused(values: dict[str, float]) -> None
     with pytest.raises(InputError) as caught:
         SineDisturbance.from_mapping({"amplitude": 1.0, "period": 1.0} | values)
     assert caught.value.where == next(iter(values))
+
+
+@pytest.mark.parametrize("kind", [SineDisturbance, SquareDisturbance, TriangleDisturbance])
+@given(
+    amplitude=st.floats(0.1, 10.0),
+    period=st.floats(5.0, 500.0),
+    phase=st.floats(-3.0, 3.0),
+    time=st.floats(0.0, 1e3),
+)
+def test_half_a_period_later_a_wave_is_on_the_other_side(
+    kind: type[PeriodicDisturbance], amplitude: float, period: float, phase: float, time: float
+) -> None:
+    wave = kind(amplitude, period, phase)
+    now = wave.step(0.0, 0.0, time)[1]
+    later = wave.step(0.0, 0.0, time + period)[1]
+    assert abs(now) <= amplitude * (1.0 + 1e-12)
+    if kind is not SquareDisturbance:  # which jumps
+        assert later == pytest.approx(now, abs=1e-6 * amplitude)
+        assert wave.step(0.0, 0.0, time + period / 2.0)[1] == pytest.approx(
+            -now, abs=1e-6 * amplitude
+        )
+
+
+@pytest.mark.parametrize("kind", [SineDisturbance, SquareDisturbance, TriangleDisturbance])
+def test_a_whole_record_at_once_is_the_same_as_one_sample_at_a_time(
+    kind: type[PeriodicDisturbance],
+) -> None:
+    wave = kind(2.0, 37.0, 0.4)
+    values = np.arange(100.0)
+    stepped = [wave.step(0.0, value, 0.5 * k)[1] for k, value in enumerate(values.tolist())]
+    assert wave.simulate(values, sample_time=0.5) == pytest.approx(stepped)
+
+
+def test_a_square_jumps_and_a_triangle_ramps() -> None:
+    square, triangle = (
+        kind(2.0, 40.0).simulate(np.zeros(41)) for kind in (SquareDisturbance, TriangleDisturbance)
+    )
+    assert square[[0, 19, 21, 39]].tolist() == [2.0, 2.0, -2.0, -2.0]
+    assert triangle[[0, 5, 10, 30]] == pytest.approx([0.0, 1.0, 2.0, -2.0])
+
+
+@pytest.mark.parametrize("second", [0.5, 4.0])
+def test_a_random_walk_spreads_with_the_root_of_time(second: float) -> None:
+    walk = RandomWalkDisturbance(0.3)
+    ends = []
+    for seed in range(400):
+        memory = walk.rest(0.0)
+        for k, normal in enumerate(np.random.default_rng(seed).standard_normal(21).tolist()):
+            memory, value = walk.step_with(memory, 0.0, k * second, normal)
+        ends.append(value)
+    assert np.std(ends) == pytest.approx(0.3 * math.sqrt(20 * second), rel=0.1)
+    assert walk.simulate(np.ones(3)) == pytest.approx(np.ones(3))

@@ -102,3 +102,18 @@ def test_tally_of_healthy_loops_allows_two_percent_sticky() -> None:
         assert findings["V1: sticky"].count == bad
         assert findings["V1: sticky"].met is met
         assert findings["V1: healthy"].count == 60 - bad
+        assert findings["V1: sticky or backlash"].count == bad
+
+
+def test_tally_of_healthy_loops_counts_backlash_as_friction() -> None:
+    loop = healthy_loop(1)
+    good = compare(loop, perfect(loop))
+    kinds = ("sticky", "backlash")
+    wrong = [
+        dataclasses.replace(good, valves=(dataclasses.replace(good.valves[0], verdict=kind),))
+        for kind in kinds
+    ]
+    findings = {f.text: f for f in tally("healthy", [good] * 58 + wrong)}
+    assert [findings[f"V1: {kind}"].met for kind in kinds[:1]] == [True]
+    assert findings["V1: sticky or backlash"].count == 2
+    assert findings["V1: sticky or backlash"].met is False

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.errors import InputError
+from stiction_ros.examples import control_cases
 from stiction_ros.examples.control_cases import (
     CASES,
     ControlOutcome,
@@ -28,6 +29,33 @@ def test_the_embedding_is_about_as_good_as_without_stiction(
     assert np.all(embedding.iae <= 1.25 * free.iae)
     assert np.all(unaware.iae >= 1.5 * free.iae)
     assert np.all(embedding.offset <= [0.008, 0.03])
+
+
+@pytest.mark.parametrize("mode", ["embedding", "unaware"])
+def test_a_soft_bound_of_c_stops_the_loop_short_of_a_set_point_beyond_it(
+    mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The set-point of C is 7.41 from sample 150 on; Table A.3 allows 0, this controller 7.46."""
+    monkeypatch.setattr(control_cases, "SAMPLES", 185)
+    bounded, free = (
+        run_case(CASES["nominal"], 41, {"mode": mode, "pv_low": low})
+        for low in ((7.46, 0.0), (0.0, 0.0))
+    )
+    late = slice(165, None)
+    lowest, apart = (float(np.min(run.error[late, 0] + run.sp[late, 0])) for run in (bounded, free))
+    assert bounded.sp[late, 0].max() == 7.41
+    assert lowest > 7.445
+    assert apart < 7.42
+
+
+def test_waiting_for_the_end_of_an_unmeasured_step_spares_moves() -> None:
+    at_once, waiting = (
+        [run_case(CASES["C_B"], seed, {"longest_wait": longest}) for seed in (41, 42)]
+        for longest in (0, 20)
+    )
+    assert sum(run.moves for run in waiting) < 0.8 * sum(run.moves for run in at_once)
+    assert sum(run.travel for run in waiting) < 0.85 * sum(run.travel for run in at_once)
+    assert max(run.offset[0] for run in waiting) < 0.006
 
 
 def test_only_the_unaware_loop_cycles(

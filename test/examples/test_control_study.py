@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.control.paper_weights import WeightPreset
+from stiction_ros.control.problem.paper_weights import WeightPreset
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
-from stiction_ros.examples import control_study
 from stiction_ros.examples.control_study import (
     COLUMNS,
     REACH,
@@ -62,11 +61,10 @@ def test_all_steps_are_solved(trial: Trial) -> None:
         assert run.statuses == {"solved": len(run.run.record)}
 
 
-def test_a_preset_changes_the_unaware_controller_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_preset_changes_the_unaware_controller_alone() -> None:
     chosen = [column for column in COLUMNS if column.key in ("unaware", "exact")]
-    monkeypatch.setattr(control_study, "COLUMNS", chosen)
-    own = run_trial(SHORT, 5)
-    printed = run_trial(StudyOptions("linear", WeightPreset.PRINTED, hold=40), 5)
+    own = run_trial(SHORT, 5, columns=chosen)
+    printed = run_trial(StudyOptions("linear", WeightPreset.PRINTED, hold=40), 5, columns=chosen)
     same = {
         key: np.array_equal(own.runs[key].run.record.op, printed.runs[key].run.record.op)
         for key in own.runs
@@ -74,9 +72,9 @@ def test_a_preset_changes_the_unaware_controller_alone(monkeypatch: pytest.Monke
     assert same == {"unaware": False, "exact": True}
 
 
-def test_the_scenario_s_own_set_points_last_one_round(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(control_study, "COLUMNS", COLUMNS[:1])
-    run = run_trial(StudyOptions(schedule="scenario"), 5).runs["unaware"].run
+def test_the_scenario_s_own_set_points_last_one_round() -> None:
+    found = run_trial(StudyOptions(schedule="scenario"), 5, columns=COLUMNS[:1])
+    run = found.runs["unaware"].run
     assert len(run.record) == 620
     assert run.record.sp is not None
     assert run.record.sp[-1].tolist() == [7.38, 41.0]

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from stiction_ros.faults.fault import Fault, Notice, Pace, Phase, nothing
-from stiction_ros.faults.observation import BagFound, Known, Observation, Sampled, Shown
+from stiction_ros.faults.judgement.observation import BagFound, Known, Observation, Sampled, Shown
 
 PERIOD = 0.04
 STEP = 10**9

@@ -11,7 +11,7 @@ from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.faults.catalogue import FAULTS, find, table
 from stiction_ros.faults.fault import LEVELS, Fault, Pace
-from stiction_ros.faults.setting_up import NAMES, case_parameters
+from stiction_ros.faults.loop.setting_up import NAMES, case_parameters
 from stiction_ros.online.session import NODE_SETTINGS
 from stiction_ros.settings import from_mapping
 

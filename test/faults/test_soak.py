@@ -7,8 +7,8 @@ import math
 
 import pytest
 
+from stiction_ros.cli.live.soak import parameters
 from stiction_ros.cli.main import main
-from stiction_ros.cli.soak import parameters
 from stiction_ros.faults.soak import Memory, Readings, Soaked
 
 GOOD = Soaked(

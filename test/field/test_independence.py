@@ -45,7 +45,7 @@ def file_of(module: str) -> Path:
 
 
 def test_the_field_imports_nothing_that_is_judged() -> None:
-    files = sorted((PACKAGE / "field").glob("*.py"))
+    files = sorted((PACKAGE / "field").rglob("*.py"))
     assert files
     for path in files:
         for module in imported(path):
@@ -53,7 +53,7 @@ def test_the_field_imports_nothing_that_is_judged() -> None:
 
 
 def test_nothing_that_it_imports_does_either_but_for_a_type() -> None:
-    waiting = list((PACKAGE / "field").glob("*.py"))
+    waiting = list((PACKAGE / "field").rglob("*.py"))
     seen: set[Path] = set()
     while waiting:
         path = waiting.pop()
@@ -69,6 +69,7 @@ def test_nothing_that_it_imports_does_either_but_for_a_type() -> None:
 
 
 def test_the_folder_stays_small() -> None:
-    files = list((PACKAGE / "field").glob("*.py"))
-    assert len(files) <= 12
+    for folder in (PACKAGE / "field", PACKAGE / "field" / "hidden"):
+        assert 1 < len(list(folder.glob("*.py"))) <= 12
+    files = list((PACKAGE / "field").rglob("*.py"))
     assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 400 for path in files)

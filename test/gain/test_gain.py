@@ -10,7 +10,7 @@ from stiction_ros.gain.draws import drawn_frictions
 from stiction_ros.gain.gain import Gain, What, gain_of
 from stiction_ros.gain.model_gain import gain_of_model
 from stiction_ros.gain.stems import stems_of
-from stiction_ros.identification import Identification, VerdictKind, identify
+from stiction_ros.identification import Identification, IdentificationOptions, VerdictKind, identify
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import PiController, simulate_closed_loop
 from stiction_ros.loop.set_points import SetPoints
@@ -59,7 +59,7 @@ def record(model: LoopModel) -> Record:
 
 @pytest.fixture(scope="module")
 def found(record: Record) -> Identification:
-    return identify(record)
+    return identify(record, IdentificationOptions("exact"))
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.gain.measures import Yardstick, work
+from stiction_ros.gain.measures import Yardstick
+from stiction_ros.records.valve_work import ValveWork
 
 
 def test_a_sine_has_its_amplitude_and_its_mean() -> None:
@@ -23,6 +24,7 @@ def test_travel_and_reversals_are_counted_an_hour() -> None:
     found = Yardstick(1.0, None, [(0, 3600)]).measure(np.zeros(3600), stem)
     assert found.amplitude is None
     assert found.travel_per_hour == pytest.approx(3599.0)
+    assert found.moves_per_hour == pytest.approx(3599.0)
     assert found.reversals_per_hour == pytest.approx(1799.0)
 
 
@@ -35,8 +37,8 @@ def test_travel_grows_with_the_stem_and_knows_no_zero(
     path: list[float], factor: float, shift: float
 ) -> None:
     stem = np.array(path)
-    travel, turns = work(stem)
-    scaled, same = work(factor * stem + shift)
-    assert scaled == pytest.approx(factor * travel, rel=1e-6, abs=1e-6 * (1 + abs(shift)))
-    assert turns <= len(path)
-    assert same <= len(path)
+    work, again = ValveWork.of(stem), ValveWork.of(factor * stem + shift)
+    near = pytest.approx(factor * work.travel, rel=1e-6, abs=1e-6 * (1 + abs(shift)))
+    assert again.travel == near
+    for one in (work, again):
+        assert one.reversals <= one.moves <= len(path)

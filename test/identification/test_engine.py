@@ -1,4 +1,4 @@
-"""identify() on loops whose truth is known."""
+"""The exact search on loops whose truth is known."""
 
 import dataclasses
 import json
@@ -11,7 +11,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, IdentificationOptions, VerdictKind, identify
 from stiction_ros.records.record import Record
 
-THIRD_ORDER = IdentificationOptions(output_order=3, input_order=3)
+EXACT = IdentificationOptions("exact")
+THIRD_ORDER = IdentificationOptions("exact", output_order=3, input_order=3)
 
 
 @pytest.mark.parametrize("noise", ["measurement", "equation"])
@@ -50,7 +51,7 @@ def test_output_model_simulates_the_record() -> None:
 
 
 def test_two_valves_two_outputs() -> None:
-    options = IdentificationOptions(output_order=2, input_order=2, delay=(0, 0))
+    options = IdentificationOptions("exact", output_order=2, input_order=2, delay=(0, 0))
     sticky, healthy = identify(loops.tank(1), options).valves
     assert sticky.verdict is VerdictKind.STICKY
     assert sticky.static_friction == pytest.approx(8.0, abs=0.3)
@@ -65,7 +66,7 @@ def test_no_friction_is_never_sticky(seed: int, period: float | None) -> None:
     samples = 1200
     sine = None if period is None else 0.3 * np.sin(2 * np.pi * np.arange(samples) / period)
     record = loops.example1(seed, friction=(0.0, 0.0), samples=samples, gain=2.8, disturbance=sine)
-    assert identify(record).valves[0].verdict is VerdictKind.HEALTHY
+    assert identify(record, EXACT).valves[0].verdict is VerdictKind.HEALTHY
 
 
 def test_compensated_window_gives_a_wide_interval() -> None:
@@ -87,11 +88,17 @@ def test_valve_that_never_slips_is_undecided() -> None:
 def test_json_has_the_keys_of_the_contract() -> None:
     found = identify(loops.example1(0, samples=800), THIRD_ORDER).to_json()
     assert json.loads(json.dumps(found)).keys() == found.keys()
-    assert {"samples", "sample_time", "seconds", "model", "valves", "outputs"} == found.keys()
+    assert {*("samples", "sample_time", "seconds", "model"), *("rate", "valves", "outputs")} == (
+        found.keys()
+    )
+    assert found["rate"] == {"sample_time": 1.0, "used": 1.0}
     assert found["valves"][0].keys() == {
         *("name", "verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval", "jump"),
-        *("band_share", "evidence"),
+        *("band_share", "stability", "evidence", "experiment"),
     }
+    stability = found["valves"][0]["stability"]
+    assert stability["agreed"] == [look["look"] for look in stability["tried"]]
+    assert stability["agreed"] == ["first half", "second half"]
     assert found["outputs"][0].keys() == {
         *("name", "a", "b", "delay", "bias", "noise_std", "fit_one_step", "fit_free_run"),
         "cause",
@@ -120,7 +127,7 @@ def test_short_record_is_refused() -> None:
 
 
 def test_unknown_law_is_refused() -> None:
-    with pytest.raises(InputError, match="known laws: he, semi_physical"):
+    with pytest.raises(InputError, match="known laws: choudhury, he, kano"):
         identify(loops.example1(0, samples=400), IdentificationOptions(law="nobody"))
 
 

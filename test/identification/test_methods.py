@@ -10,13 +10,12 @@ import pytest
 import simulated_loops as loops
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification import METHODS, IdentificationOptions, engine, identify, methods
+from stiction_ros.identification import METHODS, IdentificationOptions, identify, methods
+from stiction_ros.identification.evidence import engine
 from stiction_ros.identification.options import METHOD_NAMES
 from stiction_ros.records.record import Record
 
-SMALL = IdentificationOptions(
-    output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0
-)
+SMALL = IdentificationOptions(output_order=1, input_order=1, delay=(5, 5), friction_limit=6.0)
 
 
 def test_the_table_and_the_options_name_the_same_methods() -> None:
@@ -34,20 +33,18 @@ def test_each_method_signs_its_result(method: str) -> None:
     assert json.loads(json.dumps(document, allow_nan=False))["valves"][0]["name"] == "V1"
 
 
-def test_the_default_is_the_exact_search() -> None:
-    record = loops.example1(0, samples=400)
-    options = dataclasses.replace(SMALL, delay=(4, 5))
-    assert identify(record, options).valves == engine.identify(record, options).valves
+def test_the_default_is_the_search_by_evidence() -> None:
+    record = loops.example1(0, samples=700)
+    assert identify(record, SMALL).valves == engine.identify(record, SMALL).valves
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
         {"method": "guess"},
-        {"grid_law": "kano"},
-        {"starts": 0},
-        {"grid_step": 0.0},
-        {"grid_step": float("nan")},
+        {"method": "nlp"},
+        {"friction_limit": (5.0, 0.0)},
+        {"friction_limit": float("nan")},
     ],
 )
 def test_options_of_methods_are_checked(wrong: dict[str, object]) -> None:
@@ -55,7 +52,7 @@ def test_options_of_methods_are_checked(wrong: dict[str, object]) -> None:
         IdentificationOptions(**wrong)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("method", ["nlp", "grid"])
+@pytest.mark.parametrize("method", METHOD_NAMES)
 @pytest.mark.parametrize("case", ["constant op", "constant pv", "short", "law"])
 def test_unusable_records_are_refused(method: str, case: str) -> None:
     record = loops.example1(0, samples=300)
@@ -65,7 +62,7 @@ def test_unusable_records_are_refused(method: str, case: str) -> None:
     if case == "short":
         record = record.part(0, 30)
     if case == "law":
-        options = dataclasses.replace(options, law="kano")
+        options = dataclasses.replace(options, law="none")
     with pytest.raises(InputError):
         identify(record, options)
 
@@ -80,7 +77,7 @@ def test_a_node_that_fits_nothing_compiles_nothing() -> None:
 
 def test_casadi_is_left_alone_by_all_but_the_nonlinear_programme() -> None:
     code = (
-        "import sys, stiction_ros.cli.main, stiction_ros.online.live_estimator; "
+        "import sys, stiction_ros.cli.main, stiction_ros.online.estimator.live; "
         "sys.exit('casadi' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -94,9 +91,9 @@ def _swapped() -> Record:
 def test_swapped_columns_are_refused_before_a_slow_method_begins(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(methods, "METHODS", {"nlp": lambda *_: pytest.fail("it began")})
+    monkeypatch.setattr(methods, "METHODS", {"evidence": lambda *_: pytest.fail("it began")})
     with pytest.raises(InputError, match="look swapped"):
-        identify(_swapped(), IdentificationOptions(method="nlp"))
+        identify(_swapped(), IdentificationOptions(method="evidence"))
 
 
 def test_swapped_columns_are_a_better_reason_than_what_the_method_says(
@@ -105,7 +102,7 @@ def test_swapped_columns_are_a_better_reason_than_what_the_method_says(
     def refuse(*_: object) -> None:
         raise InputError("too short")
 
-    monkeypatch.setattr(methods, "METHODS", {"exact": refuse})
+    monkeypatch.setattr(methods, "METHODS", {"evidence": refuse})
     with pytest.raises(InputError, match="look swapped"):
         identify(_swapped())
     with pytest.raises(InputError, match="too short"):

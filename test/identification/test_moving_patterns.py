@@ -13,8 +13,8 @@ from stiction_ros.effects import (
     SemiPhysicalStiction,
     XchStiction,
 )
-from stiction_ros.identification.friction_grid import simulate
-from stiction_ros.identification.patterns import (
+from stiction_ros.identification.friction.grid import simulate
+from stiction_ros.identification.switching.patterns import (
     Cells,
     beginning_of,
     cells_at,

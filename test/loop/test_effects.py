@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlSettings
-from stiction_ros.effects import BEHAVIOURS, Behaviour, from_mapping
+from stiction_ros.effects import Behaviour, behaviours, from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, simulate_open_loop
 
-PLACES = ("valve", "process", "disturbance", "sensor")
-PAIRS = [(kind, place) for kind in BEHAVIOURS for place in PLACES if place in kind.places]
+PLACES = ("valve", "load", "process", "disturbance", "sensor")
+PAIRS = [(kind, place) for kind in behaviours() for place in PLACES if place in kind.places]
 every_pair = pytest.mark.parametrize(
     ("kind", "place"), PAIRS, ids=[f"{p}-{k.title()}" for k, p in PAIRS]
 )
@@ -29,7 +31,8 @@ def effect(kind: type[Behaviour], second: float = 1.0) -> Behaviour:
 
 
 def tag(model: LoopModel, place: str) -> str:
-    return f"{place}:{model.valve_names[0] if place == 'valve' else model.outputs[0]}"
+    tags = model.valve_names if place in ("valve", "load") else model.outputs
+    return f"{place}:{tags[0]}"
 
 
 def run(model: LoopModel) -> np.ndarray:
@@ -62,10 +65,11 @@ def test_a_controller_is_designed_on_an_altered_process(name: str) -> None:
     assert settings.design(slow).model.order == settings.design(model).model.order + 2
 
 
-@pytest.mark.parametrize("kind", BEHAVIOURS, ids=lambda kind: kind.title())
-def test_only_linear_effects_act_on_a_process(kind: type[Behaviour]) -> None:
+@pytest.mark.parametrize("kind", behaviours(), ids=lambda kind: kind.title())
+def test_only_effects_of_a_process_act_on_it(kind: type[Behaviour]) -> None:
     model = LoopModel.load(find_config("example1_process.loop.yaml"))
-    if hasattr(kind, "filter"):
+    if "process" in kind.places:
+        assert hasattr(kind, "filter")
         model.with_effect("process:PV1", effect(kind))
         return
     with pytest.raises(InputError, match="cannot act on a process") as caught:
@@ -73,11 +77,35 @@ def test_only_linear_effects_act_on_a_process(kind: type[Behaviour]) -> None:
     assert "outputs[0].effects[0]" in caught.value.where
 
 
+@pytest.mark.parametrize("kind", behaviours(), ids=lambda kind: kind.title())
+def test_an_effect_acts_at_its_places_alone(kind: type[Behaviour]) -> None:
+    model = LoopModel.load(find_config("example1_process.loop.yaml"))
+    for place in PLACES:
+        if place in kind.places:
+            model.with_effect(tag(model, place), effect(kind))
+            continue
+        with pytest.raises(InputError, match=rf"cannot act on a {place}; it acts on: "):
+            model.with_effect(tag(model, place), effect(kind))
+
+
+def test_an_effect_at_another_place_is_told_with_file_and_key(tmp_path: Path) -> None:
+    model = LoopModel.load(find_config("flow.loop.yaml"))
+    document = model.to_mapping()
+    document["valves"][0]["effects"] = [{"effect": "bias_step", "time": 5.0, "size": 1.0}]
+    path = tmp_path / "wrong.loop.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        LoopModel.load(path)
+    said = "valves[0].effects[0]: effect: bias_step cannot act on a valve; it acts on: sensor"
+    assert str(caught.value) == f"{path}: {said}"
+
+
 @pytest.mark.parametrize(
     ("place", "said"),
     [
         ("valve:PV1", "no valve 'PV1'"),
         ("process:V1", "no process 'V1'"),
+        ("load:PV1", "no load 'PV1'"),
         ("sensor:V1", "no sensor 'V1'"),
         ("disturbance:C_A", "no disturbance 'C_A'"),
         ("data:PV1", "no place"),
@@ -89,6 +117,19 @@ def test_a_wrong_place_is_named(place: str, said: str) -> None:
     with pytest.raises(InputError, match=said) as caught:
         model.with_effect(place, from_mapping({"effect": "drift", "rate": 1.0}))
     assert caught.value.fix
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_load_moves_the_process_as_its_stem_does_but_is_no_stem(name: str) -> None:
+    model = LoopModel.load(find_config(name)).with_ideal_valves()
+    moves = np.tile(model.op0, (40, 1))
+    shifted = moves + np.eye(len(model.op0))[0] * 5.0
+    step = from_mapping({"effect": "step", "time": 0.0, "size": 5.0})
+    loaded = simulate_open_loop(model.with_effect(tag(model, "load"), step), moves, seed=4)
+    moved = simulate_open_loop(model, shifted, seed=4)
+    assert loaded.pv == pytest.approx(moved.pv, rel=1e-12)
+    assert loaded.stem is not None
+    assert np.array_equal(loaded.stem, moves)
 
 
 def test_a_disturbance_may_sit_on_an_input_of_the_tank() -> None:

@@ -296,7 +296,7 @@ WRONG = {
     "b names a stranger": (changed(FULL, "process.outputs.0.b", {"V9": [1.0]}), "V9"),
     "b is empty": (changed(FULL, "process.outputs.0.b.V1", []), "empty"),
     "b is a number": (changed(FULL, "process.outputs.0.b.V1", 0.1), "no list"),
-    "delay negative": (changed(FULL, "process.outputs.0.delay.V2", -1), "whole number"),
+    "delay negative": (changed(FULL, "process.outputs.0.delay.V2", -1), "use ≥ 0"),
     "delay broken": (changed(FULL, "process.outputs.0.delay.V2", 1.5), "whole number"),
     "noise negative": (changed(FULL, "process.outputs.0.noise.std", -0.1), "out of range"),
     "noise elsewhere": (changed(FULL, "process.outputs.0.noise.enters", "valve"), "unknown value"),

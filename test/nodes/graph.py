@@ -23,10 +23,11 @@ from trajectory_msgs.msg import JointTrajectory
 
 from stiction_ros.nodes.controller import ControllerNode
 from stiction_ros.nodes.estimator import EstimatorNode
-from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.opcua import OpcuaNode
 from stiction_ros.nodes.plant import PlantNode
 from stiction_ros.nodes.player import PlayerNode
 from stiction_ros.nodes.recorder import RecorderNode
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
 
 KINDS: dict[str, type[ManagedNode]] = {
     "plant": PlantNode,
@@ -34,9 +35,10 @@ KINDS: dict[str, type[ManagedNode]] = {
     "estimator": EstimatorNode,
     "recorder": RecorderNode,
     "player": PlayerNode,
+    "opcua": OpcuaNode,
 }
 DOMAINS = itertools.cycle(random.SystemRandom().sample(range(1, 101), 100))
-BUDGET = 30.0  # s; a test that needs this long has failed
+BUDGET = 120.0  # s; a test that needs this long has failed
 
 SIGNALS: dict[str, type[Any]] = {
     "pv": JointState,

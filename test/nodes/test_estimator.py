@@ -12,9 +12,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from graph import Graph
 from sensor_msgs.msg import JointState
 
-from stiction_ros.nodes import estimator, managed
-from stiction_ros.nodes.managed import SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, joint_state
+from stiction_ros.nodes import estimator
+from stiction_ros.nodes.shared import managed
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import SECOND, joint_state
 from stiction_ros.online.health import Noticed
 
 

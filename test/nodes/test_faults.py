@@ -17,11 +17,11 @@ from std_msgs.msg import String
 
 from stiction_ros.config_files import find_config
 from stiction_ros.faults.fault import Fault, Pace, nothing
-from stiction_ros.faults.offered_models import aliases, deep
-from stiction_ros.faults.setting_up import case_parameters
-from stiction_ros.faults.signal_junk import MALFORMED, STAMPS
-from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, to_ns, to_stamp
+from stiction_ros.faults.kinds.offered_models import aliases, deep
+from stiction_ros.faults.kinds.signal_junk import MALFORMED, STAMPS
+from stiction_ros.faults.loop.setting_up import case_parameters
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import SECOND, to_ns, to_stamp
 from stiction_ros.online.session import Scenario, run_live
 
 SAMPLES = 60

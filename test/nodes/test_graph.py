@@ -13,7 +13,7 @@ from graph import Graph
 
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import read_valve_changes
-from stiction_ros.nodes.messages import SECOND, to_ns
+from stiction_ros.nodes.shared.messages import SECOND, to_ns
 from stiction_ros.online.session import LiveRun, Scenario, run_live
 
 SAMPLES = 150

@@ -19,8 +19,8 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from stiction_ros.intake.record_file import read_csv_parts
-from stiction_ros.nodes.managed import SIGNAL_QOS
-from stiction_ros.nodes.messages import joint_state
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import joint_state
 
 LOOPS, SECOND, BUDGET = 5, 1_000_000_000, 60.0
 

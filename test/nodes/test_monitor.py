@@ -19,10 +19,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "online"))
 from monitored_loops import ONSET, RULE, loop, record, shifted
 
 from stiction_ros.json_values import json_text
-from stiction_ros.nodes.managed import SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, joint_state
-from stiction_ros.online.live_estimator import EstimatorSettings, LiveEstimator
-from stiction_ros.online.monitoring import Monitoring
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import SECOND, joint_state
+from stiction_ros.online.estimator.live import EstimatorSettings, LiveEstimator
+from stiction_ros.online.monitor.monitoring import Monitoring
 
 SAMPLES, LOOKS = 1120, 12
 NEVER = {"fit_first": 100_000, "fit_every": 100_000}

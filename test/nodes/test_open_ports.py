@@ -1,19 +1,28 @@
-"""The nodes of a loop listen on no TCP port."""
+"""What the package opens by default: no TCP port but that of the plant of the demonstration."""
 
 from __future__ import annotations
 
+import ast
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
+import yaml
 from small_loop import write_small_scenario
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
-from open_sockets import listening_of
+from open_sockets import command_of, environment_of, family_of, listening_of
 
-from stiction_ros.cli.node_processes import NodeProcesses
-from stiction_ros.cli.scenarios import loop_nodes
+import stiction_ros
+from stiction_ros.cli.runs.node_processes import NodeProcesses
+from stiction_ros.cli.runs.scenarios import loop_nodes
 
 BUDGET = 60.0  # s
 SPEED = 20.0  # samples per second: the run outlasts the look at it
@@ -33,3 +42,89 @@ def test_no_node_listens(tmp_path: Path) -> None:
     finally:
         processes.stop()
     assert found == {name: [] for name in ("plant", "controller", "estimator", "recorder")}
+
+
+@pytest.mark.alone
+def test_the_demonstration_of_the_bridge_opens_one_port_of_this_machine(tmp_path: Path) -> None:
+    pytest.importorskip("asyncua", reason="asyncua is not installed")
+    demo = subprocess.Popen(
+        [
+            sys.executable,
+            "-P",
+            "-m",
+            "stiction_ros.cli.main",
+            *f"demo opcua --out {tmp_path}".split(),
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        # A shell that runs the tests in the background lets its children ignore Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    log = tmp_path / "opcua" / "log" / "opcua.log"
+    try:
+        end = time.monotonic() + BUDGET
+        while not log.exists() or "opcua is ready" not in log.read_text():
+            assert demo.poll() is None, "the demonstration has ended"
+            assert time.monotonic() < end, "the bridge was never ready"
+            time.sleep(0.05)
+        family = family_of(demo.pid)
+        found = {command_of(one): listening_of(one, may_have_none=True) for one in family}
+        nodes = [one for one in family if "stiction_ros.nodes " in f"{command_of(one)} "]
+        ranges = {environment_of(one).get("ROS_AUTOMATIC_DISCOVERY_RANGE") for one in nodes}
+    finally:
+        started = family_of(demo.pid)
+        demo.send_signal(signal.SIGINT)
+        try:
+            demo.wait(BUDGET)
+        except subprocess.TimeoutExpired:
+            for one in started:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(one, signal.SIGKILL)
+            raise
+    server = yaml.safe_load((tmp_path / "opcua" / "tank.tags.yaml").read_text())["server"]
+    address = re.fullmatch(r"opc\.tcp://127\.0\.0\.1:(\d+)/plant", server)
+    assert address is not None
+    (plant,) = [command for command in found if "stiction_ros.opcua.plant" in command]
+    assert found.pop(plant) == [f"0100007F:{int(address[1]):04X}"]
+    assert {command: ports for command, ports in found.items() if ports} == {}
+    assert len(nodes) >= 4
+    assert ranges == {"LOCALHOST"}
+
+
+OPENS = {  # what can listen, by its name in a call
+    "bind",
+    "create_server",
+    "start_server",
+    "start_unix_server",
+    "listen",
+    "set_endpoint",
+    "HTTPServer",
+    "TCPServer",
+    "ThreadingHTTPServer",
+    "LocalCluster",
+    "Listener",
+    "BaseManager",
+    "SyncManager",
+}
+KNOWN = {
+    ("opcua/plant/server.py", "set_endpoint"),  # the plant of the demonstration
+    ("opcua/plant/process.py", "bind"),  # asks for a port that is free, and lets it go
+    ("faults/bridge/relay.py", "create_server"),  # of the suite of faults
+    ("nodes/topics/controller_inputs.py", "listen"),  # to topics
+    ("nodes/controller.py", "listen"),
+    ("cli/plant/listen.py", "Listener"),
+}
+
+
+def test_nothing_else_of_the_package_can_listen() -> None:
+    root = Path(str(stiction_ros.__file__)).parent
+    found = set()
+    for path in root.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+                if called in OPENS:
+                    found.add((str(path.relative_to(root)), called))
+    assert found <= KNOWN
+    assert {one for one in KNOWN if one[1] in ("set_endpoint", "create_server")} <= found

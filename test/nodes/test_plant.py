@@ -13,10 +13,10 @@ from graph import Graph
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-from stiction_ros.nodes import managed, peers
 from stiction_ros.nodes import plant as plant_module
-from stiction_ros.nodes.managed import SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, joint_state, to_ns
+from stiction_ros.nodes.shared import managed, peers
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns
 from stiction_ros.online.health import Noticed
 
 
@@ -226,13 +226,14 @@ def test_an_op_that_is_refused_as_late_counts_among_the_times(graph: Graph) -> N
     assert hand.plant.round_trips.longest > 0.3
 
 
-def test_ticks_keep_to_the_grid_of_wall_time_and_missed_ones_are_counted(graph: Graph) -> None:
+def test_ticks_keep_to_a_grid_of_wall_time_and_missed_ones_are_counted(graph: Graph) -> None:
     hand = Commander(graph, pace="realtime", speed=50.0)
     node = hand.plant
-    first, begin = node.plant.sample, node._due
+    grid = node._grid
+    first, begin, behind = node.plant.sample, grid.due, grid.behind
     graph.spin_until(lambda: node.plant.sample >= first + 10, "ten samples")
-    grid = (node._due - begin) / node._period
-    assert grid == pytest.approx(node.plant.sample - first + node._missed, abs=1e-6)
+    wall = grid.due - begin - (grid.behind - behind)
+    assert wall / grid.period == pytest.approx(node.plant.sample - first, abs=1e-6)
     time.sleep(0.2)  # what a callback that takes long does to the executor
     before, missed = node.plant.sample, node._missed
     graph.spin_until(lambda: node._missed >= missed + 8, "the ticks that were missed")

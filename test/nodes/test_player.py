@@ -17,11 +17,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from stiction_ros.nodes.managed import LATCHED_QOS, READER_QOS
-from stiction_ros.nodes.messages import to_ns
 from stiction_ros.nodes.player import PlayerNode
-from stiction_ros.online.replay_bag import read_replay_bag
-from stiction_ros.records.bag_messages import read_messages, read_raw
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS
+from stiction_ros.nodes.shared.messages import to_ns
+from stiction_ros.online.replays.bag import read_replay_bag
+from stiction_ros.records.bag.messages import read_messages, read_raw
 
 BAG = Path(__file__).parents[2] / "bags" / "sticky_siso"
 SIGNALS = {"/pv": JointState, "/op": JointState, "/stiction": JointState}

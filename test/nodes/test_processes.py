@@ -19,14 +19,14 @@ pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from foreign_readers import differences
 
-from stiction_ros.cli.node_processes import NodeProcesses, ros_environment
-from stiction_ros.nodes.peers import GRACE
-from stiction_ros.online.replay import replay
-from stiction_ros.online.replay_result import Match
+from stiction_ros.cli.runs.node_processes import NodeProcesses, ros_environment
+from stiction_ros.nodes.shared.peers import GRACE
+from stiction_ros.online.replays.result import Match
+from stiction_ros.online.replays.run import replay
 from stiction_ros.online.session import Scenario, run_live
-from stiction_ros.records.bag_messages import read_messages
-from stiction_ros.records.run_log import read_run
-from stiction_ros.records.run_metadata import run_metadata
+from stiction_ros.records.bag.messages import read_messages
+from stiction_ros.records.bag.run_metadata import run_metadata
+from stiction_ros.records.run.log import read_run
 
 PATIENCE = 120.0
 TOPICS = ("clock", "pv", "sp", "op", "stem", "stiction", "loop_model", "mode", "prediction")

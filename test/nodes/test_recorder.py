@@ -15,10 +15,10 @@ from graph import Graph
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-from stiction_ros.nodes.managed import LATCHED_QOS, SIGNAL_QOS
-from stiction_ros.records.bag_messages import read_messages, read_raw
-from stiction_ros.records.mcap_scan import McapScan
-from stiction_ros.records.run_metadata import run_metadata
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
+from stiction_ros.records.bag.messages import read_messages, read_raw
+from stiction_ros.records.bag.run_metadata import run_metadata
+from stiction_ros.records.storage.mcap_scan import McapScan
 
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -195,7 +195,7 @@ def test_a_bag_that_cannot_be_finished_is_a_failure_and_can_be_read(
     def refuse(*_args: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("stiction_ros.records.bag_finish.os.fsync", refuse)
+    monkeypatch.setattr("stiction_ros.records.bag.finish.os.fsync", refuse)
     desk.recorder.finish()
     assert "not finished (No space left on device)" in desk.recorder.failure
     assert len(list(read_raw(desk.bag))) == 1

@@ -21,11 +21,11 @@ from rclpy.node import Node
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 
-from stiction_ros.cli.node_processes import ros_environment
-from stiction_ros.nodes.managed import SIGNAL_QOS
-from stiction_ros.nodes.messages import joint_state, to_ns
-from stiction_ros.records.bag_messages import read_messages
-from stiction_ros.records.bag_repair import RepairStatus, repair_bag
+from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import joint_state, to_ns
+from stiction_ros.records.bag.messages import read_messages
+from stiction_ros.records.bag.repair import RepairStatus, repair_bag
 
 PERIOD = 0.002  # s between two messages
 ALLOWED = 0.2  # s before the kill within which messages may be missing
@@ -115,7 +115,7 @@ def test_a_killed_recorder_loses_a_fifth_of_a_second_at_most(
 
 FINISHING = """
 import sys
-from stiction_ros.records.bag_writer import BagWriter, Packing, Splitting
+from stiction_ros.records.bag.writer import BagWriter, Packing, Splitting
 writer = BagWriter(sys.argv[1], Packing(), Splitting(size=400_000))
 writer.add_topic("/mode", "std_msgs/msg/String", "string data\\n", "")
 for k in range(20000):

@@ -17,11 +17,11 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from stiction_ros.nodes.managed import SIGNAL_QOS
-from stiction_ros.nodes.messages import SECOND, joint_state, to_stamp
 from stiction_ros.nodes.recorder import RecorderNode, free_directory
-from stiction_ros.records.bag_messages import read_messages, read_raw
-from stiction_ros.records.bag_reader import read_bag_parts
+from stiction_ros.nodes.shared.managed import SIGNAL_QOS
+from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_stamp
+from stiction_ros.records.bag.messages import read_messages, read_raw
+from stiction_ros.records.run.bag_reader import read_bag_parts
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.effects import BiasStep, HeStiction
 from stiction_ros.loop import LoopModel, PiController, PiTuning, SetPoints, simulate_closed_loop
-from stiction_ros.online.gap_monitor import GapLook, GapMonitor, MonitorRule
+from stiction_ros.online.monitor.gap_monitor import GapLook, GapMonitor, MonitorRule
 from stiction_ros.records import Record
 
 RULE = MonitorRule(monitor=True, monitor_window=300, monitor_period=50, monitor_baseline=400)

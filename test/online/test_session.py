@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ import yaml
 from stiction_ros.config_files import config_directories, find_config
 from stiction_ros.control import ControlMode
 from stiction_ros.errors import InputError
-from stiction_ros.loop import ValveChange
-from stiction_ros.online.friction_change import ChangeStatus
+from stiction_ros.identification import IdentificationOptions, VerdictKind
+from stiction_ros.loop import LoopModel, ValveChange
+from stiction_ros.online.estimator.friction_change import ChangeStatus
 from stiction_ros.online.session import Scenario, run_live
 
 SCENARIOS = sorted(config_directories()[0].glob("*.scenario.yaml"))
@@ -51,6 +53,36 @@ def test_two_runs_with_one_seed_are_equal_bit_for_bit(siso: Scenario) -> None:
     assert np.array_equal(one.stem_estimate, two.stem_estimate)
     assert one.changes == two.changes
     assert [fit.end for fit in one.fits] == [399, 499, 599]
+
+
+def test_a_valve_of_another_law_than_the_embedded_one_is_never_called_healthy(
+    siso: Scenario,
+) -> None:
+    known = LoopModel.load(find_config("example1.loop.yaml"))  # He's law
+    law = {"effect": "stiction", "law": "semi_physical", "f_s": 5.0, "f_d": 2.0}
+    sticky = known.to_mapping()["valves"][0] | {"effects": [law]}
+    changes: dict[str, Any] = {"fit_first": 1000, "fit_every": 500}
+    scenario = dataclasses.replace(
+        siso,
+        plant=LoopModel.from_mapping(known.to_mapping() | {"valves": [sticky]}),
+        process=known,
+        controller=dataclasses.replace(
+            siso.controller, mode=ControlMode.EMBEDDING.value, **changes
+        ),
+        estimator=dataclasses.replace(
+            siso.estimator, window=1000, delay_low=5, delay_high=5, **changes
+        ),
+    )
+    live = run_live(scenario, samples=3000, seed=1)
+    found = [update.identification.valves[0] for update in live.fits]
+    assert [update.end for update in live.fits] == [999, 1499, 1999, 2499, 2999]
+    assert live.changes[0].mode is ControlMode.EMBEDDING
+    for valve in found:
+        assert valve.evidence["moves"] >= IdentificationOptions().min_moves
+        assert valve.verdict is not VerdictKind.HEALTHY
+        low, high = valve.static_interval
+        assert low <= 5.0 <= high
+    assert min(valve.static_friction for valve in found) < 1.0  # which alone says nothing
 
 
 def test_a_seed_in_place_of_the_scenarios_gives_other_noise(siso: Scenario) -> None:
@@ -106,7 +138,9 @@ def test_ideal_valves_stay_ideal_whatever_changes(tmp_path: Path) -> None:
 def test_a_serviced_valve_is_noticed_and_the_window_begins_anew(siso: Scenario) -> None:
     scenario = quick(siso)
     changes = (ValveChange(540.0, "V1", ()),)
-    controller = dataclasses.replace(scenario.controller, horizon=30)
+    # A controller that moves often: what is looked at is the window, after few samples.
+    often = {"horizon": 30, "look_ahead": 0, "kick_limits": (math.inf,), "move_worth": (0.0,)}
+    controller = dataclasses.replace(scenario.controller, **often)
     scenario = dataclasses.replace(scenario, controller=controller, valve_changes=changes)
     live = run_live(scenario, samples=1105, seed=1)
     noticed = next(fit for fit in live.fits if fit.changes and fit.loop_model is not None)

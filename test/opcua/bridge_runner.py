@@ -15,7 +15,7 @@ import yaml
 
 from stiction_ros.opcua.grant import Grant, GrantState
 from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge
-from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Written
+from stiction_ros.opcua.plant_link import Heard, Linked, LinkSettings, PlantLink, Refused, Written
 from stiction_ros.opcua.sampling import PlantSample
 from stiction_ros.opcua.security import Credentials
 from stiction_ros.opcua.tag_map import TagMap
@@ -38,7 +38,7 @@ class BridgeRunner:
         asks: bool = True,
     ) -> None:
         self.tags = TagMap.load(map_file).loops[0]
-        written = tuple(self.tags.written_tags())
+        written = dict(self.tags.uses())
         settings = LinkSettings(url, credentials, self.tags.read_tags(), written, 0.02)
         self.link = PlantLink(settings)
         rules = BridgeRules(speed, True, asks, SENDER, identity)
@@ -73,6 +73,8 @@ class BridgeRunner:
                 elif isinstance(event, Written):
                     done = (event.order, event.failure, event.seconds, now)
                     self.link.submit(self.bridge.written(*done))
+                elif isinstance(event, Refused):
+                    self.link.submit(self.bridge.refuse(event.read, event.written, now))
                 else:
                     self.links.append(event)
             now = time.monotonic()

@@ -55,3 +55,17 @@ def test_groups_become_names_that_topics_bear() -> None:
     found = {("10-FIC 7", "pv"): "i=1", ("10-FIC 7", "Out"): "i=2", ("X", "PV"): "i=3"}
     (loop,) = loops_of(found, TagNames(), 1.0)
     assert loop["loop"] == "L10_FIC_7"
+
+
+def test_a_map_that_is_there_is_not_written_over(
+    plant: PlantProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "found.tags.yaml"
+    out.write_text("# by hand\n", encoding="utf-8")
+    assert call(plant, out) == 2
+    assert "found.tags.yaml: is there already; choose another file, or say --force" in (
+        capsys.readouterr().err
+    )
+    assert out.read_text(encoding="utf-8") == "# by hand\n"
+    assert call(plant, out, "--force") == 0
+    assert len(TagMap.load(out).loops) == 2

@@ -86,3 +86,9 @@ def test_whatever_happens_nothing_is_written_that_is_not_granted_now(steps: list
         else:
             grant = grant.ask() if step == "ask" else grant.give_back(0.0, "told to")
             assert not grant.may_write or step == "ask"
+
+
+def test_another_writer_is_told_before_anything_else() -> None:
+    told = begin(0.0, True).ask().follow(Facts(1.0, granted=False, fault="listens", foreign=True))
+    assert told.state is GrantState.IDLE
+    assert "another one lets the heartbeat rise" in told.reason

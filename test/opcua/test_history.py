@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plant_process import START, PlantProcess, wait_until
-from small_maps import OP, PV, SP, loop_tags
+from small_maps import MODE, OP, PV, SP, loop_tags
 
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import read_csv_parts
 from stiction_ros.opcua.intake import history
-from stiction_ros.opcua.intake.history import HistoryFile, Span, record_of
+from stiction_ros.opcua.intake.history import HistoryFile, Span, modes_of, record_of
 from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.opcua.tag_map import ValveTags
+from stiction_ros.records.csv.writer import write_csv
 from stiction_ros.records.quality import Quality
 
 SCANS = 60
@@ -73,7 +75,7 @@ def test_pages_become_the_record(
 def test_what_was_broken_off_goes_on(plant: PlantProcess, tmp_path: Path) -> None:
     assert call(plant, tmp_path) == 0
     whole = {path: path.read_text() for path in (tmp_path / "raw").glob("*.txt")}
-    assert len(whole) == 6
+    assert len(whole) == 8
     for path, text in whole.items():
         path.write_text(text[: len(text) // 2])
         path.with_suffix(".done").unlink()
@@ -133,3 +135,52 @@ def test_bad_values_are_marked_and_op_belongs_to_most_of_its_sample(tmp_path: Pa
     files[PV].begin(PV, span)
     with pytest.raises(InputError, match="no history"):
         record_of(loop_tags(), files, span)
+
+
+def test_manual_stretches_are_a_column_and_cut_by_the_intake(tmp_path: Path) -> None:
+    second = 1_000_000_000
+    span = Span(0, 40 * second)
+    good = TagQuality.GOOD
+    told: dict[str, list[tuple[float | str, TagQuality, float]]] = {
+        PV: [(7.0 + k % 3, good, k) for k in range(40)],
+        SP: [(5.0, good, 0)],
+        OP: [(40.0 + k % 5, good, k) for k in range(40)],
+        MODE: [("AUTO", good, 0), ("MAN", good, 10), ("", TagQuality.BAD, 12), ("CAS", good, 20)],
+    }
+    files = {}
+    for number, (tag, values) in enumerate(told.items()):
+        files[tag] = HistoryFile(tmp_path / f"{number}.txt")
+        files[tag].begin(tag, span)
+        files[tag].append([TagReading(v, q, round(at * second)) for v, q, at in values])
+    record = record_of(loop_tags(), files, span)
+    modes = modes_of(loop_tags(), files, record)
+    assert modes == ["AUTO"] * 10 + ["MAN"] * 10 + ["CAS"] * 20
+    write_csv(record, tmp_path / "unit.csv", modes=modes)
+    (read,) = read_csv_parts(tmp_path / "unit.csv")
+    assert np.flatnonzero(read.quality == Quality.MANUAL).tolist() == list(range(10, 20))
+    np.testing.assert_array_equal(read.pv, record.pv)
+
+
+def test_of_several_valves_the_one_that_is_not_automatic_tells_the_mode(tmp_path: Path) -> None:
+    second = 1_000_000_000
+    valves = tuple(ValveTags(f"V{j}", f"s=OP{j}", mode=f"s=MODE{j}") for j in (1, 2))
+    tags = loop_tags(valves=valves, grant=None)
+    told: dict[str, list[tuple[float | str, int]]] = {
+        PV: [(float(k), k) for k in range(6)],
+        SP: [(5.0, 0)],
+        "s=OP1": [(40.0, 0)],
+        "s=OP2": [(40.0, 0)],
+        "s=MODE1": [("CAS", 1)],
+        "s=MODE2": [("AUTO", 0), ("MAN", 3), ("AUTO", 5)],
+    }
+    files = {}
+    for number, (tag, values) in enumerate(told.items()):
+        files[tag] = HistoryFile(tmp_path / f"{number}.txt")
+        files[tag].begin(tag, Span(0, 5 * second))
+        files[tag].append([TagReading(v, TagQuality.GOOD, at * second) for v, at in values])
+    record = record_of(tags, files, Span(0, 5 * second))
+    assert modes_of(tags, files, record) == ["", "CAS", "CAS", "MAN", "MAN", "CAS"]
+    write_csv(record, tmp_path / "two.csv", modes=modes_of(tags, files, record))
+    (read,) = read_csv_parts(tmp_path / "two.csv")
+    assert read.valves == ("V1", "V2")
+    assert (read.quality == Quality.MANUAL).tolist() == [False, False, False, True, True, False]

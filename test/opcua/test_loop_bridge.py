@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from small_maps import ALIVE, BEAT, MODE, OP, PV, ROUT, SP, bad, good, loop_tags
 
-from stiction_ros.online.op_port import Reception
+from stiction_ros.online.input.op_port import Reception
 from stiction_ros.opcua.grant import GrantState
 from stiction_ros.opcua.heartbeat import HeardBeat, OwnBeat, identity_of
 from stiction_ros.opcua.loop_bridge import BridgeRules, LoopBridge, OrderKind, WriteOrder, mode_text
 from stiction_ros.opcua.reading import TagQuality, TagReading
+from stiction_ros.opcua.tag_map import ValveTags
 
 SENDER = "/unit/controller"
 RULES = BridgeRules(writes=True, asks=True, commander=SENDER, identity=3)
@@ -24,14 +25,15 @@ class Plant:
     Every order is carried out at once, unless ``refuses`` says why not.
     """
 
-    def __init__(self, rules: BridgeRules = RULES) -> None:
-        self.bridge = LoopBridge(loop_tags(), rules, 0.0)
+    def __init__(self, rules: BridgeRules = RULES, **tags: object) -> None:
+        self.bridge = LoopBridge(loop_tags(**tags), rules, 0.0)
         self.now = 0.0
         self.mode, self.op, self.pv, self.alive = "AUTO", 40.0, 10.0, 0
         self.beats = True
         self.linked = True
         self.refuses = ""
         self.took = 0.01
+        self.unanswered: set[OrderKind] = set()  # what is never told to have been written
         self.orders: list[WriteOrder] = []
         for tag, value in ((PV, 10.0), (SP, 10.0), (OP, self.op), (MODE, self.mode)):
             self.hear(tag, good(value, -0.1, first=True))
@@ -43,6 +45,8 @@ class Plant:
     def do(self, orders: list[WriteOrder]) -> None:
         for order in orders:
             self.orders.append(order)
+            if order.kind in self.unanswered:
+                continue
             if order.kind is OrderKind.OP and not self.refuses:
                 self.op = order.values[0][1]
                 self.hear(OP, good(self.op, self.now))
@@ -108,12 +112,45 @@ def test_op_begins_where_it_is_and_moves_at_the_rate() -> None:
     assert ops[-1] > 55.0
 
 
+def test_ops_that_the_rate_cuts_are_told() -> None:
+    plant = Plant().granted()
+    plant.run(10, wanted=plant.op)
+    watch = plant.bridge.rate_watch
+    before = plant.bridge.counts["op_cut_by_rate"]
+    assert before > 0  # the way from the OP in force to what was wanted first
+    plant.run(60, wanted=plant.op)
+    assert watch.text() == ""
+    plant.run(4, wanted=plant.op + 9.2)
+    assert plant.bridge.counts["op_cut_by_rate"] == before + 4
+    assert watch.text() == (
+        "OP of V1 is cut by the map's rate of 2 %/s at 4 of the last 60 samples; "
+        "the controller wanted steps up to 9.2 %"
+    )
+    plant.set_mode("AUTO")
+    plant.run(3)
+    plant.bridge.ask(plant.now)
+    plant.granted()
+    assert watch.text() == ""  # a new grant, on its way to what is wanted
+
+
 def test_op_never_leaves_its_limits() -> None:
     plant = Plant().granted()
     plant.run(60, wanted=400.0)
     assert max(plant.ops()) == 100.0
     plant.run(120, wanted=-400.0)
     assert min(plant.ops()) == 0.0
+
+
+def test_an_op_that_is_not_taken_in_time_ends_the_grant() -> None:
+    plant = Plant().granted()
+    plant.unanswered.add(OrderKind.OP)
+    plant.run(1)
+    written = len(plant.ops())
+    assert plant.bridge.grant.may_write
+    plant.run(3)
+    assert plant.bridge.grant.reason == "the server does not take an OP in time"
+    assert plant.requests() == [1.0, 0.0]
+    assert len(plant.ops()) == written
 
 
 def test_the_mode_is_asked_for_at_the_moment_of_writing() -> None:
@@ -224,6 +261,39 @@ def test_it_can_be_asked_for_again() -> None:
     assert plant.ops()[-3] == 61.0  # bumpless again
 
 
+def test_a_request_that_is_still_being_taken_back_is_not_made_anew() -> None:
+    plant = Plant().granted()
+    plant.unanswered.add(OrderKind.REQUEST)
+    plant.set_mode("AUTO")
+    assert plant.orders[-1].values[0][1] == 0.0
+    taking_back = plant.orders[-1]
+    plant.bridge.ask(plant.now)
+    plant.set_mode(ROUT)  # a grant of the request that still stands there
+    assert plant.bridge.grant.state is GrantState.IDLE
+    assert "being taken back" in plant.bridge.grant.reason
+    plant.set_mode("AUTO")
+    plant.unanswered.clear()
+    plant.do(plant.bridge.written(taking_back, "", 0.01, plant.now))
+    plant.run(1)
+    assert plant.bridge.grant.state is GrantState.ASKED
+    assert plant.requests()[-2:] == [0.0, 1.0]
+
+
+def test_a_pending_ask_waits_until_it_can_be_made_or_is_taken_back() -> None:
+    plant = Plant()
+    plant.run(60, wanted=None)  # twelve times the watchdog's time
+    assert plant.bridge.grant.reason == f"waits: no op from {SENDER}"
+    assert plant.bridge.grant.wanted
+    plant.do(plant.bridge.give_back(plant.now, "given back by service"))
+    assert not plant.bridge.grant.wanted
+    plant.run(10)
+    assert plant.orders == []
+    assert plant.bridge.grant.reason == "given back by service"
+    assert plant.bridge.ask(plant.now) == ""
+    plant.run(1)
+    assert plant.bridge.grant.state is GrantState.ASKED
+
+
 def test_a_writer_that_is_there_already_is_waited_for() -> None:
     plant, other = Plant(), OwnBeat(77)
     for _ in range(12):
@@ -243,6 +313,20 @@ def test_a_give_back_of_another_one_is_not_made() -> None:
     plant.hear(BEAT, good(float(OwnBeat(77).next()), plant.now))
     plant.run(2)
     assert plant.requests() == [1.0]  # the request is the other one's by now
+
+
+def test_limits_of_the_plant_that_are_crossed_are_told_as_such() -> None:
+    valve = ValveTags("V1", OP, ROUT, MODE, low="s=LOW", high="s=HIGH")
+    plant = Plant(valves=(valve,))
+    for tag, value in (("s=LOW", 80.0), ("s=HIGH", 20.0)):
+        plant.hear(tag, good(value, 0.0, first=True))
+    plant.run(10)
+    assert plant.bridge.grant.reason == "waits: limits of V1 are 80 to 20"
+    assert plant.orders == []
+    plant.hear("s=LOW", good(10.0, 11.0))
+    plant.hear("s=HIGH", good(30.0, 11.0))
+    plant.run(1)
+    assert plant.bridge.grant.reason == "waits: OP in force beyond its limits"
 
 
 def test_beats_bear_the_writer() -> None:

@@ -7,6 +7,7 @@ the time of the watchdog.
 
 from __future__ import annotations
 
+import asyncio
 import datetime
 import signal
 import time
@@ -19,11 +20,16 @@ import numpy as np
 import pytest
 from bridge_runner import BridgeProcess, BridgeRunner
 from plant_process import PlantProcess, wait_until
-from relay import Relay
 
 from stiction_ros.cli.main import main
+from stiction_ros.faults.bridge.relay import Relay
 from stiction_ros.opcua.grant import GrantState
-from stiction_ros.opcua.security import fingerprint, load_certificate
+from stiction_ros.opcua.loop_bridge import OrderKind, WriteOrder
+from stiction_ros.opcua.plant_link import LinkSettings, PlantLink, Written
+from stiction_ros.opcua.security import Credentials, fingerprint, load_certificate
+from stiction_ros.opcua.session import ANSWER, open_client
+
+pytestmark = pytest.mark.alone
 
 WATCHDOG = 1.5  # s
 RATE = 0.1 * 60.0  # % a sample, as the tag map says
@@ -87,7 +93,7 @@ class Trial:
         for name in ("QUALITY", "PAST", "ALIVE", "DELAY", "BURST"):
             if name in self.disturbed:
                 self.plant.disturb(name, 0.0)
-        if self.plant.process is not None:
+        if self.plant.running:
             wait_until(lambda: self.plant.events("mode")[-1]["mode"] == "AUTO", "automatic")
 
     disturbed: tuple[str, ...] = ()
@@ -230,7 +236,12 @@ def test_the_bridge_is_killed(trial: Trial) -> None:
     process = BridgeProcess(plant.folder, **process_settings(plant, 21))
     try:
         process.wait_for("asked")
-        plant.grant()
+
+        def granted() -> bool:  # as soon as a beat has come
+            plant.grant()
+            return bool(plant.events("target")[-1]["why_not"] == "")
+
+        wait_until(granted, "the grant", pause=0.1)
         wait_until(lambda: len(trial.ops()) > 10, "OPs that are taken")
         since = time.monotonic()
         process.stop(signal.SIGKILL)
@@ -282,20 +293,58 @@ def test_what_cannot_be_trusted_gets_no_session(trial: Trial, kind: str, tmp_pat
     changes = {}
     if kind == "server":  # another server than the pinned one
         plant.certificate("other_server", server=True)
-        changes["server_certificate"] = str(plant.folder / "other_server.der")
+        changes["server_certificate"] = str(plant.secrets / "other_server.der")
     elif kind in ("stranger", "expired"):
         ago = datetime.timedelta(days=10 if kind == "expired" else 1)
         plant.certificate(kind, begin=datetime.datetime.now(datetime.UTC) - ago, days=5)
-        changes["certificate"] = str(plant.folder / f"{kind}.der")
-        changes["private_key"] = str(plant.folder / f"{kind}.pem")
+        changes["certificate"] = str(plant.secrets / f"{kind}.der")
+        changes["private_key"] = str(plant.secrets / f"{kind}.pem")
     else:
         changes["password_file"] = plant.word("tester")
     runner = trial.bridge(credentials=plant.credentials(**changes))
     wait_until(lambda: runner.links, "a refusal")
     assert not any(link.connected for link in runner.links)
-    assert runner.links[0].reason
+    said = {"server": "is not what the server shows now", "expired": "has expired"}
+    assert said.get(kind, "") in runner.links[0].reason != ""
     assert runner.samples == []
-    assert all("own word" not in link.reason for link in runner.links)
+    words = [plant.password_file(user).read_text() for user in plant.users]
+    assert not any(word in link.reason for link in runner.links for word in words)
+
+
+def test_a_connection_that_is_closed_at_once_is_not_waited_for(plant: PlantProcess) -> None:
+    relay = Relay(plant.port)
+    try:
+        relay.cut()
+        for _ in range(3):
+            begin = time.monotonic()
+            with pytest.raises(OSError, match=r"closes|reset|refused"):
+                asyncio.run(
+                    open_client(f"opc.tcp://127.0.0.1:{relay.port}/plant", plant.credentials())
+                )
+            assert time.monotonic() - begin < ANSWER  # else it was waited for
+    finally:
+        relay.close()
+
+
+def test_a_request_goes_before_what_its_loop_waits_to_write() -> None:
+    link = PlantLink(LinkSettings("opc.tcp://127.0.0.1:1", Credentials(security="none"), ()))
+
+    def order(loop: str, kind: OrderKind) -> WriteOrder:
+        return WriteOrder(loop, kind, (("s=X", 0.0),), 1e9)
+
+    for loop, kind in (("A", OrderKind.BEAT), ("B", OrderKind.BEAT), ("A", OrderKind.OP)):
+        link._put(order(loop, kind))
+    link._put(order("A", OrderKind.REQUEST))
+    link._put(order("A", OrderKind.REQUEST))  # one request does not drop another
+    left = [link._orders.get_nowait() for _ in range(link._orders.qsize())]
+    assert [(one.loop, one.kind) for one in left] == [
+        ("B", OrderKind.BEAT),
+        ("A", OrderKind.REQUEST),
+        ("A", OrderKind.REQUEST),
+    ]
+    told = [event for event in link.drain() if isinstance(event, Written)]
+    assert [event.order.kind for event in told] == [OrderKind.BEAT, OrderKind.OP]
+    assert all(event.failure for event in told)
 
 
 def test_the_server_is_killed_and_starts_again(tmp_path: Path) -> None:
@@ -322,7 +371,7 @@ def test_the_servers_certificate_is_pinned_by_its_fingerprint(
     plant: PlantProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = tmp_path / "pinned.der"
-    shown = fingerprint(load_certificate(plant.folder / "server.der"))
+    shown = fingerprint(load_certificate(plant.secrets / "server.der"))
     assert main(["certificates", "pin", plant.url]) == 0
     assert shown in capsys.readouterr().out
     wrong = shown.replace(shown[:2], "00" if shown[:2] != "00" else "11", 1)
@@ -333,5 +382,6 @@ def test_the_servers_certificate_is_pinned_by_its_fingerprint(
     assert (
         main(["certificates", "pin", plant.url, "--to", str(target), "--fingerprint", shown]) == 0
     )
-    assert target.read_bytes() == (plant.folder / "server.der").read_bytes()
+    assert target.read_bytes() == (plant.secrets / "server.der").read_bytes()
     assert main(["certificates", "pin", "opc.tcp://127.0.0.1:1"]) == 2
+    assert "nobody listens at that address" in capsys.readouterr().err

@@ -235,3 +235,23 @@ def test_the_plant_clock_takes_the_freshest_stamp() -> None:
 
 def test_a_text_has_no_number() -> None:
     assert math.isnan(TagReading("AUTO", TagQuality.GOOD, 0).number)
+
+
+def test_a_pv_that_is_reported_after_other_tags_is_waited_for() -> None:
+    scans = Scans()
+    scans.sampler.hear(SP, good(1.0, 0.0, first=True), 0.0)
+    assert not scans.look(5.0)
+    scans.sampler.hear(PV, good(7.0, 0.0, first=True), 5.0)
+    scans.look(6.0)
+    assert scans.found
+    assert all(sample.pv[0] == 7.0 for sample in scans.found)
+
+
+def test_a_pv_that_is_never_reported_is_not_waited_for_without_end() -> None:
+    scans = Scans()
+    scans.sampler.hear(SP, good(1.0, 0.0, first=True), 0.0)
+    assert not scans.look(9.0)
+    scans.look(13.0)
+    scans.look(14.0)
+    assert scans.found
+    assert all(math.isnan(sample.pv[0]) for sample in scans.found)

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 import yaml
 
+from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
-from stiction_ros.opcua.tag_map import TagMap
+from stiction_ros.opcua.tag_map import TagMap, check_address
 
 LOOP: dict[str, Any] = {
     "loop": "FIC101",
@@ -79,6 +80,7 @@ def changed(*path: Any, value: Any) -> dict[str, Any]:
         (changed("write", "granted", value=[]), "granted"),
         (changed("write", "watchdog", value=0.0), "watchdog"),
         (changed("valves", 0, "mode", value=None), "mode"),
+        (changed("valves", 0, "op", value="ns=2;s=FIC101.OUT"), "op_read of a valve as well"),
         (changed("sample_time", value=-1.0), "sample_time"),
         (changed("loop", value="FIC 101"), "loop"),
         (changed("colour", value="red"), "colour"),
@@ -102,3 +104,37 @@ def test_an_address_that_is_none_or_holds_a_password_is_refused(
     with pytest.raises(InputError) as raised:
         load(tmp_path, LOOP, server=server)
     assert "sesame" not in str(raised.value)
+
+
+@pytest.mark.parametrize("port", ["65536", "99999", "0", "-1", "", "48a0", "9" * 40, "٤٨"])
+def test_a_port_that_is_none_is_one_sentence(
+    port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    address = f"opc.tcp://127.0.0.1:{port}/unit"
+    with pytest.raises(InputError, match="is no port; use 1 to 65535"):
+        check_address(address, "URL")
+    assert main(["certificates", "pin", address]) == 2
+    out = ["--sample-time", "1", "--out", str(tmp_path / "found.tags.yaml"), "--security", "none"]
+    assert main(["browse-tags", address, *out]) == 2
+    path = tmp_path / "unit.tags.yaml"
+    path.write_text(yaml.safe_dump({"server": address, "loops": [LOOP]}), encoding="utf-8")
+    days = ["--from", "2026-01-01", "--to", "2026-01-02", "--out", str(tmp_path / "history")]
+    fetch = ["fetch-history", address, "--tags", str(path), *days, "--security", "none"]
+    assert main(fetch) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 3
+    assert all("is no port" in line for line in told)
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["plant", "plant:1/unit", "plant:65535", "10.0.0.7:4840", "[::1]:4840/unit", "[fe80::1]"],
+)
+def test_addresses_that_are_well(address: str) -> None:
+    check_address(f"opc.tcp://{address}", "URL")
+
+
+@pytest.mark.parametrize("address", [":4840", "[::1:4840", "::1:4840", "[]:4840"])
+def test_an_address_without_a_machine_is_refused(address: str) -> None:
+    with pytest.raises(InputError, match="is no address of a server"):
+        check_address(f"opc.tcp://{address}", "URL")

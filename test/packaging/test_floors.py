@@ -42,22 +42,39 @@ def test_every_sub_package_stands_in_a_contract() -> None:
     ],
 )
 def test_an_import_that_runs_up_is_noticed(tmp_path: Path, module: str, line: str) -> None:
-    """A tree of the same names, in which one module imports what it must not."""
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    # The imports that are left out of the contracts are not in this small tree.
-    lines = [row for row in text.splitlines() if " -> stiction_ros" not in row]
-    (tmp_path / "pyproject.toml").write_text("\n".join(lines), encoding="utf-8")
-    names = [*(path.parent.name for path in (ROOT / "stiction_ros").glob("*/__init__.py"))]
-    files = [path.stem for path in (ROOT / "stiction_ros").glob("[!_]*.py")]
-    for name in names:
-        (tmp_path / "stiction_ros" / name).mkdir(parents=True)
-        (tmp_path / "stiction_ros" / name / "__init__.py").write_text("")
-    (tmp_path / "stiction_ros" / "__init__.py").write_text("")
-    for name in files:
-        (tmp_path / "stiction_ros" / f"{name}.py").write_text("")
-    (tmp_path / "stiction_ros" / "control" / "__init__.py").write_text("class MpcController: ...\n")
+    small_tree(tmp_path)
     assert lint(tmp_path).returncode == 0
     (tmp_path / "stiction_ros" / module / "wrong.py").write_text(line + "\n")
     done = lint(tmp_path)
     assert done.returncode == 1
     assert f"stiction_ros.{module}.wrong" in done.stdout
+
+
+def test_rooms_that_import_each_other_are_noticed(tmp_path: Path) -> None:
+    small_tree(tmp_path)
+    for room, other in (("state", "valves"), ("valves", "state")):
+        folder = tmp_path / "stiction_ros" / "control" / room
+        folder.mkdir()
+        (folder / "__init__.py").write_text("")
+        (folder / "one.py").write_text("")
+        (folder / "two.py").write_text(f"from stiction_ros.control.{other} import one\n")
+    done = lint(tmp_path)
+    assert done.returncode == 1
+    assert "No cycles are allowed in stiction_ros.control" in done.stdout
+
+
+def small_tree(folder: Path) -> None:
+    """Write a tree of the same names, in which nothing imports anything."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    # The imports that are left out of the contracts are not in this small tree.
+    lines = [row for row in text.splitlines() if " -> stiction_ros" not in row]
+    (folder / "pyproject.toml").write_text("\n".join(lines), encoding="utf-8")
+    names = [*(path.parent.name for path in (ROOT / "stiction_ros").glob("*/__init__.py"))]
+    files = [path.stem for path in (ROOT / "stiction_ros").glob("[!_]*.py")]
+    for name in names:
+        (folder / "stiction_ros" / name).mkdir(parents=True)
+        (folder / "stiction_ros" / name / "__init__.py").write_text("")
+    (folder / "stiction_ros" / "__init__.py").write_text("")
+    for name in files:
+        (folder / "stiction_ros" / f"{name}.py").write_text("")
+    (folder / "stiction_ros" / "control" / "__init__.py").write_text("class MpcController: ...\n")

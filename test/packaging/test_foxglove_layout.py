@@ -11,7 +11,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from stiction_ros.records.playback import bag_content
+from stiction_ros.records.bag.playback import bag_content
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYOUT = json.loads((ROOT / "config" / "foxglove_layout.json").read_text())

@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 import yaml
 
-from stiction_ros.cli.scenarios import SCENARIOS, STARTED, find, loop_nodes
+from stiction_ros.cli.runs.scenarios import SCENARIOS, STARTED, bridged_nodes, find, loop_nodes
+from stiction_ros.errors import InputError
 from stiction_ros.nodes.__main__ import NODES
-from stiction_ros.nodes.parameter_files import applies, node_keys
+from stiction_ros.nodes.shared.parameter_files import applies, node_keys
 
 LAUNCH = Path(__file__).resolve().parents[2] / "launch" / "stiction.launch.py"
 
@@ -93,5 +94,42 @@ def test_the_parameters_reach_nodes_in_any_namespace(
         assert sum(applies(key, full) for key in node_keys(path)) == 1
 
 
+def test_a_bridge_stands_in_the_place_of_the_plant(launch: Any, tmp_path: Path) -> None:
+    told = tmp_path / "plant.yaml"
+    nodes = start(
+        launch, scenario="tank", directory=str(tmp_path), opcua=str(told), namespace="FIC101"
+    )
+    wanted = bridged_nodes(find("tank"), tmp_path, source="topic:pv")
+    assert [n.named["name"] for n in nodes] == [*wanted, "opcua"]
+    assert "plant" not in wanted
+    bridge = nodes.pop().named
+    assert (bridge["executable"], bridge["namespace"]) == ("opcua", "")
+    assert bridge["parameters"] == [str(told)]
+    for node in nodes:
+        assert node.named["namespace"] == "FIC101"
+        (path,) = node.named["parameters"]
+        values = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        found = values[f"/**/{node.named['name']}"]["ros__parameters"]
+        assert found == wanted[node.named["name"]]
+        assert "plant" not in found.get("wait_for", [])
+    assert wanted["controller"]["pace"] == wanted["estimator"]["pace"] == "realtime"
+    assert wanted["controller"]["speed"] == 1.0
+
+
+def test_a_scenario_of_a_real_loop_needs_no_plant(tmp_path: Path) -> None:
+    nodes = yaml.safe_load(find("siso").read_text(encoding="utf-8"))
+    del nodes["plant"]
+    nodes["controller"]["ros__parameters"]["model"] = "own.loop.yaml"
+    own = tmp_path / "own.scenario.yaml"
+    own.write_text(yaml.safe_dump(nodes), encoding="utf-8")
+    found = bridged_nodes(own, tmp_path / "run")
+    assert list(found) == ["recorder", "estimator", "controller"]
+    assert found["controller"]["model"] == str((tmp_path / "own.loop.yaml").resolve())
+    nodes["controller"]["ros__parameters"]["modle"] = "x"
+    own.write_text(yaml.safe_dump(nodes), encoding="utf-8")
+    with pytest.raises(InputError, match="modle"):
+        bridged_nodes(own, tmp_path / "run")
+
+
 def test_every_executable_is_a_node() -> None:
-    assert set(STARTED) <= set(NODES)
+    assert {*STARTED, "opcua"} <= set(NODES)

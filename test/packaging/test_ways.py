@@ -30,18 +30,36 @@ def test_doors_are_counted_where_another_package_calls(ways: ModuleType) -> None
     found = ways.ways_of(lambda: st.simulate(model, samples=20))
     assert next(iter(found)) == "loop"
     assert found["loop"] == ["simulate"]  # what it calls of its own package is no door
-    assert "HeStiction.step" in found["effects"]
+    assert "Behaviour.step" in found["effects"]  # one name, whatever law overrides it
+    assert "HeStiction.step" not in found["effects"]
     assert found["records"][0].startswith("Record.")
     assert sys.getprofile() is None
 
 
-def test_three_calls_are_shown(ways: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+def test_three_calls_are_shown_and_every_exception_has_its_reason(
+    ways: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert ways.main(["--samples", "300"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split("(")[0] for line in lines[::2]] == [
-        "identify",
-        "LiveController.step",
-        "find_gap",
+    names = [line for line in lines if not line.startswith(" ")]
+    assert names == [ways.IDENTIFY, ways.STEP, ways.GAP]
+    counts = [line.strip() for line in lines if line.startswith("    ") and line[4] != " "]
+    assert [line.split(",")[0] for line in counts] == [
+        "identification 1",
+        "online 1",
+        "discrepancy 1",
     ]
-    firsts = [line.split(",")[0].strip() for line in lines[1::2]]
-    assert firsts == ["identification 1", "online 1", "discrepancy 1"]
+    reasons = [line for line in lines if line.startswith("        because ")]
+    assert len(reasons) == sum(len(each) for each in ways.REASONS.values())
+
+
+def test_many_doors_want_a_reason_and_a_reason_wants_many_doors(ways: ModuleType) -> None:
+    doors = {"loop": ["a", "b", "c"], "records": ["a", "b"]}
+    assert ways.complaints("call", doors, {"loop": "it is so"}) == []
+    (missing,) = ways.complaints("call", doors, {})
+    assert "loop by 3 doors" in missing
+    assert ways.complaints("call", doors, {"loop": " "}) == [missing]
+    (stale,) = ways.complaints("call", doors, {"loop": "it is so", "records": "once"})
+    assert "records by no more than 2" in stale
+    (gone,) = ways.complaints("call", {}, {"loop": "it is so"})
+    assert gone.startswith("call enters loop")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from stiction_ros.records.bag_messages import read_raw
-from stiction_ros.records.bag_metadata import Qos
-from stiction_ros.records.bag_writer import BagWriter
-from stiction_ros.records.mcap_scan import RawMessage
-from stiction_ros.records.playback import offered_qos
+from stiction_ros.records.bag.messages import read_raw
+from stiction_ros.records.bag.playback import offered_qos
+from stiction_ros.records.bag.writer import BagWriter
+from stiction_ros.records.storage.bag_metadata import Qos
+from stiction_ros.records.storage.mcap_scan import RawMessage
 
 SECOND = 10**9
 Change = Callable[[RawMessage], RawMessage | None]

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from stiction_ros.records.bag_metadata import LATCHED, Qos
-from stiction_ros.records.bag_writer import BagWriter
+from stiction_ros.records.bag.writer import BagWriter
+from stiction_ros.records.storage.bag_metadata import LATCHED, Qos
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINT_STATE = "sensor_msgs/msg/JointState"

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from bag_making import Bag
 
-from stiction_ros.records.bag_writer import BagWriter
+from stiction_ros.records.bag.writer import BagWriter
 
 
 @pytest.fixture

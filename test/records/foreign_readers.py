@@ -18,9 +18,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from stiction_ros.records.bag_messages import read_messages
-from stiction_ros.records.run_log import read_run
-from stiction_ros.records.storage_files import storage_files
+from stiction_ros.records.bag.messages import read_messages
+from stiction_ros.records.run.log import read_run
+from stiction_ros.records.storage.files import storage_files
 
 Values = dict[str, list[tuple[int, object]]]
 """Topic to log time and value of each message."""

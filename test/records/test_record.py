@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import read_csv_parts
-from stiction_ros.records.bag_messages import read_raw
-from stiction_ros.records.bag_reader import read_bag_parts
-from stiction_ros.records.csv_writer import write_csv
+from stiction_ros.records.bag.messages import read_raw
+from stiction_ros.records.csv.writer import write_csv
 from stiction_ros.records.parts import joined, longest_part, only_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
+from stiction_ros.records.run.bag_reader import read_bag_parts
 from stiction_ros.records.segment import Gap, Segment
 
 G, H, B, M = Quality.GOOD, Quality.HELD, Quality.BAD, Quality.MANUAL
@@ -218,7 +218,7 @@ def test_only_one_good_part_is_one_record() -> None:
 
 def test_gaps_and_runs_go_through_a_bag(tmp_path: Path) -> None:
     pytest.importorskip("sensor_msgs", reason="the definitions of sensor_msgs are not installed")
-    from stiction_ros.records.record_to_bag import write_bag
+    from stiction_ros.records.run.record_to_bag import write_bag
 
     found = record(gaps=(Gap(20, 105.0), Gap(40, 5.0)), count=60)
     write_bag(found, tmp_path / "bag")

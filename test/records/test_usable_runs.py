@@ -12,12 +12,12 @@ from bag_cutting import SECOND, copy_bag
 from bag_making import joint_state
 
 from stiction_ros.cli.main import main
-from stiction_ros.records.bag_messages import read_raw
-from stiction_ros.records.bag_writer import BagWriter
-from stiction_ros.records.mcap_scan import RawMessage
-from stiction_ros.records.playback import offered_qos
+from stiction_ros.records.bag.messages import read_raw
+from stiction_ros.records.bag.playback import offered_qos
+from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.quality import Quality
-from stiction_ros.records.run_log import RunLog, read_run
+from stiction_ros.records.run.log import RunLog, read_run
+from stiction_ros.records.storage.mcap_scan import RawMessage
 
 LIVE = Path(__file__).parents[2] / "bags" / "sticky_siso"
 

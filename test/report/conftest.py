@@ -7,7 +7,7 @@ import pytest
 
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
-from stiction_ros.records.run_log import Estimate, Fit, ModeChange, RunLog, Text
+from stiction_ros.records.run.log import Estimate, Fit, ModeChange, RunLog, Text
 
 SECOND = 10**9
 SAMPLES, ROUND, SWAP = 1200, 400, 500

@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 from stiction_ros.identification import FitStatus, Identification, OutputModel, ValveEstimate
-from stiction_ros.identification.results import VerdictKind
+from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.loop import LoopModel
-from stiction_ros.records.run_log import RunLog
+from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.drawing import TimeAxis
 from stiction_ros.report.page import duration, interval, number, words
-from stiction_ros.report.record_report import report_record
-from stiction_ros.report.run_report import write_run
+from stiction_ros.report.record.report import report_record
+from stiction_ros.report.run.identified import valve_cards, verdict_line
+from stiction_ros.report.run.page import headline
+from stiction_ros.report.run.report import write_run
+from stiction_ros.report.run.story import tell
 from stiction_ros.report.shapes import fitted_start, free_run, step_response, true_response
-from stiction_ros.report.story import tell
 
 FIGURES = {"rounds", "swap", "trends", "valves", "estimates", "step_responses"}
 
@@ -103,7 +105,7 @@ def test_the_report_of_a_record(log: RunLog, tmp_path: Path, status: FitStatus) 
     assert "Valve V1 sticks" in page
     assert "5.00 % (4.90 … 5.10)" in page
     assert ("no model fits" in page) is not good
-    assert len(list((tmp_path / "out").glob("*.png"))) == (4 if good else 1)
+    assert len(list((tmp_path / "out").glob("*.png"))) == (6 if good else 3)
 
 
 def test_step_responses_agree_with_the_loop_model(model: LoopModel) -> None:
@@ -147,3 +149,32 @@ def test_other_words_for_people() -> None:
     assert interval([1.0, None]) == "1.00 … –"
     assert words("f_S < 1") == "f<sub>S</sub> &lt; 1"
     assert [TimeAxis.spanning(s).unit for s in (100, 5000, 50000)] == ["s", "min", "h"]
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "said"),
+    [
+        (["sticky"], "Valve V1 sticks"),
+        (["backlash"], "Valve V1 has backlash"),
+        (["sticky", "sticky"], "Valves V1 and V2 stick"),
+        (["backlash", "backlash"], "Valves V1 and V2 have backlash"),
+        (["backlash", "sticky"], "Valve V2 sticks, V1 has backlash"),
+        (["backlash", "healthy"], "Valve V1 has backlash"),
+        (["healthy", "undecided"], "No valve is shown to stick"),
+        (["healthy"], "Valve V1 is healthy"),
+        ([], "No fit of the valves"),
+    ],
+)
+def test_the_verdicts_in_a_line(verdicts: list[str], said: str) -> None:
+    valves = [{"name": f"V{n}", "verdict": verdict} for n, verdict in enumerate(verdicts, start=1)]
+    assert verdict_line(valves) == said
+
+
+def test_a_valve_with_backlash_is_shown_as_one_with_friction(log: RunLog) -> None:
+    found = dict(log.fits[-1].identification)
+    found["valves"] = [{**valve, "verdict": "backlash"} for valve in found["valves"]]
+    told = dataclasses.replace(log.fits[-1], identification=found)
+    story = tell(dataclasses.replace(log, fits=(*log.fits[:-1], told), modes=log.modes[:1]))
+    assert story.identified["valves"][0]["verdict"] == "backlash"
+    assert headline(story) == "Valve V1 has backlash; the controller was not swapped"
+    assert 'class="card bad"' in valve_cards(story.identified["valves"])

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
-from stiction_ros.identification.results import (
+from stiction_ros.identification.result.cause import Cause, CauseKind
+from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
     OutputModel,
@@ -73,6 +73,7 @@ GAIN: dict[str, Any] = {
         "amplitude": 1.2,
         "iae_per_hour": 0.9,
         "travel_per_hour": 240.0,
+        "moves_per_hour": 120.0,
         "reversals_per_hour": 120.0,
     },
     "options": [
@@ -81,6 +82,7 @@ GAIN: dict[str, Any] = {
             "amplitude": 0.1,
             "iae_per_hour": 0.2,
             "travel_per_hour": 90.0,
+            "moves_per_hour": 40.0,
             "reversals_per_hour": 30.0,
             "interval": {"iae_per_hour": [0.1, 0.3]},
             "note": "Simulated.",

@@ -11,7 +11,7 @@ from made import GAIN, entry, identification, record
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
-from stiction_ros.survey.pages.list_page import list_page
+from stiction_ros.survey.listing.page import list_page
 from stiction_ros.survey.pages.loop_page import loop_page, with_trend
 from stiction_ros.survey.pages.plot import MOST, Curve, over_time
 from stiction_ros.survey.survey import Survey

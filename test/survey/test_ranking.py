@@ -77,7 +77,8 @@ def test_confidence_falls_with_what_is_not_known() -> None:
         < confidence(sure, "none", 10**6)
         < confidence(sure, "valve", 10**6)
     )
-    assert confidence({**sure, "stability": 0.5}, "valve", 10**6) == 0.5 * confidence(
+    half = {"tried": [{}, {}], "agreed": ["first half"]}
+    assert confidence({**sure, "stability": half}, "valve", 10**6) == 0.5 * confidence(
         sure, "valve", 10**6
     )
     assert confidence({**sure, "verdict": "undecided"}, "valve", 10**6) < confidence(

@@ -12,11 +12,11 @@ from made import entry, identification, record, unreadable
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
-from stiction_ros.survey.engine import Done, Task
+from stiction_ros.survey.engines.engine import Done, Task
 from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.listing.tables import HEAD, write_csv, write_xlsx
 from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.survey import Plan, survey
-from stiction_ros.survey.tables import HEAD, write_csv, write_xlsx
 
 KEYS = {
     *("name", "files", "status", "reason", "samples", "sample_time", "auto_share"),

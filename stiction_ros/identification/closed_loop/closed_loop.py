@@ -42,7 +42,11 @@ from stiction_ros.identification.closed_loop.repeated_runs import (
     span_of,
 )
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, scaled, scaled_process
-from stiction_ros.identification.results import FitStatus, Identification, ValveEstimate
+from stiction_ros.identification.result.identification import (
+    FitStatus,
+    Identification,
+    ValveEstimate,
+)
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
 from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,
     LoopStatus,
@@ -14,7 +13,8 @@ from stiction_ros.identification.closed_loop.closed_loop import (
 )
 from stiction_ros.identification.closed_loop.damping import Ringing
 from stiction_ros.identification.closed_loop.oscillation import REGULAR
-from stiction_ros.identification.results import Identification, ValveEstimate
+from stiction_ros.identification.result.cause import Cause, CauseKind
+from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
 
 ENDLESS = 1e6

@@ -15,7 +15,7 @@ from stiction_ros.identification.closed_loop.oscillation import (
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import DIGITS, ScaledLoop, free_run
-from stiction_ros.identification.results import ValveEstimate
+from stiction_ros.identification.result.identification import ValveEstimate
 
 STARTS = (0.2, 0.5, 0.8)
 """Shares of the longest stretch at which runs begin as recorded."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.results import OutputModel
+from stiction_ros.identification.result.identification import OutputModel
 from stiction_ros.records.record import Record
 
 DIGITS = 9

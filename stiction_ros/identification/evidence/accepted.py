@@ -8,9 +8,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.search import Found, losses
-from stiction_ros.identification.friction_grid import coarse_grid, finer_grid
+from stiction_ros.identification.evidence.candidate import losses
+from stiction_ros.identification.evidence.problem import LIMIT, Problem
+from stiction_ros.identification.evidence.search import Found
+from stiction_ros.identification.friction.grid import coarse_grid, finer_grid
 
 Interval = tuple[float, float]
 
@@ -23,7 +24,7 @@ STEPS = (0.3, 0.1, 0.03, 0.01, 0.003)  # of f_S + f_D: grids round the best
 
 @dataclasses.dataclass(frozen=True)
 class Accepted:
-    """Frictions of one valve, %.
+    """Frictions of one valve, shares of the span of OP.
 
     Attributes:
         static, dynamic, band: hulls of f_S, f_D and f_S + f_D of what is not rejected.
@@ -41,6 +42,14 @@ class Accepted:
     none: bool
     deadband_loss: float
     profile: tuple[tuple[float, float], ...]
+
+    def times(self, span: float) -> Accepted:
+        """Return the same with frictions in % of a valve whose OP has this span, %."""
+        static, dynamic, band = (
+            (span * low, span * high) for low, high in (self.static, self.dynamic, self.band)
+        )
+        profile = tuple((span * friction, loss) for friction, loss in self.profile)
+        return dataclasses.replace(self, static=static, dynamic=dynamic, band=band, profile=profile)
 
 
 def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> Accepted:
@@ -74,15 +83,15 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
 
 def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, FloatArray]:
     """Return frictions, shape (G, 2), and their losses, those of exact fits first."""
-    best, limit = found.best, float(problem.limit[valve])
+    best = found.best
     met = [one for one in found.met if one.friction[valve, 0] > 0.0] or [best]
     rows = [np.array([one.friction[valve] for one in met])]
     lost = [np.array([one.loss for one in met])]
     centre = best.friction[valve]
-    grids = [coarse_grid(limit)]
+    grids = [coarse_grid(LIMIT)]
     if centre[0] > 0.0:
         size = float(centre.sum())
-        grids += [finer_grid(centre[None, :], step * size / 3.0, limit) for step in STEPS]
+        grids += [finer_grid(centre[None, :], step * size / 3.0, LIMIT) for step in STEPS]
     grid = np.vstack(grids)
     grid = np.vstack([grid, np.column_stack([grid[:, 0], grid[:, 0]])])  # deadbands
     start = np.full(len(grid), best.starts[valve])

@@ -16,38 +16,52 @@ from stiction_ros.identification.closed_loop.explanation import (
     RIVAL,
     explained,
 )
-from stiction_ros.identification.conclusion import Findings, conclude
 from stiction_ros.identification.engine import order_row
+from stiction_ros.identification.evidence.candidate import Candidate
+from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.kernels import whitened
 from stiction_ros.identification.evidence.output_fit import OutputFit, noise_of
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
-from stiction_ros.identification.evidence.rates import Agreement, Look, agreement, looks
-from stiction_ros.identification.evidence.search import Candidate
-from stiction_ros.identification.models import Data, Model, linear_model, settle_delays, stem_of
+from stiction_ros.identification.evidence.rates import (
+    ALIKE,
+    PRICE,
+    Agreement,
+    Look,
+    agreement,
+    liveliest,
+    looks,
+)
+from stiction_ros.identification.inference.conclusion import Findings, conclude
+from stiction_ros.identification.inference.verdict import half_gains, is_deadband, kind_of
 from stiction_ros.identification.options import IdentificationOptions
-from stiction_ros.identification.preparation import prepare, windows
-from stiction_ros.identification.results import (
+from stiction_ros.identification.problem.models import (
+    Data,
+    Model,
+    linear_model,
+    refit,
+    settle_delays,
+    stem_of,
+)
+from stiction_ros.identification.problem.preparation import prepare, windows
+from stiction_ros.identification.result.identification import (
     Identification,
     OrderRow,
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.verdict import half_gains
+from stiction_ros.identification.result.stability import Look as View
+from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
 
-PRICE = 15.0
-"""−2 log likelihood that friction must gain at two neighbouring rates: what the best of so many
-frictions gains on quiet loops without any."""
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
 SURE = 40.0
 """What a friction gains beyond :data:`PRICE` from which on it is not doubted for being idle, unless
 the closed loop grows without end: the linear process that is fitted at last is less certain."""
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
-HARMLESS = 0.12  # of the range of OP: a valve is healthy when larger bands are rejected
-UNHEARD = 12.0  # gain of friction at any rate from which on a valve is not called healthy
-POWERFUL = 3  # rates of which one must reject larger bands
+HARMLESS = 0.08  # of the range of OP: a valve is healthy when larger bands are rejected
+POWERFUL = 2  # rates at which larger bands must be rejected, of those that carry news
 BETWEEN = 3.0
 """Standard deviations of OP's innovations by which the band may be larger than the record shows: a
 valve feels what OP does between two samples, and slips at its peaks."""
@@ -74,25 +88,35 @@ def identify(
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    seen = looks(record, options)
+    part = liveliest(record)
+    seen = looks(part, options)
     report(0.7)
-    valves = tuple(_judged(record, seen, j, options) for j in range(len(record.valves)))
-    model, table = _process(data, options, valves, record)
+    valves = tuple(_judged(part, seen, j, options) for j in range(len(part.valves)))
+    small = data if part is record else prepare(part, options)
+    model, table = _process(small, options, valves, part)
+    if part is not record:
+        valves, model = _over_all(record, data, valves, model)
     report(1.0)
     concluded = conclude(record, data, Findings(model, valves, table, (), None), 0.0)
     looped = explained(record, dataclasses.replace(concluded, method="evidence"))
     judged = tuple(doubted(valve) for valve in looped.valves)
-    return dataclasses.replace(looped, valves=judged, seconds=time.perf_counter() - begun)
+    surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
+    return dataclasses.replace(
+        looped,
+        valves=judged,
+        row_samples=round(surest.evidence["rate"]),
+        seconds=time.perf_counter() - begun,
+    )
 
 
 def doubted(valve: ValveEstimate) -> ValveEstimate:
-    """Return the estimate, no longer sticky where its loop says otherwise.
+    """Return the estimate, no longer with friction where its loop says otherwise.
 
     A wave of one period that explains the record nearly as well comes from outside, and a
     friction without which OP would move all the same is not what moves it; the latter holds where
     the controller is known and the evidence not overwhelming.
     """
-    if valve.verdict is not VerdictKind.STICKY:
+    if not valve.verdict.has_friction:
         return valve
     told = valve.evidence
     wave = told.get("line_rivalry", 0.0) > RIVAL and told.get("outside_line", 0.0) > LINE
@@ -114,19 +138,22 @@ def _judged(
     record: Record, seen: tuple[Look, ...], valve: int, options: IdentificationOptions
 ) -> ValveEstimate:
     agreed = agreement(seen, valve)
-    problem, found, held = agreed.look.problem, agreed.look.found, agreed.look.accepted[valve]
+    problem, found = agreed.look.problem, agreed.look.found
+    span = float(problem.span[valve])
+    held = agreed.look.accepted[valve].times(span)
     figures = evidence_of(agreed, valve)
     for look in seen:
         figures[f"gain_{look.problem.rate}"] = look.accepted[valve].gain
-        figures[f"band_high_{look.problem.rate}"] = look.accepted[valve].band[1]
+        figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
     verdict = _verdict(figures, agreed, seen, valve, options)
-    believed = verdict is VerdictKind.STICKY
+    believed = verdict.has_friction
     low = (held.static[0], held.dynamic[0]) if believed else (0.0, 0.0)
     healthy = verdict is VerdictKind.HEALTHY
-    high = 0.0 if healthy else 0.5 * BETWEEN * _innovation(problem.op[valve])
+    high = 0.0 if healthy else 0.5 * BETWEEN * span * _innovation(problem.op[valve])
     chosen = found.without[valve] if healthy else found.best
-    static, dynamic = (float(value) for value in chosen.friction[valve])
-    return ValveEstimate(
+    static, dynamic = (span * float(value) for value in chosen.friction[valve])
+    deadband = is_deadband(held.deadband_loss, held.static, held.dynamic)
+    estimate = ValveEstimate(
         name=record.valves[valve],
         verdict=verdict,
         law=options.law,
@@ -134,12 +161,36 @@ def _judged(
         static_interval=(low[0], max(held.static[1], static) + high),
         dynamic_friction=dynamic,
         dynamic_interval=(low[1], max(held.dynamic[1], dynamic) + high),
-        jump=0.0 if held.deadband_loss < 4.0 else static - dynamic,
-        stem_start=float(record.op[0, valve]) + float(chosen.starts[valve]),
+        jump=0.0 if deadband else static - dynamic,
+        stem_start=float(record.op[0, valve]) + span * float(chosen.starts[valve]),
         moves=int(np.count_nonzero(np.diff(chosen.stems[valve]))),
         evidence=figures,
         profile=held.profile,
+        stability=_stability(seen, agreed, valve, figures, (healthy, record.sample_time)),
     )
+    return with_further(estimate, problem, found, valve, options.confidence)
+
+
+def _stability(
+    seen: tuple[Look, ...],
+    agreed: Agreement,
+    valve: int,
+    figures: dict[str, float],
+    told: tuple[bool, float],
+) -> Stability:
+    """Return what every rate and both halves say; ``told`` is (healthy, s between samples)."""
+    healthy, sample_time = told
+    band = agreed.look.accepted[valve].band
+    views = []
+    for look in seen:
+        held = look.accepted[valve]
+        near = max(band[0], held.band[0]) <= ALIKE * min(band[1], held.band[1])
+        agrees = held.gain < PRICE if healthy else held.gain > PRICE and near
+        name = f"rows of {look.problem.rate * sample_time:g} s"
+        shown = held.times(float(look.problem.span[valve]))
+        views.append(View(name, held.gain, agrees, shown.band))
+    gains = figures["half_1"], figures["half_2"]
+    return Stability((*views, *halves(gains, PRICE if healthy else None)))
 
 
 def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
@@ -155,7 +206,7 @@ def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
         "free_run_ratio": _free_run(problem, without) / _free_run(problem, best),
         "half_1": halves[0],
         "half_2": halves[1],
-        "share": float(best.friction[valve, 0] / problem.limit[valve]),
+        "share": float(best.friction[valve, 0]),
         "moves": float(np.count_nonzero(np.diff(best.stems[valve]))),
         "rate": float(problem.rate),
         "alike": float(agreed.alike),
@@ -164,7 +215,7 @@ def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
 
 
 def _innovation(op: FloatArray) -> float:
-    """Return the standard deviation of what the past of OP does not tell, %."""
+    """Return the standard deviation of what the past of OP does not tell."""
     return float(whitened(noise_of(op), op, float(op[0]))[NOISE_ORDER:].std())
 
 
@@ -183,17 +234,38 @@ def _verdict(
     valve: int,
     options: IdentificationOptions,
 ) -> VerdictKind:
-    span = float(agreed.look.problem.limit[valve])
     held = agreed.look.accepted[valve]
     slips = figures["moves"] >= options.min_moves
-    if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL * span:
+    if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL:
         both = min(figures["half_1"], figures["half_2"]) > 0.0
-        return VerdictKind.STICKY if both and slips else VerdictKind.UNDECIDED
-    told = [look.accepted[valve] for look in seen]
-    quiet = max(one.gain for one in told) < UNHEARD
-    if quiet and slips and min(one.band[1] for one in told[:POWERFUL]) <= HARMLESS * span:
+        kind = kind_of(held.deadband_loss, held.static, held.dynamic)
+        return kind if both and slips else VerdictKind.UNDECIDED
+    quiet = max(look.accepted[valve].gain for look in seen) < PRICE
+    rejecting = [
+        look for look in seen if look.carries_news and look.accepted[valve].band[1] <= HARMLESS
+    ]
+    if quiet and slips and len(rejecting) >= min(POWERFUL, len(seen)):
         return VerdictKind.HEALTHY
     return VerdictKind.UNDECIDED
+
+
+def _over_all(
+    record: Record, data: Data, valves: tuple[ValveEstimate, ...], found: Model
+) -> tuple[tuple[ValveEstimate, ...], Model]:
+    """Return what a part of a record has shown for all of it, the process fitted anew.
+
+    Where the stems were before the part is not known: they begin at OP.
+    """
+    first = (float(op) for op in record.op[0])
+    valves = tuple(
+        dataclasses.replace(valve, stem_start=op) for valve, op in zip(valves, first, strict=True)
+    )
+    stems = data.u.copy()
+    for j in np.flatnonzero(found.friction[:, 0]):
+        stems[j] = stem_of(data, int(j), found.friction[j], 0.0)
+    nowhere = np.zeros(len(stems))
+    model = dataclasses.replace(found, start=nowhere, stems=stems)
+    return valves, refit(data, model, found.fits[0].orders, warm=False)
 
 
 def _process(
@@ -205,6 +277,10 @@ def _process(
     """Return orders, delays and linear parts for the stems, and all orders that were tried."""
     friction = np.array([[v.static_friction, v.dynamic_friction] for v in valves])
     starts = np.array([v.stem_start for v in valves]) - record.op[0]
+    if data.further:
+        told = zip(valves, data.further, strict=True)
+        held = tuple(tuple(valve.further.values()) or first for valve, first in told)
+        data = dataclasses.replace(data, further=held)
     stems = data.u.copy()
     for j in np.flatnonzero(friction[:, 0]):
         stems[j] = stem_of(data, int(j), friction[j], float(starts[j]))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction_ros.compiled import compiled_fused
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 LEAST = 1e-12  # share of the output's energy that is always left
 
@@ -25,21 +25,22 @@ def whitened(noise: FloatArray, signal: FloatArray, before: float) -> FloatArray
 
 
 @compiled_fused
-def lagged(signal: FloatArray, before: float, first: int, taps: int) -> FloatArray:
-    """Return rows of a signal and its past, one to ``taps`` samples back, shape (taps, N − first).
+def answered(signal: FloatArray, response: FloatArray) -> FloatArray:
+    """Return what an impulse response makes of a signal, shape (N,).
 
     Args:
-        signal: shape (N,).
-        before: its value before its first sample.
-        first: sample of the first column.
-        taps: M.
+        signal: shape (N,); it was at its first value before.
+        response: from one sample on, shape (M,).
     """
-    count = len(signal) - first
-    out = np.empty((taps, count))
-    for i in range(taps):
-        for k in range(count):
-            at = first + k - 1 - i
-            out[i, k] = signal[at] if at >= 0 else before
+    out, before = np.zeros(len(signal)), 0.0
+    for i in range(len(response)):
+        past = i + 1
+        for k in range(past, len(signal)):
+            out[k] += response[i] * signal[k - past]
+        before += response[i]
+    for k in range(min(len(response), len(signal))):
+        out[k] += before * signal[0]
+        before -= response[k]
     return out
 
 
@@ -53,42 +54,79 @@ def with_past(signal: FloatArray, taps: int) -> FloatArray:
 
 
 @compiled_fused
-def lagged_with(padded: FloatArray, other: FloatArray, taps: int) -> FloatArray:
-    """Return the products of :func:`lagged` rows of a signal with another, shape (M,).
+def lagged_with(padded: FloatArray, other: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the products of the groups of lags of a signal with another, shape (r,).
 
     Args:
         padded: the signal by :func:`with_past`.
         other: its last samples, shape (n,).
-        taps: M.
+        edges: group g sums lags ``edges[g] + 1`` to ``edges[g + 1]``, shape (r + 1,).
     """
-    out = np.empty(taps)
-    for i in range(taps):
-        start = len(padded) - len(other) - 1 - i
-        out[i] = np.dot(padded[start : start + len(other)], other)
+    out = np.zeros(len(edges) - 1)
+    for g in range(len(out)):
+        for i in range(edges[g], edges[g + 1]):
+            start = len(padded) - len(other) - 1 - i
+            out[g] += np.dot(padded[start : start + len(other)], other)
     return out
 
 
 @compiled_fused
-def lagged_products(left: FloatArray, right: FloatArray, count: int, taps: int) -> FloatArray:
-    """Return the products of the :func:`lagged` rows of two signals, shape (M, M).
+def groups(edges: IntArray) -> IntArray:
+    """Return the group of every lag, shape (M,); ``edges`` as in :func:`lagged_with`."""
+    out = np.empty(edges[-1], dtype=np.int64)
+    for g in range(len(edges) - 1):
+        out[edges[g] : edges[g + 1]] = g
+    return out
 
-    Each follows from its neighbour up and left by two samples; only one row and one column are
-    summed up.
+
+@compiled_fused
+def lagged_products(left: FloatArray, right: FloatArray, count: int, edges: IntArray) -> FloatArray:
+    """Return the products of the groups of lags of two signals, shape (r, r).
+
+    Those of two lags follow from their neighbours up and left by two samples; only one row and
+    one column are summed up.
 
     Args:
         left, right: by :func:`with_past`.
         count: n, samples of a row.
-        taps: M.
+        edges: of the groups, as in :func:`lagged_with`.
     """
-    start = len(left) - 1 - count
-    out = np.empty((taps, taps))
-    out[:, 0] = lagged_with(left, right[start : start + count], taps)
-    out[0] = lagged_with(right, left[start : start + count], taps)
-    for i in range(1, taps):
-        enters, leaves = left[start - i], left[start - i + count]
-        for j in range(1, taps):
-            gone = leaves * right[start - j + count]
-            out[i, j] = out[i - 1, j - 1] + enters * right[start - j] - gone
+    size, taps, start = len(edges) - 1, edges[-1], len(left) - 1 - count
+    out, group = np.zeros((size, size)), groups(edges)
+    row, above = np.empty(taps), np.empty(taps)
+    for j in range(taps):
+        row[j] = np.dot(right[start - j : start - j + count], left[start : start + count])
+    for i in range(taps):
+        if i > 0:
+            above, row = row, above
+            row[0] = np.dot(left[start - i : start - i + count], right[start : start + count])
+            enters, leaves = left[start - i], left[start - i + count]
+            for j in range(1, taps):
+                gone = leaves * right[start - j + count]
+                row[j] = above[j - 1] + enters * right[start - j] - gone
+        for j in range(taps):
+            out[group[i], group[j]] += row[j]
+    return out
+
+
+@compiled_fused
+def own_products(signal: FloatArray, count: int, edges: IntArray) -> FloatArray:
+    """Return :func:`lagged_products` of a signal with itself, at half the work."""
+    size, taps, start = len(edges) - 1, edges[-1], len(signal) - 1 - count
+    out, group = np.zeros((size, size)), groups(edges)
+    first, row = signal[start : start + count], np.empty(taps)
+    for j in range(taps):
+        row[j] = np.dot(signal[start - j : start - j + count], first)
+    for i in range(taps):
+        if i > 0:  # row[j] holds lags i and i + j
+            enters, leaves = signal[start - i], signal[start - i + count]
+            for j in range(taps - i):
+                gone = leaves * signal[start - i - j + count]
+                row[j] += enters * signal[start - i - j] - gone
+        out[group[i], group[i]] += row[0]
+        for j in range(1, taps - i):
+            out[group[i], group[i + j]] += row[j]
+            out[group[i + j], group[i]] += row[j]
     return out
 
 
@@ -135,10 +173,11 @@ class Given(NamedTuple):
         noise: monic polynomial D, shape (d + 1,).
         known: rows of any signals, shape (c, n).
         others: stems of the other valves, by :func:`with_past`, shape (m − 1, M + N).
-        root: L^-1, with L L^T the products of ``known`` and of M lags of each of ``others`` with
-            each other and what is known of them before the record, shape (q, q).
+        root: L^-1, with L L^T the products of ``known`` and of the lags of each of ``others``
+            with each other and what is known of them before the record, shape (q, q).
         target: what all these leave of the output, shape (n,).
         energy: of that and of the prior of what explains the rest.
+        edges: of the groups of lags, shape (r + 1,).
     """
 
     noise: FloatArray
@@ -147,6 +186,7 @@ class Given(NamedTuple):
     root: FloatArray
     target: FloatArray
     energy: float
+    edges: IntArray
 
 
 @compiled_fused
@@ -161,22 +201,22 @@ def evidence(stem: FloatArray, given: Given, precision: FloatArray) -> tuple[flo
     Args:
         stem: scaled, shape (N,).
         given: everything else.
-        precision: inverse of K, shape (M, M).
+        precision: inverse of K, shape (r, r).
     """
-    taps, known, count = len(precision), len(given.known), len(given.target)
-    signal = with_past(whitened(given.noise, stem, stem[0]), taps)
-    gram = lagged_products(signal, signal, count, taps)
-    shared = np.empty((taps, len(given.root)))
+    size, known, count = len(precision), len(given.known), len(given.target)
+    signal = with_past(whitened(given.noise, stem, stem[0]), given.edges[-1])
+    gram = own_products(signal, count, given.edges)
+    shared = np.empty((size, len(given.root)))
     for row in range(known):
-        shared[:, row] = lagged_with(signal, given.known[row], taps)
+        shared[:, row] = lagged_with(signal, given.known[row], given.edges)
     for other in range(len(given.others)):
-        at = known + other * taps
-        shared[:, at : at + taps] = lagged_products(signal, given.others[other], count, taps)
+        at, beside = known + other * size, given.others[other]
+        shared[:, at : at + size] = lagged_products(signal, beside, count, given.edges)
     shared = np.dot(shared, given.root.T)
     gram -= np.dot(shared, shared.T)
     gram += precision
     determinant = factorised(gram)
-    response, explained = solved(gram, lagged_with(signal, given.target, taps))
+    response, explained = solved(gram, lagged_with(signal, given.target, given.edges))
     left = max(given.energy - explained, LEAST * given.energy)
     return count * np.log(left / count) + determinant, response
 

@@ -15,14 +15,18 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     LEAST,
     Given,
+    answered,
     evidence,
     evidences,
-    lagged,
+    factorised,
     lagged_products,
+    lagged_with,
+    own_products,
+    solved,
     whitened,
     with_past,
 )
@@ -43,7 +47,7 @@ class OutputFit:
         noise: monic polynomial D, shape (d + 1,).
         prior: of the responses.
         loss: −2 log of the marginal likelihood, up to a constant of the rows.
-        responses: of the scaled output to the scaled stems, shape (m, M).
+        responses: of the scaled output to the scaled stems, levels of the groups of taps, (m, r).
         rest: what the free run leaves of the output, shape (n,).
     """
 
@@ -87,9 +91,9 @@ class Whitened:
         seen: the output, shape (n,).
         known: a constant, shape (1, n).
         stems: by :func:`.kernels.with_past`, shape (m, M + N).
-        products: of ``known`` and of M lags of every stem with each other, shape (q, q).
+        products: of ``known`` and of the lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
-        taps: M.
+        edges: of the groups of taps.
     """
 
     noise: FloatArray
@@ -98,49 +102,52 @@ class Whitened:
     stems: FloatArray
     products: FloatArray
     seen_products: FloatArray
-    taps: int
+    edges: IntArray
 
     @classmethod
     def of(cls, problem: Problem, output: int, stems: FloatArray, noise: FloatArray) -> Whitened:
         """Whiten an output and ``stems``, scaled, shape (m, n); m may be 0."""
-        taps, first = problem.taps, problem.first
+        edges, first = problem.edges, problem.first
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[first:]
         known = np.full((1, len(seen)), 1.0 / np.sqrt(len(seen)))
-        past = [with_past(whitened(noise, stem, float(stem[0])), taps) for stem in stems]
-        signals = np.array(past).reshape(len(stems), taps + problem.rows)
-        rows = np.vstack([known, *(lagged(x, float(x[0]), first + taps, taps) for x in signals)])
-        count = len(known)
-        products = np.empty((len(rows), len(rows)))
-        products[:, :count] = rows @ known.T
-        products[:count] = products[:, :count].T
+        past = [with_past(whitened(noise, stem, float(stem[0])), problem.taps) for stem in stems]
+        signals = np.array(past).reshape(len(stems), problem.taps + problem.rows)
+        count, size = len(known), len(edges) - 1
+        products = np.empty((count + len(stems) * size,) * 2)
+        products[:count, :count] = known @ known.T
+        with_seen = [known @ seen]
         for i, left in enumerate(signals):
-            for j, right in enumerate(signals[: i + 1]):
-                down, along = (slice(count + k * taps, count + (k + 1) * taps) for k in (i, j))
-                products[down, along] = lagged_products(left, right, len(seen), taps)
+            down = slice(count + i * size, count + (i + 1) * size)
+            for row, one in enumerate(known):
+                products[row, down] = products[down, row] = lagged_with(left, one, edges)
+            for j, right in enumerate(signals[:i]):
+                along = slice(count + j * size, count + (j + 1) * size)
+                products[down, along] = lagged_products(left, right, len(seen), edges)
                 products[along, down] = products[down, along].T
-        return cls(noise, seen, known, signals, products, rows @ seen, taps)
+            products[down, down] = own_products(left, len(seen), edges)
+            with_seen.append(lagged_with(left, seen, edges))
+        return cls(noise, seen, known, signals, products, np.concatenate(with_seen), edges)
 
     def with_precision(self, prior: ResponsePrior) -> FloatArray:
         """Return the products and what is known before the record, shape (q, q)."""
-        out, precision = self.products.copy(), prior.precision(self.taps)
-        for start in range(len(self.known), len(out), self.taps):
-            block = slice(start, start + self.taps)
+        out, precision = self.products.copy(), prior.precision(self.edges)
+        for start in range(len(self.known), len(out), len(precision)):
+            block = slice(start, start + len(precision))
             out[block, block] += precision
         return out
 
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
-        return len(self.stems) * prior.log_determinant(self.taps)
+        return len(self.stems) * prior.log_determinant(self.edges)
 
     def loss(self, prior: ResponsePrior) -> tuple[float, FloatArray]:
         """Return the loss, and what multiplies ``known`` and each lag, shape (q,)."""
-        factor = np.linalg.cholesky(self.with_precision(prior))
-        half = solve_triangular(factor, self.seen_products, lower=True, check_finite=False)
+        factor = self.with_precision(prior)
+        determinant = factorised(factor) + self.log_determinant(prior)
+        weights, explained = solved(factor, self.seen_products)
         count, energy = len(self.seen), float(self.seen @ self.seen)
-        left = max(energy - float(half @ half), LEAST * energy)
-        determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
-        weights = solve_triangular(factor, half, lower=True, trans=1, check_finite=False)
+        left = max(energy - explained, LEAST * energy)
         return float(count * np.log(left / count) + determinant), weights
 
     def under(self, prior: ResponsePrior) -> Criterion:
@@ -150,17 +157,15 @@ class Whitened:
         half = root @ self.seen_products
         weights = root.T @ half
         target = self.seen - weights[: len(self.known)] @ self.known
-        first = self.stems.shape[1] - len(target)
-        for i, signal in enumerate(self.stems):
-            at = len(self.known) + i * self.taps
-            response = weights[at : at + self.taps]
-            target -= response @ lagged(signal, float(signal[0]), first, self.taps)
+        levels = weights[len(self.known) :].reshape(len(self.stems), len(self.edges) - 1)
+        for signal, level in zip(self.stems, levels, strict=True):
+            target -= answered(signal, np.repeat(level, np.diff(self.edges)))[-len(target) :]
         energy = float(self.seen @ self.seen) - float(half @ half)
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
         return Criterion(
-            Given(self.noise, self.known, self.stems, root, target, energy),
-            prior.precision(self.taps),
-            determinant + prior.log_determinant(self.taps),
+            Given(self.noise, self.known, self.stems, root, target, energy, self.edges),
+            prior.precision(self.edges),
+            determinant + prior.log_determinant(self.edges),
         )
 
 
@@ -237,12 +242,11 @@ def _tuned(
 def _fitted(
     problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
 ) -> OutputFit:
-    taps = problem.taps
     loss, weights = Whitened.of(problem, output, stems, noise).loss(prior)
-    responses = weights[1:].reshape(len(stems), taps)
+    responses = weights[1:].reshape(len(stems), len(problem.edges) - 1)
     rest = problem.pv[output].copy()
-    for stem, response in zip(stems, responses, strict=True):
-        rest -= response @ lagged(stem, float(stem[0]), 0, taps)
+    for stem, levels in zip(stems, responses, strict=True):
+        rest -= answered(stem, np.repeat(levels, np.diff(problem.edges)))
     rest -= rest[problem.first :].mean()
     return OutputFit(noise, prior, loss, responses, rest)
 

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from stiction_ros.effects import FrictionLaw
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.friction_grid import find_law, simulate
+from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.friction.grid import find_law, simulate
+from stiction_ros.identification.options import IdentificationOptions, limited
 from stiction_ros.records.record import Record
 
 TAPS = 60  # of an impulse response, at most
 SHARE = 8  # rows per tap, at least
+COARSER = 8
+"""A tap i of a response is resolved to i / 8 samples: late taps are smooth, and a third of the
+weights does."""
+LIMIT = 1.0  # largest f_S of all: a valve that moves at all turns within the span of OP
+DIGITS = 12  # of OP and PV in their own scale: no unit leaves a trace, not even in rounding
 LEFT_OUT = 0.05  # share of the rows at the begin, where a stem may not have found its place
 NOISE_ORDER = 6
+MOVES = 6  # of a stem over a whole record, fewest of a friction that is judged
+FEW_MOVES = 2  # of a beginning
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,48 +31,70 @@ class Problem:
     """Signals in their own scale, so that no unit of OP, PV or time changes an answer.
 
     Attributes:
-        op: about its mean, %, shape (m, N).
+        op: about its mean over its span, shape (m, N): all frictions here are shares of the span.
         pv: means of ``rate`` samples, about their mean over their standard deviation, (p, n).
         rate: samples of OP per row.
         law: friction law.
-        limit: largest f_S per valve, %, shape (m,).
-        scale: standard deviation of OP per valve, %, shape (m,).
+        span: of OP per valve, %, shape (m,).
+        limit: largest f_S per valve, shape (m,).
+        scale: standard deviation of ``op`` per valve, shape (m,).
         skipped: smallest delay, rows.
+        least_moves: of a stem, fewest of a friction that is judged.
+        further: per valve, values of the law's parameters behind f_S and f_D; empty where it
+            has no others.
     """
 
     op: FloatArray
     pv: FloatArray
     rate: int
     law: type[FrictionLaw]
+    span: FloatArray
     limit: FloatArray
     scale: FloatArray
     skipped: int = 0
+    least_moves: int = MOVES
+    further: tuple[tuple[float, ...], ...] = ()
 
     @classmethod
-    def of(cls, record: Record, law: str = "he", rate: int = 1, skipped: int = 0) -> Problem:
+    def of(
+        cls, record: Record, options: IdentificationOptions | None = None, rate: int = 1
+    ) -> Problem:
         """Prepare a whole record.
 
         Args:
             record: without gaps.
-            law: name of a friction law.
+            options: of which law, largest friction and smallest delay count.
             rate: samples that are averaged to a row.
-            skipped: smallest delay t_d, samples.
 
         Raises:
-            InputError: an unknown law.
+            InputError: an unknown law, or limits that are not one or one for each valve.
         """
+        options = options or IdentificationOptions()
         rows = len(record) // rate
-        op, pv = record.op[: rows * rate].T, record.pv[: rows * rate].T
-        centred = np.ascontiguousarray(op - op.mean(axis=1, keepdims=True))
-        slow = pv.reshape(len(pv), rows, rate).mean(axis=2)
+        span = np.ptp(record.op, axis=0)
+        op = ((record.op - record.op.mean(axis=0)) / span).round(DIGITS)[: rows * rate].T
+        slow = record.pv[: rows * rate].T.reshape(-1, rows, rate).mean(axis=2)
+        pv = (slow - slow.mean(axis=1, keepdims=True)) / slow.std(axis=1, keepdims=True)
         return cls(
-            op=centred,
-            pv=(slow - slow.mean(axis=1, keepdims=True)) / slow.std(axis=1, keepdims=True),
+            op=np.ascontiguousarray(op),
+            pv=np.ascontiguousarray(pv.round(DIGITS)),
             rate=rate,
-            law=find_law(law),
-            limit=np.ptp(op, axis=1),
-            scale=centred.std(axis=1),
-            skipped=skipped // rate,
+            law=find_law(options.law),
+            span=span,
+            limit=limited(span, options.friction_limit) / span,
+            scale=op.std(axis=1),
+            skipped=options.delay[0] // rate,
+        )
+
+    def beginning(self, rows: int) -> Problem:
+        """Return the first ``rows`` of the record, in the scale of the whole; all are itself."""
+        if rows == self.rows:
+            return self
+        return dataclasses.replace(
+            self,
+            op=np.ascontiguousarray(self.op[:, : rows * self.rate]),
+            pv=np.ascontiguousarray(self.pv[:, :rows]),
+            least_moves=FEW_MOVES,
         )
 
     @property
@@ -81,10 +112,19 @@ class Problem:
         """Rows that count."""
         return self.rows - self.first
 
+    @functools.cached_property
+    def edges(self) -> IntArray:
+        """Groups of taps of one height: g holds ``edges[g] + 1`` to ``edges[g + 1]``, (r + 1,)."""
+        taps = max(min(TAPS, self.rows // SHARE), 2)
+        edges = [0]
+        while edges[-1] < taps:
+            edges.append(min(edges[-1] + max(edges[-1] // COARSER, 1), taps))
+        return np.array(edges)
+
     @property
     def taps(self) -> int:
         """M, length of an impulse response."""
-        return max(min(TAPS, self.rows // SHARE), 2)
+        return int(self.edges[-1])
 
     def ideal_stems(self) -> FloatArray:
         """Return the stems of valves without friction, scaled, shape (m, n)."""
@@ -95,17 +135,27 @@ class Problem:
 
         Args:
             valve: index.
-            friction: rows (f_S, f_D), %, shape (G, 2).
-            starts: stem before the first sample minus the first OP, %, one or (G,).
+            friction: rows (f_S, f_D), shape (G, 2), or with all further parameters behind.
+            starts: stem before the first sample minus the first OP, one or (G,).
         """
         op = self.op[valve]
         begin = op[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(friction),))
-        stems = simulate(self.law, friction, op, begin)
+        further = self.further[valve] if self.further else ()
+        if self.law.switching is None:  # it may know sizes in %, not J and S alone
+            rows = friction.copy()
+            rows[:, :2] *= self.span[valve]
+            op, begin = self.span[valve] * op, self.span[valve] * begin
+            stems = simulate(self.law, rows, op, begin, further) / self.span[valve]
+        else:
+            stems = simulate(self.law, friction, op, begin, further)
         return np.asarray(self._slowed(stems.T) / self.scale[valve])
 
     def _slowed(self, signals: FloatArray) -> FloatArray:
-        shape = (len(signals), self.rows, self.rate)
-        slow = np.ascontiguousarray(signals).reshape(shape).mean(axis=2)
+        slow = np.ascontiguousarray(signals)
+        if self.rate > 1:
+            slow = slow.reshape(len(signals), self.rows, self.rate).mean(axis=2)
+        if self.skipped == 0:
+            return slow
         delayed: FloatArray = np.empty_like(slow)
         delayed[:, self.skipped :] = slow[:, : slow.shape[1] - self.skipped]
         delayed[:, : self.skipped] = slow[:, :1]

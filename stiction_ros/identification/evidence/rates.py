@@ -5,23 +5,33 @@ hidden: samples that are held or drawn between two reports carry no news, yet as
 they tell the noise model that PV is smooth to the last digit. And it takes away what only looks
 like friction because a load moves PV faster than the process could. So an answer counts where two
 neighbouring rates give it. What is best at one rate is tried at the others.
+
+A rate sees a response for as many rows as it has taps. Where the process goes on beyond that, it
+is no longer among the processes that are tried, and friction makes up for what they lack: such a
+rate has a say only where all coarser ones, one of which sees the end, find friction as well.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
+
+import numpy as np
 
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
+from stiction_ros.identification.evidence.candidate import Candidate
+from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.search import (
     APART,
-    Candidate,
     Found,
+    Provider,
     heads,
     search,
     search_again,
 )
+from stiction_ros.identification.exact.long_records import PART, liveliest_begin
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
 
@@ -29,9 +39,17 @@ RATES = (1, 2, 4, 8)
 LEAST_ROWS = 120  # that are left at a rate
 ROUNDS = 2  # in which rates hand each other what they found
 SEEDS = 2  # frictions of each rate that are tried at the others
+OLDEST = 2.0  # rows from one report to the next, at most, of a rate that may call a valve healthy
+STRAIGHT = 1e-7  # of the range of PV: less is no bend
 ALIKE = 1.5
 """Factor between the bands of two rates that may be one: averaging hides what OP does within a
 row, and the friction with it."""
+
+
+PRICE = 15.0
+"""−2 log likelihood that friction must gain at two neighbouring rates: what the best of so many
+frictions gains on quiet loops without any."""
+UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on beyond it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,11 +60,18 @@ class Look:
         problem: the record at this rate.
         found: by the search.
         accepted: per valve, frictions that are not rejected.
+        carries_news: whether at least every other row holds a report of its own.
     """
 
     problem: Problem
     found: Found
     accepted: tuple[Accepted, ...]
+    carries_news: bool = True
+
+    def covers(self, valve: int) -> bool:
+        """Return whether responses die away by their last tap, without friction of the valve."""
+        taps = np.abs([fit.responses for fit in self.found.without[valve].fits])
+        return bool(taps[..., -1].max() <= UNDIED * taps.max())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +81,8 @@ class Agreement:
     Attributes:
         look: the one of the two with more evidence.
         gain: the lesser of both gains of friction, −2 log of the marginal likelihood.
-        alike: whether the bands that they accept overlap, but for :data:`ALIKE`.
+        alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
+            have a say.
     """
 
     look: Look
@@ -64,38 +90,75 @@ class Agreement:
     alike: bool
 
 
-def looks(record: Record, options: IdentificationOptions) -> tuple[Look, ...]:
-    """Return what each rate shows for which enough rows are left, the record as it is first."""
+def looks(
+    record: Record,
+    options: IdentificationOptions,
+    providers: Sequence[Provider] = tuple(Provider),
+) -> tuple[Look, ...]:
+    """Return what each rate shows for which enough rows are left, the record as it is first.
+
+    Args:
+        record: without gaps.
+        options: law, largest friction, smallest delay and level.
+        providers: of seeds.
+    """
     rates = [rate for rate in RATES if rate == 1 or len(record) // rate >= LEAST_ROWS]
-    problems = [Problem.of(record, options.law, rate, options.delay[0]) for rate in rates]
-    found = [search(problem) for problem in problems]
+    problems = [Problem.of(record, options, rate) for rate in rates]
+    further = settled(problems[0])
+    problems = [dataclasses.replace(problem, further=further) for problem in problems]
+    found = [search(problem, providers) for problem in problems]
     for _ in range(ROUNDS):
         seeds = [_heads(*one) for one in zip(problems, found, strict=True)]
         for k, problem in enumerate(problems):
             others = [seed for other, row in enumerate(seeds) if other != k for seed in row]
             found[k] = search_again(problem, found[k], others)
-    seen = []
+    seen, between = [], samples_between_reports(record)
     for problem, one in zip(problems, found, strict=True):
         valves = range(len(record.valves))
         held = tuple(accepted(problem, one, j, options.confidence) for j in valves)
-        seen.append(Look(problem, one, held))
+        seen.append(Look(problem, one, held, between <= OLDEST * problem.rate))
     return tuple(seen)
+
+
+def liveliest(record: Record) -> Record:
+    """Return the :data:`PART` samples in which OP moves most; all of a shorter record."""
+    if len(record) <= PART:
+        return record
+    begin = liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
+    return record.part(begin, begin + PART)
+
+
+def samples_between_reports(record: Record) -> float:
+    """Return the mean number of samples from one report of PV to the next, 1 or more.
+
+    A sample is none where PV stays as it is or goes on along a straight line, as historians hold
+    or draw it; of several outputs the one reported most often counts.
+    """
+    bends = np.abs(np.diff(record.pv, 2, axis=0)) > STRAIGHT * np.ptp(record.pv, axis=0)
+    return float(len(record) / max(bends.sum(axis=0).max(initial=0), 1))
 
 
 def _heads(problem: Problem, found: Found) -> list[Candidate]:
     """Return the candidates of one rate that are worth a trial at the others."""
-    limits = enumerate(problem.limit)
-    return [one for j, limit in limits for one in heads(found, j, SEEDS, APART * float(limit))]
+    return [one for j in range(len(problem.op)) for one in heads(found, j, SEEDS, APART)]
 
 
 def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
-        return Agreement(seen[0], seen[0].accepted[valve].gain, True)
-    pairs = []
-    for two in itertools.pairwise(seen):
+        return Agreement(seen[0], seen[0].accepted[valve].gain, seen[0].covers(valve))
+    say, pairs = _with_a_say(seen, valve), []
+    for k, two in enumerate(itertools.pairwise(seen)):
         held = [look.accepted[valve] for look in two]
         low, high = max(one.band[0] for one in held), min(one.band[1] for one in held)
         gains = [one.gain for one in held]
-        pairs.append(Agreement(two[gains.index(max(gains))], min(gains), low <= ALIKE * high))
+        alike = low <= ALIKE * high and say[k] and say[k + 1]
+        pairs.append(Agreement(two[gains.index(max(gains))], min(gains), alike))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
+
+
+def _with_a_say(seen: tuple[Look, ...], valve: int) -> list[bool]:
+    """Return which rates count: those that cover the process, and those that such confirm."""
+    covers = [look.covers(valve) for look in seen]
+    finds = [look.accepted[valve].gain > PRICE for look in seen]
+    return [covers[k] or (all(finds[k + 1 :]) and any(covers[k + 1 :])) for k in range(len(seen))]

@@ -14,7 +14,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 DECAYS = (0.6, 0.75, 0.85, 0.92, 0.96, 0.98)  # per tap: a time constant of 2 to 50 taps
 SIZES = (1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of σ²; per standard deviation of the stem
@@ -32,22 +32,26 @@ class ResponsePrior:
     decay: int = 3
     size: int = 2
 
-    def variances(self, taps: int) -> FloatArray:
-        """Return the variances of the differences g over σ², shape (taps,)."""
-        decay, size = DECAYS[self.decay], SIZES[self.size]
-        powers = size * decay ** np.arange(1, taps + 1)
-        return np.append(powers[:-1] * (1.0 - decay), powers[-1])
+    def variances(self, edges: IntArray) -> FloatArray:
+        """Return the variances of the differences g over σ², shape (r,).
 
-    def precision(self, taps: int) -> FloatArray:
-        """Return the inverse of K, shape (taps, taps)."""
-        weights = 1.0 / self.variances(taps)
+        Args:
+            edges: of groups of taps, each as high as its middle one, shape (r + 1,).
+        """
+        middles = 0.5 * (edges[:-1] + 1 + edges[1:])
+        powers = SIZES[self.size] * DECAYS[self.decay] ** middles
+        return np.append(powers[:-1] - powers[1:], powers[-1])
+
+    def precision(self, edges: IntArray) -> FloatArray:
+        """Return the inverse of K, shape (r, r)."""
+        weights = 1.0 / self.variances(edges)
         found = np.diag(weights + np.append(0.0, weights[:-1]))
         found -= np.diag(weights[:-1], 1) + np.diag(weights[:-1], -1)
         return found
 
-    def log_determinant(self, taps: int) -> float:
+    def log_determinant(self, edges: IntArray) -> float:
         """Return log det K."""
-        return float(np.log(self.variances(taps)).sum())
+        return float(np.log(self.variances(edges)).sum())
 
     def neighbours(self) -> list[ResponsePrior]:
         """Return the members next to this one, itself included."""

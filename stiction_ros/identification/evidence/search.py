@@ -7,58 +7,50 @@ nothing is accepted that is worse than what is known, and everything that was fi
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+import enum
+from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.output_fit import (
-    OutputFit,
-    Whitened,
-    fit_output,
-    follow,
-    white,
+from stiction_ros.identification.evidence.candidate import (
+    Candidate,
+    candidates_apart,
+    ideal,
+    losses,
+    rows_apart,
 )
-from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.friction_grid import coarse_grid, cross_grid, finer_grid
-from stiction_ros.identification.scan_kernels import best_apart
+from stiction_ros.identification.evidence.growing import grown
+from stiction_ros.identification.evidence.output_fit import OutputFit, fit_output, follow, white
+from stiction_ros.identification.evidence.problem import LIMIT, Problem
+from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, finer_grid
 
 SEEDS = 6  # frictions taken from one look at the whole triangle
-APART = 0.03  # of the limit, by which they differ
-MEMORIES = (0.0, 0.95)  # noise under which the triangle is looked at, beside that of the best
+APART = 0.03  # of the span of OP, by which they differ
+DRIFT = 0.95
+"""Of the noise 1 / (1 − .95 q⁻¹), under which PV is judged by its changes: the friction-free fit
+takes what a friction leaves for noise, and under that noise all frictions look alike."""
+NEAR = 0.01  # by which seeds from elsewhere differ
 HEADS = 3  # candidates that are polished
-STEP = 0.03  # of the limit: first step of the polish
+STEP = 0.03  # of the span: first step of the polish
 FINEST = 1e-4
 SHRINK = 2.5
-LINES = 100  # steps along J and S over the limit
+LINES = 100  # steps along J and S over the span
 BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of a stem, shares of f_S away from OP
 THINNED = 3  # rows of the grid of which one is tried with these
 STARTS = 41  # beginnings of a head
-MOVES = 6  # of the stem, fewest of a candidate
-GAIN = 0.5  # of the loss: a sweep over the valves that gains less is the last
-SWEEPS = 3
+OFF = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # steps of a beginning, with those of friction
+GAIN = 10.0  # of the loss: a friction that gains less is none to search another valve's beside
+BETTER = 0.5  # of the loss: a seed from elsewhere that gains less is not polished
+SWEEPS = 3  # searches of a valve, at most
 
 
-@dataclasses.dataclass(frozen=True)
-class Candidate:
-    """Frictions of all valves, and every output under them.
+class Provider(enum.StrEnum):
+    """Where frictions come from that are polished."""
 
-    Attributes:
-        friction: rows (f_S, f_D), %, shape (m, 2).
-        starts: stem before the first sample minus the first OP, %, shape (m,).
-        stems: scaled, shape (m, n).
-        fits: one per output.
-    """
-
-    friction: FloatArray
-    starts: FloatArray
-    stems: FloatArray
-    fits: tuple[OutputFit, ...]
-
-    @property
-    def loss(self) -> float:
-        """Sum over the outputs."""
-        return float(sum(fit.loss for fit in self.fits))
+    GROWING = "growing"  # beginnings of the record as it is, under drifting noise
+    TRIANGLE = "triangle"  # a grid, also of it as it is, under the noise of the friction-free fit
+    DRIFTING = "drifting"  # the same grid at slower rates, under drifting noise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +75,6 @@ class _Valve:
 
     def __init__(self, problem: Problem, base: Candidate, valve: int) -> None:
         self.problem, self.base, self.valve = problem, base, valve
-        self.limit = float(problem.limit[valve])
         self.met: list[Candidate] = []
         self._keys: set[tuple[float, ...]] = set()
 
@@ -109,39 +100,50 @@ class _Valve:
 
     def look(self, fits: Sequence[OutputFit]) -> None:
         """Take the best of the whole triangle under the noise of ``fits``."""
-        grid = coarse_grid(self.limit)
+        grid = coarse_grid(LIMIT)
         rows = [np.column_stack([grid, np.zeros(len(grid))])]
         for share in BEGINNINGS:
             away = grid[::THINNED]
             rows.append(np.column_stack([away, share * away[:, 0]]))
-        self._take(np.vstack(rows), fits, SEEDS, APART * self.limit)
+        self._take(np.vstack(rows), fits, SEEDS, APART)
+
+    def grow(self, fits: Sequence[OutputFit]) -> None:
+        """Take the best of what is found on growing beginnings of the record."""
+        rows, found = grown(self.problem, self.base, self.valve, fits, BEGINNINGS)
+        for i in rows_apart(rows[:, :2], found, SEEDS, APART):
+            self.add(rows[i], fits, whole=False)
 
     def heads(self, count: int, distance: float) -> list[Candidate]:
         """Return the best that was met, frictions apart."""
         met = sorted(self.met, key=lambda one: one.loss)
-        return _candidates_apart(met, self.valve, count, distance)
+        return candidates_apart(met, self.valve, count, distance)
 
     def settle(self) -> None:
         """Fit the heads until nothing changes, once more from the noise of the best."""
-        for head in self.heads(HEADS, APART * self.limit):
+        for head in self.heads(HEADS, APART):
             self.add(self.row_of(head), head.fits, whole=True)
 
     def polish(self) -> None:
         """Look closer and closer round the heads, and along the lines through them."""
-        step = STEP * self.limit
+        step = STEP
         for head in self.heads(HEADS, step):
-            self._near(self._lines(head), head, 2, step)
+            self._take(self._lines(head), head.fits, 2, step)
             self._begin(head)
-        while step > FINEST * self.limit:
-            for head in self.heads(HEADS if step > 0.1 * STEP * self.limit else 1, step):
+        while step > FINEST:
+            for head in self.heads(HEADS if step > 0.1 * STEP else 1, step):
                 centre = head.friction[self.valve][None, :]
-                self._near(finer_grid(centre, step / 3.0, self.limit), head, 2, step / 3.0)
+                self._near(finer_grid(centre, step / 3.0, LIMIT), head, 2, step / 3.0)
             step /= SHRINK
         self._begin(self.heads(1, 0.0)[0])
 
     def _near(self, grid: FloatArray, head: Candidate, count: int, distance: float) -> None:
-        start = np.full(len(grid), head.starts[self.valve])
-        self._take(np.column_stack([grid, start]), head.fits, count, distance)
+        friction, start = head.friction[self.valve], head.starts[self.valve]
+        starts = np.clip(start + distance * OFF, -friction[0], friction[0])
+        rows = [
+            np.column_stack([grid, np.full(len(grid), start)]),
+            np.column_stack([np.tile(friction, (len(OFF), 1)), starts]),
+        ]
+        self._take(np.vstack(rows), head.fits, count, distance)
 
     def _begin(self, head: Candidate) -> None:
         """Try where the stem may have been before the first sample: wherever it had stayed."""
@@ -154,79 +156,63 @@ class _Valve:
         self, rows: FloatArray, fits: Sequence[OutputFit], count: int, distance: float
     ) -> None:
         found = losses(self.problem, self.base, self.valve, rows, fits)
-        for i in _apart(rows[:, :2], found, count, distance):
+        for i in rows_apart(rows[:, :2], found, count, distance):
             self.add(rows[i], fits, whole=False)
 
     def _lines(self, head: Candidate) -> FloatArray:
-        static, dynamic = head.friction[self.valve]
+        """Return rows of the same J or S, with the stem's beginning and with its first slip kept.
+
+        Slips that alternate tell S alone; what J is decides the first one, and with it the rest.
+        """
+        (static, dynamic), start = head.friction[self.valve], head.starts[self.valve]
         jump, band = np.array([static - dynamic]), np.array([static + dynamic])
-        return cross_grid(jump, band, self.limit, LINES)
+        lines = cross_grid(jump, band, LIMIT, LINES)
+        more = lines[:, 0] - static  # f_S: a slip upwards keeps f_S + start, one downwards less
+        starts = np.concatenate([np.full(len(lines), start), start - more, start + more])
+        rows = np.column_stack([np.tile(lines, (3, 1)), starts])
+        return np.asarray(rows[np.abs(starts) <= rows[:, 0]])
 
 
-def losses(
-    problem: Problem, beside: Candidate, valve: int, rows: FloatArray, fits: Sequence[OutputFit]
-) -> FloatArray:
-    """Return the loss of many frictions of one valve, infinite where it hardly moves, shape (G,).
-
-    Args:
-        problem: the record.
-        beside: whose other valves are kept.
-        valve: index.
-        rows: (f_S, f_D, start), %, shape (G, 3).
-        fits: whose noise and prior are taken.
-    """
-    stems = problem.stems(valve, rows[:, :2], rows[:, 2])
-    others = np.delete(beside.stems, valve, axis=0)
-    total = np.zeros(len(rows))
-    for i, fit in enumerate(fits):
-        total += Whitened.of(problem, i, others, fit.noise).under(fit.prior).losses(stems)
-    moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
-    return np.where(moves < MOVES, np.inf, total)
-
-
-def _apart(places: FloatArray, found: FloatArray, count: int, distance: float) -> list[int]:
-    """Return the best of ``places``; what lies just at the distance, as in a grid, is too near."""
-    beyond = float(np.nextafter(distance, np.inf))
-    return [int(i) for i in best_apart(places, found, count, beyond)]
-
-
-def ideal(problem: Problem, starts: Iterable[Sequence[OutputFit]] = ()) -> Candidate:
-    """Return the best fit without friction, from white noise and from ``starts``."""
-    stems = problem.ideal_stems()
-    begun: list[list[OutputFit | None]] = [[None] for _ in problem.pv]
-    for fits in starts:
-        for row, fit in zip(begun, fits, strict=True):
-            row.append(fit)
-    fits = tuple(fit_output(problem, i, stems, row) for i, row in enumerate(begun))
-    return Candidate(np.zeros((len(stems), 2)), np.zeros(len(stems)), stems, fits)
-
-
-def search_valve(problem: Problem, base: Candidate, valve: int) -> list[Candidate]:
+def search_valve(
+    problem: Problem, base: Candidate, valve: int, providers: Sequence[Provider] = tuple(Provider)
+) -> list[Candidate]:
     """Return all candidates met in a search over the friction of one valve, best first."""
     looked = _Valve(problem, base, valve)
-    looked.look(base.fits)
-    for memory in MEMORIES:
-        looked.look([white(problem, i, base.stems, memory) for i in range(len(base.fits))])
+    drifting = [white(problem, i, base.stems, DRIFT) for i in range(len(base.fits))]
+    slower = problem.rate > 1
+    if Provider.GROWING in providers and not slower:
+        looked.grow(drifting)
+    if Provider.TRIANGLE in providers and not slower:
+        looked.look(base.fits)
+    if Provider.DRIFTING in providers and slower:
+        looked.look(drifting)
     if looked.met:
         looked.settle()
-        looked.look(looked.heads(1, 0.0)[0].fits)
         looked.polish()
         looked.settle()
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 
-def search(problem: Problem) -> Found:
-    """Search the frictions of all valves, one after the other, until nothing changes."""
+def search(problem: Problem, providers: Sequence[Provider] = tuple(Provider)) -> Found:
+    """Search the frictions of all valves, each anew when that of another has changed.
+
+    Args:
+        problem: the record.
+        providers: of seeds.
+    """
     without = ideal(problem)
     met, best = [without], without
-    for _ in range(SWEEPS if len(problem.op) > 1 else 1):
-        before = best.loss
-        for valve in range(len(problem.op)):
-            found = search_valve(problem, best, valve)
-            met += found
-            best = found[0]
-        if best.loss > before - GAIN:
+    due = list(range(len(problem.op)))
+    for _ in range(SWEEPS * len(problem.op)):
+        if not due:
             break
+        valve = due.pop(0)
+        found = search_valve(problem, best, valve, providers)
+        met += found
+        if found[0].loss < best.loss - GAIN:
+            best = found[0]
+            others = (j for j in range(len(problem.op)) if j != valve and j not in due)
+            due += others
     return _concluded(problem, met)
 
 
@@ -241,9 +227,11 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
     met, best = list(found.met), found.best
     for valve in range(len(problem.op)):
         tried = _Valve(problem, best, valve)
-        for seed in seeds:
-            tried.add(tried.row_of(seed), best.fits, whole=True)
-        if min((one.loss for one in tried.met), default=np.inf) < best.loss - GAIN:
+        rubbing = [seed for seed in seeds if seed.friction[valve, 0] > 0.0]
+        for seed in candidates_apart(rubbing, valve, SEEDS, NEAR):
+            tried.add(tried.row_of(seed), best.fits, whole=False)
+        tried.settle()
+        if min((one.loss for one in tried.met), default=np.inf) < best.loss - BETTER:
             tried.polish()
             tried.settle()
         met += tried.met
@@ -252,18 +240,9 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
 
 
 def heads(found: Found, valve: int, count: int, distance: float) -> list[Candidate]:
-    """Return the best candidates with friction of a valve, apart by ``distance``, %."""
+    """Return the best candidates with friction of a valve, apart by ``distance``."""
     met = [one for one in found.met if one.friction[valve, 0] > 0.0]
-    return _candidates_apart(met, valve, count, distance)
-
-
-def _candidates_apart(
-    met: Sequence[Candidate], valve: int, count: int, distance: float
-) -> list[Candidate]:
-    """Return the first of ``met``, best first, whose frictions of a valve are apart."""
-    places = np.array([one.friction[valve] for one in met]).reshape(-1, 2)
-    ranks = np.arange(len(met), dtype=float)
-    return [met[i] for i in _apart(places, ranks, count, distance)]
+    return candidates_apart(met, valve, count, distance)
 
 
 def _concluded(problem: Problem, met: list[Candidate]) -> Found:

@@ -20,7 +20,7 @@ from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.tables.block import Key
 from stiction_ros.intake.tables.clock import TimeColumn, time_column
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
+from stiction_ros.records.csv.names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
 OPTIONS = {"op": "--op TAG=COLUMN", "pv": "--pv TAG=COLUMN", "sp": "--sp TAG=COLUMN"}
 
@@ -113,10 +113,9 @@ def _one_loop(sheet: Sheet, columns: CsvColumns) -> Plan:
     for signal, mapping in (("op", op), ("pv", pv), ("sp", sp), ("stem", stem)):
         for tag, column in (mapping or {}).items():
             chosen[Key(signal, tag)] = sheet.column(column, f"--{signal} TAG=COLUMN")
-    if not written:
-        mode = sheet.find(_usual(sheet, "mode"))
-        if mode is not None and mode not in chosen.values() and mode != time.place:
-            chosen[Key("mode", "")] = mode
+    mode = sheet.find(_usual(sheet, "mode"))
+    if mode is not None and mode not in chosen.values() and mode != time.place:
+        chosen[Key("mode", "")] = mode
     named = bool(columns.op and columns.pv) or bool(written)
     quality, whole = _qualities(sheet, set(chosen.values()))
     return Plan(Shape.ONE, time, {sheet.name: chosen}, quality, whole, named=named)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import datetime
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.intake.modes import AUTOMATIC
+from stiction_ros.opcua.loop_bridge import mode_text
 from stiction_ros.opcua.reading import TagQuality, TagReading
 from stiction_ros.opcua.sampling import JITTER
 from stiction_ros.opcua.security import Credentials
@@ -94,8 +97,8 @@ class HistoryFile:
         self._done.touch()
 
     def append(self, readings: list[TagReading]) -> None:
-        """Add a page."""
-        lines = [f"{one.stamp},{one.number!r},{int(one.quality)}\n" for one in readings]
+        """Add a page; a text stands there in quotes."""
+        lines = [f"{one.stamp},{_shown(one)},{int(one.quality)}\n" for one in readings]
         with self.path.open("a", encoding="utf-8") as file:
             file.write("".join(lines))
 
@@ -103,16 +106,38 @@ class HistoryFile:
         """Return what there is; of equal stamps the last."""
         found: dict[int, float] = {}
         for line in self.path.read_text(encoding="utf-8").splitlines()[1:]:
-            stamp, value, quality = line.split(",")
-            found[int(stamp)] = float(value) if int(quality) == TagQuality.GOOD else float("nan")
+            stamp, value, quality = _parts(line)
+            good = quality == TagQuality.GOOD and not value.startswith('"')
+            found[stamp] = float(value) if good else float("nan")
         stamps = np.array(sorted(found), dtype=np.int64)
         return TagHistory(stamps, np.array([found[int(stamp)] for stamp in stamps], dtype=float))
+
+    def read_modes(self) -> tuple[np.ndarray[Any, np.dtype[np.int64]], list[str]]:
+        """Return stamps, ns, and modes as text; those of bad quality are left out."""
+        found: dict[int, str] = {}
+        for line in self.path.read_text(encoding="utf-8").splitlines()[1:]:
+            stamp, value, quality = _parts(line)
+            if quality == TagQuality.GOOD:
+                found[stamp] = mode_text(json.loads(value) if value[0] == '"' else float(value))
+        stamps = sorted(found)
+        return np.array(stamps, dtype=np.int64), [found[stamp] for stamp in stamps]
 
     @property
     def last(self) -> int | None:
         """Stamp of the last value, ns; None before the first."""
         lines = self.path.read_text(encoding="utf-8").splitlines()[1:]
         return int(lines[-1].split(",")[0]) if lines else None
+
+
+def _shown(reading: TagReading) -> str:
+    return json.dumps(reading.value) if isinstance(reading.value, str) else repr(reading.number)
+
+
+def _parts(line: str) -> tuple[int, str, int]:
+    """Return stamp, value as it stands there, and quality of a line."""
+    stamp, _, rest = line.partition(",")
+    value, _, quality = rest.rpartition(",")
+    return int(stamp), value, int(quality)
 
 
 def fetch(
@@ -254,6 +279,27 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
         start=first / 1e9,
         mask=mask,
     )
+
+
+def modes_of(tags: LoopTags, files: dict[str, HistoryFile], record: Record) -> list[str] | None:
+    """Return the mode of the loop at each sample, empty where it is not known.
+
+    That of a loop with several valves is the first that is not automatic. None when the map
+    names none.
+    """
+    grid = np.rint((record.start + record.time) * 1e9).astype(np.int64) + tags.step // JITTER
+    found: list[list[str]] = []
+    for valve in tags.valves:
+        if valve.mode:
+            stamps, words = files[valve.mode].read_modes()
+            rows = np.searchsorted(stamps, grid, side="right") - 1
+            found.append([words[row] if row >= 0 else "" for row in rows.tolist()])
+    if not found:
+        return None
+    return [
+        next((w for w in words if not AUTOMATIC.fullmatch(w)), words[0])
+        for words in zip(*found, strict=True)
+    ]
 
 
 def _moment(stamp: int) -> datetime.datetime:

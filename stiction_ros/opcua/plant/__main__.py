@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import os
 import signal
 import sys
@@ -11,9 +12,11 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import numpy as np
+
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, PiTuning, SetPoints
-from stiction_ros.loop.reading import Section, load_yaml
+from stiction_ros.loop.yaml.reading import Section, load_yaml
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.plant.control_system import ControlSystem, Tunings
 from stiction_ros.opcua.security import check_secret_file
@@ -39,6 +42,9 @@ async def _serve(path: Path) -> None:
     check_secret_file(path)  # it holds the passwords
     top = Section(load_yaml(path), str(path))
     model = LoopModel.load(top.text("model"))
+    if "out" in top:  # the OPs that were in force when the controllers stopped
+        start = np.array(top.numbers("out", [], count=len(model.valves)))
+        model = dataclasses.replace(model, stem_start=start)
     schedule = None
     if "set_points" in top:
         schedule = SetPoints.load(top.text("set_points"), model.outputs)

@@ -49,7 +49,7 @@ class ControlSystem:
         self.mode = AUTO
         self.alarm = ""
         self.request = False
-        self._took_over = False
+        self._took_over = True
         self._beat: float | None = None
         self._beat_at = float("-inf")
 

@@ -22,7 +22,7 @@ from asyncua.crypto.truststore import TrustStore
 from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
 
 from stiction_ros.opcua.plant.control_system import ControlSystem
-from stiction_ros.opcua.plant.tags import NAMESPACE, SERVER_URI, PlantTags
+from stiction_ros.opcua.plant.tags import NAMESPACE, REMOTE_USE, SERVER_URI, PlantTags
 from stiction_ros.opcua.session import EPOCH
 
 PAGE = 5000  # values of history in one answer
@@ -134,8 +134,6 @@ class PlantServer:
             if tag.writers:
                 await made.set_writable()
             self._nodes[tag.name], self._names[node] = node, tag.name
-            if settings.history and tag.history:
-                await server.historize_node_data_change(made, None, 0)
         if settings.history:
             server.iserver.history_manager.storage.max_history_data_response_size = PAGE
         server.subscribe_server_callback(CallbackType.PreRead, self._before_read)
@@ -147,6 +145,7 @@ class PlantServer:
     async def _scan_until(self, stop: asyncio.Event) -> None:
         self._tick_at = time.monotonic()
         await self._show()
+        await self._keep_history()
         due = self._tick_at + self._period
         while not stop.is_set():
             await self._rest(due - self._period / 2, stop)
@@ -159,6 +158,14 @@ class PlantServer:
             await self._show()
             missed = max(int((now - due) / self._period), 0)
             due += (missed + 1) * self._period
+
+    async def _keep_history(self) -> None:
+        """Keep what comes from now on: before it the tags had values that nobody measured."""
+        if self.settings.history:
+            for tag in self.tags.all:
+                if tag.history:
+                    node = self._server.get_node(self._nodes[tag.name])
+                    await self._server.historize_node_data_change(node, None, 0)
 
     async def _burst(self, count: int) -> None:
         """Let each PV change ``count`` times more within the sample that ends."""
@@ -243,7 +250,8 @@ class PlantServer:
         account = self.settings.accounts[event.user.name]
         for name in written:
             tag = self.tags.by_name.get(name)
-            if tag is None or not tag.writers & account.writes:
+            taken = self._faults["FAULT.RIGHTS"] and tag is not None and REMOTE_USE in tag.writers
+            if tag is None or taken or not tag.writers & account.writes:
                 self._note("denied", tag=name, user=event.user.name)
                 raise ServiceError(ua.StatusCodes.BadUserAccessDenied)
         self.system.watch(time.monotonic())

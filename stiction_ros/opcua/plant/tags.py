@@ -38,7 +38,8 @@ class PlantTags:
     Attributes:
         pv, sp, out, mode, remote: names by controller; ``remote`` is the remote OP.
         faults: by which tests disturb the server: bad quality of PV, stamps s in the past, the
-            heartbeat standing still, s that answers take, extra changes of PV a sample.
+            heartbeat standing still, s that answers take, extra changes of PV a sample, no
+            rights of the remote user.
         all, by_name: every tag.
     """
 
@@ -48,7 +49,8 @@ class PlantTags:
         self.pv, self.sp, self.out, self.mode, self.remote = (
             [f"{name}.{key}" for name in names] for key in ("PV", "SP", "OUT", "MODE", "ROUT_IN")
         )
-        self.faults = ("FAULT.QUALITY", "FAULT.PAST", "FAULT.ALIVE", "FAULT.DELAY", "FAULT.BURST")
+        kinds = ("QUALITY", "PAST", "ALIVE", "DELAY", "BURST", "RIGHTS")
+        self.faults = tuple(f"FAULT.{kind}" for kind in kinds)
         remote = frozenset({REMOTE_USE})
         found = [PlantTag(name, "Double", 0.0, history=True) for name in (*self.pv, *self.sp)]
         found += [PlantTag(name, "Double", 0.0, history=True) for name in self.out]

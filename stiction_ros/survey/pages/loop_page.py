@@ -74,6 +74,7 @@ def loop_page(
         f'<p class="soft">{text(_span(record))}</p>',
         f'<p class="note warn">The fit is not to be trusted: {text(reason)}</p>' if reason else "",
         f"<p>{text(sentence)}</p>" if sentence else "",
+        *[f"<p>{text(valve.experiment)}</p>" for valve in found.valves if valve.experiment],
         f'<div class="cards">{"".join(cards)}</div>',
         TREND,
         gain_table(gain, unit),
@@ -105,8 +106,15 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str) -> str:
     if gain is None:
         return ""
     of_pv = f", {unit}" if unit else ""
-    head = ("", f"amplitude{of_pv}", f"IAE per hour{of_pv}", "travel %/h", "reversals/h", "")
-    keys = ("amplitude", "iae_per_hour", "travel_per_hour", "reversals_per_hour")
+    work = ("travel %/h", "moves/h", "reversals/h")
+    head = ("", f"amplitude{of_pv}", f"IAE per hour{of_pv}", *work, "")
+    keys = (
+        "amplitude",
+        "iae_per_hour",
+        "travel_per_hour",
+        "moves_per_hour",
+        "reversals_per_hour",
+    )
     rows = [_gain_row("now", gain["now"], head, keys, "")]
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects import FloatArray, HeStiction
-from stiction_ros.identification.results import (
+from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
     OutputModel,

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_loops import Kind, Known, changed, known
 
-from stiction_ros.identification.closed_loop.cause import Cause, CauseKind
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.results import Identification
+from stiction_ros.identification.result.cause import Cause, CauseKind
+from stiction_ros.identification.result.identification import Identification
 
 
 def wave(shape: str, period: float, samples: int = 900) -> np.ndarray:

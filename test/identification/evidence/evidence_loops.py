@@ -41,3 +41,18 @@ def pi_loop(
             stem = op[k] - np.sign(op[k] - stem) * dynamic
         stems[k] = stem
     return Record("loop", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None], sp=sp[:, None])
+
+
+def slow_loop(*, seed: int = 0, samples: int = 2400) -> Record:
+    """Return a process with a time constant of 100 samples under PI control, no friction."""
+    random = np.random.default_rng(seed)
+    sp = 2.0 * (np.arange(samples) // 300 % 2)
+    op, pv = np.zeros(samples), np.zeros(samples)
+    y, u, last = 0.0, 0.0, 0.0
+    for k in range(samples):
+        y = 0.99 * y + 0.01 * u
+        pv[k] = y + 0.05 * random.standard_normal()
+        error = sp[k] - pv[k]
+        op[k] = u = u + 3.0 * (error - last + error / 60.0)
+        last = error
+    return Record("slow", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None], sp=sp[:, None])

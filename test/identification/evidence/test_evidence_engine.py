@@ -7,13 +7,19 @@ from evidence_loops import pi_loop
 
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
 from stiction_ros.identification.evidence.engine import doubted
-from stiction_ros.identification.results import ValveEstimate
+from stiction_ros.identification.result.identification import ValveEstimate
 
 
 def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:
     found = identify(pi_loop(3.0, 1.0), IdentificationOptions(method="evidence"))
     valve, output = found.valves[0], found.outputs[0]
     assert found.method == "evidence"
+    assert found.to_json()["rate"] == {"sample_time": 1.0, "used": valve.evidence["rate"]}
+    assert valve.stability is not None
+    assert [look.name for look in valve.stability.tried] == [
+        *("rows of 1 s", "rows of 2 s", "rows of 4 s", "first half", "second half")
+    ]
+    assert valve.stability.share == 1.0
     assert valve.verdict is VerdictKind.STICKY
     assert valve.static_interval[0] <= 3.0 <= valve.static_interval[1]
     assert valve.dynamic_interval[0] <= 1.0 <= valve.dynamic_interval[1]
@@ -85,3 +91,10 @@ def test_the_loop_takes_back_what_a_wave_or_an_idle_friction_explains(
     found = doubted(valve)
     assert found.verdict is verdict
     assert found.static_interval[0] == (2.5 if verdict is VerdictKind.STICKY else 0.0)
+    play = doubted(dataclasses.replace(valve, verdict=VerdictKind.BACKLASH))
+    taken_back = verdict is VerdictKind.UNDECIDED
+    assert play.verdict is (VerdictKind.UNDECIDED if taken_back else VerdictKind.BACKLASH)
+    assert play.static_interval == found.static_interval
+    for kind in (VerdictKind.HEALTHY, VerdictKind.UNDECIDED):
+        other = dataclasses.replace(valve, verdict=kind)
+        assert doubted(other) == other

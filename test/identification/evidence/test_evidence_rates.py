@@ -4,14 +4,22 @@ import dataclasses
 
 import numpy as np
 import pytest
-from evidence_loops import pi_loop
+from evidence_loops import pi_loop, slow_loop
 
-from stiction_ros.identification import IdentificationOptions
+from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.identification.evidence.accepted import Accepted
 from stiction_ros.identification.evidence.engine import PRICE
 from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.rates import ALIKE, Agreement, Look, agreement, looks
-from stiction_ros.identification.evidence.search import search
+from stiction_ros.identification.evidence.rates import (
+    ALIKE,
+    UNDIED,
+    Agreement,
+    Look,
+    agreement,
+    looks,
+    samples_between_reports,
+)
+from stiction_ros.identification.evidence.search import search, search_again
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +32,17 @@ def changed(seen: tuple[Look, ...], *told: tuple[float, float, float]) -> tuple[
     out = []
     for look, (gain, low, high) in zip(seen, told, strict=False):
         held = dataclasses.replace(look.accepted[0], gain=gain, band=(low, high))
-        out.append(dataclasses.replace(look, accepted=(held,)))
+        out.append(ending(dataclasses.replace(look, accepted=(held,)), 0.0))
     return tuple(out)
+
+
+def ending(look: Look, share: float) -> Look:
+    """Return a look whose friction-free responses end with ``share`` of their largest tap."""
+    none = look.found.without[0]
+    taps = np.append(np.ones(none.fits[0].responses.shape[1] - 1), share)[None, :]
+    fits = tuple(dataclasses.replace(fit, responses=taps) for fit in none.fits)
+    without = (dataclasses.replace(none, fits=fits),)
+    return dataclasses.replace(look, found=dataclasses.replace(look.found, without=without))
 
 
 def rate_of(found: Agreement) -> int:
@@ -34,23 +51,44 @@ def rate_of(found: Agreement) -> int:
 
 def test_there_is_a_look_for_each_rate_that_leaves_rows_enough(seen: tuple[Look, ...]) -> None:
     assert [look.problem.rate for look in seen] == [1, 2, 4]
-    held = [look.accepted[0] for look in seen]
+    held = [look.accepted[0].times(float(look.problem.span[0])) for look in seen]
     assert all(one.gain > 50.0 for one in held)
     assert [one.band for one in held] == [pytest.approx((4.0, 4.0), abs=0.1)] * 3
 
 
-def test_rates_hand_each_other_what_they_found() -> None:
-    record = pi_loop(3.0, 1.0, samples=1600, noise=0.1)
-    options = IdentificationOptions()
-    alone = search(Problem.of(record)).best
-    (first, *_) = looks(record, options)
-    assert first.found.best.loss < alone.loss - 100.0
-    assert first.found.best.friction[0] == pytest.approx([3.0, 1.0], abs=0.1)
+def test_what_is_best_at_one_rate_is_tried_at_the_others() -> None:
+    problem = Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1))
+    poor = search(problem, ())  # nothing but the friction-free fit
+    slow = search(Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1), rate=2))
+    better = search_again(problem, poor, [slow.best])
+    assert better.best.loss < poor.best.loss - 100.0
+    assert better.best.friction[0] * problem.span[0] == pytest.approx([3.0, 1.0], abs=0.1)
 
 
 def test_the_pair_with_the_larger_lesser_gain_is_taken(seen: tuple[Look, ...]) -> None:
     found = agreement(changed(seen, (2.0, 1.0, 2.0), (40.0, 1.0, 2.0), (30.0, 1.0, 2.0)), 0)
     assert (found.gain, found.alike, rate_of(found)) == (30.0, True, 2)
+
+
+def test_a_rate_that_does_not_see_the_end_of_a_response_needs_coarser_ones_that_do(
+    seen: tuple[Look, ...],
+) -> None:
+    looks_of = changed(seen, (90.0, 1.0, 2.0), (40.0, 1.0, 2.0), (30.0, 1.0, 2.0))
+    first, second, third = looks_of
+    (silent,) = changed(seen[2:], (0.5 * PRICE, 1.0, 2.0))
+    assert agreement((first, second), 0).alike
+    assert agreement((ending(first, 0.99 * UNDIED), second), 0).alike
+    beyond = ending(first, 1.01 * UNDIED), ending(second, -1.01 * UNDIED)
+    assert agreement((*beyond, third), 0).alike
+    assert not agreement((*beyond, silent), 0).alike
+    assert not agreement((*beyond, ending(third, 1.0)), 0).alike
+    assert not agreement((ending(first, 1.0),), 0).alike
+
+
+def test_a_slow_process_without_friction_is_not_called_sticky() -> None:
+    """Its response of 100 samples outlasts the taps of three rates."""
+    answer = identify(slow_loop())
+    assert not answer.valves[0].verdict.has_friction
 
 
 def test_one_rate_alone_shows_nothing(seen: tuple[Look, ...]) -> None:
@@ -91,3 +129,14 @@ def test_what_a_valve_gains_is_told_beside_the_friction_of_the_others() -> None:
 def test_gains_are_none_below_what_stands_without(seen: tuple[Look, ...]) -> None:
     held: Accepted = seen[0].accepted[0]
     assert held.gain == pytest.approx(seen[0].found.ideal.loss - seen[0].found.best.loss)
+
+
+@pytest.mark.parametrize("every", [1, 2, 5])
+def test_reports_are_counted_whether_held_or_drawn(every: int) -> None:
+    record = pi_loop(3.0, 1.0, samples=1000, noise=0.1)
+    rows = np.arange(1000)
+    held = record.pv[rows - rows % every]
+    drawn = np.interp(rows, rows[::every], record.pv[::every, 0])[:, None]
+    for pv, bends in ((drawn, 1.0), (held, 2.0 if every > 1 else 1.0)):
+        between = samples_between_reports(dataclasses.replace(record, pv=pv))
+        assert between * bends == pytest.approx(every, rel=0.1)

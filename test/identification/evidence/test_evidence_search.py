@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from stiction_ros.identification.evidence.accepted import accepted
 from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.search import Found, search
-from stiction_ros.identification.scan_kernels import best_apart
+from stiction_ros.identification.evidence.search import Found, Provider, search
+from stiction_ros.identification.kernels.scan import best_apart
 
 STATIC, DYNAMIC = 3.0, 1.0
 
@@ -27,21 +27,24 @@ def found(problem: Problem) -> Found:
 
 
 def test_stems_are_those_of_the_law(problem: Problem) -> None:
-    stem = problem.stems(0, np.array([[STATIC, DYNAMIC]]), 0.0)[0] * problem.scale[0]
-    assert stem == pytest.approx(he(problem.op[0], STATIC, DYNAMIC), abs=1e-9)
+    span = problem.span[0]
+    shares = np.array([[STATIC, DYNAMIC]]) / span
+    stem = problem.stems(0, shares, 0.0)[0] * problem.scale[0] * span
+    assert stem == pytest.approx(he(problem.op[0] * span, STATIC, DYNAMIC), abs=1e-9)
 
 
 def test_rows_are_means_of_the_samples() -> None:
     record = pi_loop(STATIC, DYNAMIC)
     slow = Problem.of(record, rate=4)
     assert slow.rows == len(record) // 4
-    stem = slow.stems(0, np.array([[STATIC, DYNAMIC]]), 0.0)[0] * slow.scale[0]
-    fast = he(slow.op[0], STATIC, DYNAMIC)
+    shares = np.array([[STATIC, DYNAMIC]]) / slow.span[0]
+    stem = slow.stems(0, shares, 0.0)[0] * slow.scale[0] * slow.span[0]
+    fast = he(slow.op[0] * slow.span[0], STATIC, DYNAMIC)
     assert stem == pytest.approx(fast.reshape(-1, 4).mean(axis=1), abs=1e-9)
 
 
-def test_the_friction_is_found_and_beats_none_by_far(found: Found) -> None:
-    assert found.best.friction[0] == pytest.approx([STATIC, DYNAMIC], abs=0.1)
+def test_the_friction_is_found_and_beats_none_by_far(problem: Problem, found: Found) -> None:
+    assert found.best.friction[0] * problem.span[0] == pytest.approx([STATIC, DYNAMIC], abs=0.1)
     assert found.ideal.loss - found.best.loss > 100.0
 
 
@@ -68,7 +71,7 @@ def test_units_change_no_answer(op_unit: float, op_zero: float, pv_unit: float) 
         record, op=op_unit * record.op + op_zero, pv=pv_unit * record.pv - 7.0, sp=None
     )
     one, two = search(Problem.of(record)), search(Problem.of(other))
-    assert two.best.friction / abs(op_unit) == pytest.approx(one.best.friction, rel=1e-3)
+    assert two.best.friction == pytest.approx(one.best.friction, rel=1e-3)
     gains = [each.ideal.loss - each.best.loss for each in (one, two)]
     assert gains[1] == pytest.approx(gains[0], abs=0.5)
 
@@ -77,7 +80,8 @@ def test_what_is_accepted_holds_the_truth_and_grows_with_the_level(
     problem: Problem, found: Found
 ) -> None:
     wide, narrow = (accepted(problem, found, 0, level) for level in (0.999, 0.9))
-    for held in (wide, narrow):
+    for shares in (wide, narrow):
+        held = shares.times(float(problem.span[0]))
         assert held.static[0] <= STATIC <= held.static[1]
         assert held.dynamic[0] <= DYNAMIC <= held.dynamic[1]
         assert not held.none
@@ -88,3 +92,19 @@ def test_what_is_accepted_holds_the_truth_and_grows_with_the_level(
 def test_places_apart_are_the_best_first_and_none_that_is_impossible() -> None:
     places = np.array([[1.0, 0.0], [1.1, 0.0], [3.0, 0.0], [5.0, 0.0]])
     assert best_apart(places, np.array([2.0, 1.0, 3.0, np.inf]), 3, 0.5).tolist() == [1, 2]
+
+
+def test_a_needle_is_found_that_no_grid_of_the_triangle_meets() -> None:
+    clean = Problem.of(pi_loop(STATIC, DYNAMIC, samples=1600, noise=0.002))
+    grown = search(clean, (Provider.GROWING,)).best
+    assert grown.friction[0] * clean.span[0] == pytest.approx([STATIC, DYNAMIC], abs=0.02)
+
+
+def test_the_beginning_of_a_record_keeps_its_scale(problem: Problem) -> None:
+    part = problem.beginning(150)
+    assert part.rows == 150
+    assert part.pv[0] == pytest.approx(problem.pv[0, :150])
+    assert part.stems(0, np.array([[0.3, 0.1]]), 0.0)[0] == pytest.approx(
+        problem.stems(0, np.array([[0.3, 0.1]]), 0.0)[0, :150]
+    )
+    assert problem.beginning(problem.rows) is problem

@@ -11,11 +11,11 @@ from stiction_ros.identification.evidence.response_prior import DECAYS, SIZES, R
 def test_precision_is_the_inverse_of_the_kernel_that_the_docstring_names(
     decay: int, taps: int
 ) -> None:
-    prior = ResponsePrior(decay, 3)
+    prior, edges = ResponsePrior(decay, 3), np.arange(taps + 1)
     lags = np.arange(1, taps + 1)
     kernel = SIZES[3] * DECAYS[decay] ** np.maximum.outer(lags, lags)
-    assert prior.precision(taps) @ kernel == pytest.approx(np.eye(taps), abs=1e-6)
-    assert prior.log_determinant(taps) == pytest.approx(np.linalg.slogdet(kernel)[1], abs=1e-6)
+    assert prior.precision(edges) @ kernel == pytest.approx(np.eye(taps), abs=1e-6)
+    assert prior.log_determinant(edges) == pytest.approx(np.linalg.slogdet(kernel)[1], abs=1e-6)
 
 
 def test_neighbours_stay_within_the_family_and_hold_the_member_itself() -> None:

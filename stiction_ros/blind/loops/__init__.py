@@ -1,0 +1,1 @@
+"""Blind loops, and what is hidden in them."""

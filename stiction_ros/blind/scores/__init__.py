@@ -1,0 +1,1 @@
+"""What was hidden against what was said, counted."""

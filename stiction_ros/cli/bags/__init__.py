@@ -1,0 +1,1 @@
+"""Commands about bags: convert, repair, replay, report."""

@@ -1,0 +1,1 @@
+"""``stiction bench``: speed side by side, and how often answers are right."""

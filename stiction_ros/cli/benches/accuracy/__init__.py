@@ -1,0 +1,1 @@
+"""How often right: answers counted over loops whose truth is known."""

@@ -1,0 +1,399 @@
+"""``stiction bench field``: identification over loops that share nothing with it, counted."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.options import choices
+from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.runs.seeds import run_seeds
+from stiction_ros.errors import InputError
+from stiction_ros.records.parts import longest_part
+from stiction_ros.records.record import Record
+
+FIRST, LAST = 10_000, 10_099
+"""Seeds when none are given; those below 1000 are for tuning."""
+
+METHOD = "evidence"
+"""Search when none is given."""
+
+FOUND = ("sticky", "backlash")
+"""Verdicts that find friction."""
+
+MANY_SLIPS = f"{choices.MANY} slips or more"
+FEW_SLIPS = "fewer slips"
+OTHERS = "no friction"
+GROUPS = (MANY_SLIPS, FEW_SLIPS, OTHERS)
+
+REFUSED = "refused"
+"""What stands for a verdict where identification refuses the record."""
+
+VERDICTS = ("sticky", "backlash", "healthy", "undecided", REFUSED)
+
+Interval = tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """What ``identify`` says of one valve, as its JSON says it.
+
+    Attributes:
+        verdict: one of :data:`VERDICTS`.
+        f_s, f_d, band: intervals, in the record's unit of OP; None where it refuses. The band's
+            is the sum of the other two where none is given.
+        cause: of the oscillation; None where none is given.
+        seconds: processor time.
+        reason: of a refusal.
+    """
+
+    verdict: str
+    f_s: Interval | None
+    f_d: Interval | None
+    band: Interval | None
+    cause: str | None
+    seconds: float
+    reason: str = ""
+
+
+def answer_of(record: Record, find: Callable[[Record], Mapping[str, Any]]) -> Answer:
+    """Return what is said of the first valve of a record.
+
+    Args:
+        record: its longest good part is looked at, as ``stiction identify`` does.
+        find: record to the mapping of ``identify --json``.
+    """
+    begun = time.process_time()
+    try:
+        document = find(longest_part([record]))
+    except InputError as error:
+        return Answer(REFUSED, None, None, None, None, time.process_time() - begun, str(error))
+    valve, output = document["valves"][0], document["outputs"][0]
+    f_s, f_d = _interval(valve["f_s_interval"]), _interval(valve["f_d_interval"])
+    band = _interval(valve.get("band_interval", [f_s[0] + f_d[0], f_s[1] + f_d[1]]))
+    cause = output.get("cause") or {}
+    seconds = time.process_time() - begun
+    return Answer(valve["verdict"], f_s, f_d, band, cause.get("kind"), seconds)
+
+
+def _interval(values: Sequence[float]) -> Interval:
+    low, high = values
+    return float(low), float(high)
+
+
+def identified(method: str, record: Record) -> Mapping[str, Any]:
+    """Return the mapping of ``identify --json`` by a method, else with default options."""
+    from stiction_ros.identification import IdentificationOptions, identify
+
+    return identify(record, IdentificationOptions(method=method)).to_json()
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """One loop, what is true of it and what was said.
+
+    Attributes:
+        seed, kind, plant, circumstances, samples: of the loop.
+        valve, law, band, f_s, f_d, causes: of its truth.
+        slips: in the part that was looked at.
+        answer: what was said.
+    """
+
+    seed: int
+    kind: str
+    plant: str
+    circumstances: tuple[str, ...]
+    samples: int
+    valve: str
+    law: str
+    band: float
+    f_s: float | None
+    f_d: float | None
+    causes: tuple[str, ...]
+    slips: int
+    answer: Answer
+
+    @property
+    def group(self) -> str:
+        """One of :data:`GROUPS`."""
+        if self.valve == "healthy":
+            return OTHERS
+        return MANY_SLIPS if self.slips >= choices.MANY else FEW_SLIPS
+
+    @property
+    def verdict(self) -> str:
+        """What was said of the valve."""
+        return self.answer.verdict
+
+    @property
+    def found(self) -> bool:
+        """Whether friction was found."""
+        return self.verdict in FOUND
+
+    @property
+    def open(self) -> bool:
+        """Whether nothing was decided."""
+        return self.verdict in ("undecided", REFUSED)
+
+    @property
+    def cause_right(self) -> bool | None:
+        """Whether the cause is one of the true ones; None where none is told."""
+        if self.answer.cause in (None, "unknown"):
+            return None
+        return self.answer.cause in self.causes
+
+    def covered(self) -> dict[str, bool]:
+        """Return which intervals hold the truth, of those that were given."""
+        pairs = {
+            "band": (self.band, self.answer.band),
+            "f_s": (self.f_s, self.answer.f_s),
+            "f_d": (self.f_d, self.answer.f_d),
+        }
+        return {
+            name: interval[0] <= true <= interval[1]
+            for name, (true, interval) in pairs.items()
+            if true is not None and interval is not None
+        }
+
+
+def judge(method: str, seed: int) -> Judged:
+    """Identify one loop of the field by a method, else with default options."""
+    from stiction_ros.field import field_loop
+
+    loop = field_loop(seed)
+    truth = loop.truth
+    return Judged(
+        seed=seed,
+        kind=loop.kind,
+        plant=loop.plant,
+        circumstances=loop.circumstances,
+        samples=len(loop.record),
+        valve=truth.valve.value,
+        law=truth.law,
+        band=truth.band,
+        f_s=truth.f_s,
+        f_d=truth.f_d,
+        causes=tuple(sorted(cause.value for cause in truth.causes)),
+        slips=loop.judged_slips,
+        answer=answer_of(loop.record, functools.partial(identified, method)),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Share:
+    """How often something happened, and how often it should."""
+
+    name: str
+    count: int
+    total: int
+    wanted: str
+
+    @property
+    def share(self) -> float:
+        """Between 0 and 1; NaN of none."""
+        return self.count / self.total if self.total else float("nan")
+
+
+def shares(rows: Sequence[Judged]) -> list[Share]:
+    """Return the rates that identification is held to."""
+    much = [row for row in rows if row.group == MANY_SLIPS]
+    few = [row for row in rows if row.group == FEW_SLIPS]
+    others = [row for row in rows if row.group == OTHERS]
+    both = [*much, *others]
+    told = [row for row in both if row.answer.cause is not None]
+    right = sum(row.cause_right is True for row in told)
+    wrong = sum(row.cause_right is False for row in told)
+    held = [row.covered() for row in much if row.found]
+
+    def covered(name: str) -> tuple[int, int]:
+        known = [entry[name] for entry in held if name in entry]
+        return sum(known), len(known)
+
+    return [
+        Share("friction found", sum(row.found for row in much), len(much), ">= 92 %"),
+        Share("friction called healthy", _healthy(much), len(much), "<= 1 %"),
+        Share("others called sticky or backlash", _found(others), len(others), "<= 1 %"),
+        Share("undecided of both", sum(row.open for row in both), len(both), "<= 15 %"),
+        Share("fewer slips: right or undecided", len(few) - _healthy(few), len(few), ""),
+        Share("interval of the band holds the truth", *covered("band"), ">= 90 %"),
+        Share("He's law: interval of f_S", *covered("f_s"), ">= 93 %"),
+        Share("He's law: interval of f_D", *covered("f_d"), ">= 93 %"),
+        Share("cause right", right, len(told), ">= 85 %"),
+        Share("cause wrong", wrong, len(told), "<= 5 %"),
+    ]
+
+
+def _healthy(rows: Iterable[Judged]) -> int:
+    return sum(row.verdict == "healthy" for row in rows)
+
+
+def _found(rows: Iterable[Judged]) -> int:
+    return sum(row.found for row in rows)
+
+
+def splits(rows: Sequence[Judged]) -> dict[str, list[Judged]]:
+    """Return the loops by group, valve, plant and circumstance, to see where it misses.
+
+    Valves that slip less often stand in their own row alone.
+    """
+    parts: dict[str, list[Judged]] = {group: [] for group in GROUPS}
+    for row in rows:
+        parts[row.group].append(row)
+        for name in _places(row) if row.group != FEW_SLIPS else ():
+            parts.setdefault(name, []).append(row)
+    named = sorted(name for name in parts if name not in GROUPS)
+    return {name: parts[name] for name in (*GROUPS, *named)}
+
+
+def _places(row: Judged) -> list[str]:
+    named = row.group == OTHERS or row.law == row.valve
+    valve = row.law if named else f"{row.valve} {row.law}"
+    told = row.circumstances or ("nothing unusual",)
+    return [f"valve {valve}", f"plant {row.plant}", *(f"with {name}" for name in told)]
+
+
+def table_row(name: str, rows: Sequence[Judged]) -> dict[str, Any]:
+    """Return one row of the table, with the keys that every benchmark has."""
+    times = [1e3 * row.answer.seconds for row in rows]
+    held = [entry["band"] for row in rows if row.found and "band" in (entry := row.covered())]
+    counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
+    return {
+        "case": name,
+        "subject": "identify",
+        "baseline": "truth",
+        "subject_ms": float(np.median(times)) if times else None,
+        "baseline_ms": None,
+        "p99_ms": float(np.percentile(times, 99)) if times else None,
+        "ratio": None,
+        "note": "",
+        "loops": len(rows),
+        **counts,
+        "band_held": sum(held),
+        "band_told": len(held),
+        "cause_right": sum(row.cause_right is True for row in rows),
+        "cause_wrong": sum(row.cause_right is False for row in rows),
+    }
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that this benchmark shares with ``stability``."""
+    from stiction_ros.cli.runs.seeds import seed_range
+
+    group = parser.add_argument_group("field and stability; --seeds also for gain, --jobs for all")
+    group.add_argument(
+        "--seeds", type=seed_range, metavar="A:B", help=f"of the field's loops ({FIRST}:{LAST})"
+    )
+    group.add_argument("--method", choices=choices.METHODS, help=f"search ({METHOD})")
+
+
+def run(options: argparse.Namespace, machine: str) -> int:
+    """Run the benchmark."""
+    seeds = options.seeds or (FIRST, LAST)
+    rows = run_seeds(
+        functools.partial(judge, options.method or METHOD), seeds, options.jobs or 1, "field"
+    )
+    if options.json is not None:
+        write_json(options.json, document(rows, machine))
+    if options.json != "-":
+        show(rows)
+    return 0
+
+
+def document(rows: Sequence[Judged], machine: str) -> dict[str, Any]:
+    """Return what ``--json`` writes."""
+    return {
+        "name": "field",
+        "machine": machine,
+        "rows": [
+            table_row(f"{name} · {side}" if side else name, part)
+            for name, whole in splits(rows).items()
+            for side, part in _sides(name, whole)
+        ],
+        "rates": [dataclasses.asdict(rate) | {"share": rate.share} for rate in shares(rows)],
+        "loops": [dataclasses.asdict(row) | {"group": row.group} for row in rows],
+    }
+
+
+def _sides(name: str, rows: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
+    """Return the rows with friction and those without; of a group all."""
+    if name in GROUPS:
+        return [("", list(rows))]
+    sticks = [row for row in rows if row.group != OTHERS]
+    others = [row for row in rows if row.group == OTHERS]
+    return [(side, part) for side, part in (("friction", sticks), (OTHERS, others)) if part]
+
+
+def show(rows: Sequence[Judged]) -> None:
+    """Print the rates, the table and the loops that were missed."""
+    console = Console()
+    console.print(shares_table(shares(rows)))
+    console.print(_counted(rows))
+    console.print(
+        "loops: with friction that matters; others: without; open: undecided or refused; "
+        "band: intervals that hold it, where friction is found"
+    )
+    for title, missed in misses(rows).items():
+        if missed:
+            console.print(f"{title}: seeds {', '.join(map(str, missed))}")
+
+
+def _counted(rows: Sequence[Judged]) -> Table:
+    """Return a line for every valve, plant and circumstance, with friction and without."""
+    columns = ("loops", "found", "healthy", "open", "band", "others", "called", "open", "cause")
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0), show_edge=False)
+    table.add_column("", no_wrap=True)
+    for name in columns:
+        table.add_column(name, justify="right")
+    for name, part in splits(rows).items():
+        sticks = [row for row in part if row.group != OTHERS]
+        others = [row for row in part if row.group == OTHERS]
+        held = [entry["band"] for row in sticks if row.found and (entry := row.covered())]
+        told = [row for row in part if row.answer.cause is not None]
+        cells = ["–"] * len(columns)
+        if sticks:
+            cells[:4] = _texts(len(sticks), _found(sticks), _healthy(sticks), _open(sticks))
+            cells[4] = f"{sum(held)}/{len(held)}"
+        if others:
+            cells[5:8] = _texts(len(others), _found(others), _open(others))
+        if told:
+            cells[8] = f"{sum(row.cause_right is True for row in told)}/{len(told)}"
+        table.add_row(name, *cells)
+    return table
+
+
+def _texts(*counts: int) -> list[str]:
+    return [str(count) for count in counts]
+
+
+def _open(rows: Iterable[Judged]) -> int:
+    return sum(row.open for row in rows)
+
+
+def misses(rows: Sequence[Judged]) -> dict[str, list[int]]:
+    """Return the seeds of the loops with a wrong verdict."""
+    return {
+        "friction called healthy": [
+            row.seed for row in rows if row.group == MANY_SLIPS and row.verdict == "healthy"
+        ],
+        "others called sticky or backlash": [
+            row.seed for row in rows if row.group == OTHERS and row.found
+        ],
+    }
+
+
+def shares_table(found: Iterable[Share]) -> Table:
+    """Return rates as a table, – for those of nothing."""
+    table = Table("rate", "count", "of", "share", "wanted")
+    for rate in found:
+        share = f"{100.0 * rate.share:.1f} %" if rate.total else "–"
+        table.add_row(rate.name, str(rate.count), str(rate.total), share, rate.wanted)
+    return table

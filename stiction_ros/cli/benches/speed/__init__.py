@@ -1,0 +1,1 @@
+"""How fast: rows of times, side by side."""

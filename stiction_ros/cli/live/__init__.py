@@ -1,0 +1,1 @@
+"""Commands that start the nodes: the demo, faults, the long run."""

@@ -1,0 +1,27 @@
+"""What both suites of faults do with a case: keep what it left, and write its times."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from stiction_ros.errors import InputError
+
+
+def keep(folder: Path, target: Path) -> None:
+    """Copy what a case has left in ``folder`` to ``target``; what was there before goes.
+
+    Raises:
+        InputError: the target cannot be written.
+    """
+    try:
+        if target.exists():
+            shutil.rmtree(target)
+        shutil.copytree(folder, target)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
+
+
+def shown_seconds(value: float | None) -> str:
+    """Return ``value``, s, as the tables show it; a dash for None."""
+    return "–" if value is None else f"{value:.1f}"

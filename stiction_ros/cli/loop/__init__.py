@@ -1,0 +1,1 @@
+"""Commands about one loop: identify, gap, gain, simulate."""

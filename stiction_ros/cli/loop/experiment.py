@@ -1,0 +1,72 @@
+"""``stiction experiment``: simulated experiments and plants, written as records."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from typing import Any
+
+from stiction_ros.cli.loop.fit_linear import limits_range
+from stiction_ros.cli.runs.seeds import add_jobs
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel, prbs_experiment
+from stiction_ros.loop.excitation import LEVELS, SWITCH_PROBABILITY
+from stiction_ros.records.csv.writer import write_csv
+
+DEFAULT_MODEL = "tank.loop.yaml"
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "experiment",
+        help="simulate an identification experiment, or the exports of a plant",
+        description="prbs: simulate an open-loop experiment on a loop model, in which every "
+        "valve moves by a random binary sequence of its own, as in Appendix A, and write its "
+        "record. plant: simulate many loops of a plant and write the exports of its historian, "
+        "in five forms and with everything wrong that exports have; the truth stands beside "
+        "the folder.",
+    )
+    parser.add_argument("name", choices=("prbs", "plant"), help="the experiment")
+    parser.add_argument(
+        "--model", default=DEFAULT_MODEL, metavar="F", help=f"loop model ({DEFAULT_MODEL})"
+    )
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of moves and noise (1)")
+    parser.add_argument("--samples", type=int, default=3000, metavar="N", help="(3000)")
+    parser.add_argument(
+        "--switch-probability", type=float, default=SWITCH_PROBABILITY, metavar="P", help="(0.05)"
+    )
+    parser.add_argument(
+        "--levels", type=limits_range, default=LEVELS, metavar="LO:HI", help="%% of OP (40:60)"
+    )
+    parser.add_argument(
+        "--keep-effects", action="store_true", help="valves as in the model (default: ideal)"
+    )
+    parser.add_argument(
+        "--out", required=True, metavar="F", help="the record, F.csv, or the plant's folder"
+    )
+    parser.add_argument("--loops", type=int, default=500, metavar="N", help="of a plant (500)")
+    add_jobs(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.name == "plant":
+        from stiction_ros.cli.loop.experiment_plant import run_plant
+
+        return run_plant(options)
+    if options.samples < 2:
+        raise InputError(f"{options.samples} is too few", where="--samples", fix="use 2 or more")
+    model = LoopModel.load(find_config(options.model))
+    if not options.keep_effects:
+        model = model.with_ideal_valves()
+    record = prbs_experiment(
+        model, options.samples, options.seed, options.switch_probability, options.levels
+    )
+    write_csv(record, options.out)
+    command = shlex.join(["stiction", "fit-linear", options.out])
+    print(f"{options.out}: {len(record)} samples; read it by\n{command}", file=sys.stderr)
+    return 0

@@ -1,0 +1,31 @@
+"""``stiction experiment plant``: a folder of exports whose truth is known."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import sys
+from pathlib import Path
+
+from stiction_ros.cli.runs.seeds import run_each
+from stiction_ros.errors import InputError
+from stiction_ros.field import field_loop
+from stiction_ros.field.exports.plant import PlantLoop, export_plant, loop_seed, plant_loop
+
+
+def made(seed: int, number: int) -> PlantLoop:
+    """Return one loop of a plant; a worker process can run it."""
+    return plant_loop(field_loop(loop_seed(seed, number)), seed, number)
+
+
+def run_plant(options: argparse.Namespace) -> int:
+    """Make a plant and write it."""
+    if options.loops < 1:
+        raise InputError(f"{options.loops} is too few", where="--loops", fix="use 1 or more")
+    if options.seed < 0:
+        raise InputError(f"{options.seed} is negative", where="--seed", fix="use 0 or more")
+    work = functools.partial(made, options.seed)
+    loops = run_each(work, range(options.loops), options.jobs, f"plant: {options.loops} loops")
+    truth = export_plant(loops, options.seed, Path(options.out))
+    print(f"{options.out}: {len(loops)} loops; the truth: {truth}", file=sys.stderr)
+    return 0

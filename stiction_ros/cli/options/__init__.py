@@ -1,0 +1,1 @@
+"""What options several commands have, and how they are read."""

@@ -1,0 +1,1 @@
+"""Commands about a whole plant: all its loops, and its control system."""

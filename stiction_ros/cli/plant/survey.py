@@ -1,0 +1,247 @@
+"""``stiction survey``: every loop of a plant, ranked by what to service first."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import dataclasses
+import datetime
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.loop.identify import delay_range
+from stiction_ros.cli.options.intake import add_columns, add_intake, intake_options, show_loops
+from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.progress import Bar, bar
+from stiction_ros.errors import InputError
+
+SHOWN = 30
+"""Rows of the list that are printed."""
+
+PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "survey",
+        help="every loop of a plant, ranked by what to service first",
+        description="Judge every loop in files and folders of exports and list the valves to "
+        "service first, with a page for each loop. A loop that cannot be judged stands in the "
+        "list with its reason and stops no other.",
+    )
+    parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
+    add_columns(parser)
+    add_intake(parser, many=True)
+    parser.add_argument("--delay", type=delay_range, metavar="LO:HI", help="samples (0:10)")
+    parser.add_argument("--no-gain", action="store_true", help="simulate nothing")
+    parser.add_argument("--cost", metavar="F", help="CSV: loop, money per hour and unit of |PV−SP|")
+    parser.add_argument("--units", metavar="F", help="CSV: loop, unit of PV, for the pages")
+    parser.add_argument(
+        "--previous", action="append", default=[], metavar="F", help="JSON of an earlier survey"
+    )
+    parser.add_argument("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (all cores)"
+    )
+    parser.add_argument(
+        "--engine", default="local", metavar="E", help="local, or dask://HOST:PORT (local)"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with the survey in --out")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    # Judging takes compiled code, which other commands do not wait for.
+    from stiction_ros.identification.options import IdentificationOptions
+    from stiction_ros.intake import loops
+    from stiction_ros.survey.options import SurveyOptions
+    from stiction_ros.survey.survey import Plan, survey
+
+    paths = [Path(path) for path in options.paths]
+    for path in paths:
+        if not path.exists():
+            raise InputError("there is no such file or folder", where=str(path))
+    intake = intake_options(options)
+    if options.dry_run:
+        return show_loops(paths, intake)
+    costs = {name: _number(value, options.cost) for name, value in _pairs(options.cost)}
+    identification = IdentificationOptions()
+    if options.delay is not None:
+        identification = dataclasses.replace(identification, delay=options.delay)
+    plan = Plan(
+        SurveyOptions(
+            identification,
+            gain=not options.no_gain,
+            pages=options.out is not None,
+            units=tuple(_pairs(options.units)),
+            read_by=repr(intake),
+        ),
+        None if options.out is None else Path(options.out),
+        options.resume,
+        costs,
+    )
+    trends = _trends(options.previous)
+    engine = _engine(options)
+    with bar("survey") as show:
+        found = survey(loops(paths, intake), plan, engine, _Forecast(show, paths))
+    found = dataclasses.replace(
+        found, date=datetime.datetime.now(datetime.UTC).isoformat(" ", "minutes")
+    )
+    if plan.out is not None:
+        _write(found, plan.out, trends)
+    if options.json is not None:
+        write_json(options.json, found.to_json())
+    if options.json != "-":
+        _print(found)
+        if plan.out is not None:
+            print(f"list: {plan.out / PAGE}", file=sys.stderr)
+    return 0
+
+
+def _engine(options: argparse.Namespace) -> Any:
+    if options.engine == "local":
+        from stiction_ros.survey.engines.local import LocalEngine
+
+        if options.jobs < 1:
+            raise InputError(f"{options.jobs} is no number of processes", where="--jobs")
+        return LocalEngine(options.jobs)
+    from stiction_ros.survey.engines.dask import SCHEME, DaskEngine
+
+    if not options.engine.startswith(SCHEME):
+        raise InputError(
+            f"unknown engine {options.engine!r}",
+            where="--engine",
+            fix=f"use local, or {SCHEME}HOST:PORT",
+        )
+    return DaskEngine(options.engine)
+
+
+class _Forecast:
+    """Shows how far a survey is, and how long the rest takes: by the bytes that are done."""
+
+    def __init__(self, show: Bar, paths: Sequence[Path]) -> None:
+        self._show, self._begun = show, time.monotonic()
+        self._total = sum(_size(path) for path in paths)
+        self._files: set[str] = set()
+        self._done = 0
+
+    def __call__(self, done: int, known: int, entry: Any) -> None:
+        for file in set(entry.files) - self._files:
+            self._files.add(file)
+            self._done += _size(Path(file))
+        share = min(self._done / max(self._total, 1), 1.0)
+        passed = time.monotonic() - self._begun
+        left = passed * (1.0 - share) / max(share, 1e-6)
+        self._show(share, f"{done} loops, about {_minutes(left)} left: {entry.name}")
+
+
+def _size(path: Path) -> int:
+    if path.is_dir():
+        return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+    return path.stat().st_size if path.exists() else 0
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+
+
+def _write(found: Any, out: Path, trends: Any) -> None:
+    from stiction_ros.survey.listing.page import list_page
+    from stiction_ros.survey.listing.tables import write_csv, write_xlsx
+    from stiction_ros.survey.pages.loop_page import with_trend
+
+    try:
+        (out / PAGE).write_text(list_page(found, trends), encoding="utf-8")
+        write_csv(out / CSV, found.entries)
+        write_xlsx(out / XLSX, found.entries)
+        for entry in found.entries:
+            past = trends.get(entry.name)
+            if entry.report is not None and past:
+                now = [] if entry.f_s is None else [entry.f_s + entry.f_d]
+                page = out / entry.report
+                told = with_trend(page.read_text(encoding="utf-8"), [*past, *now])
+                page.write_text(told, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(out)) from None
+
+
+def _pairs(file: str | None) -> list[tuple[str, str]]:
+    """Return the first two columns of a CSV; a first line whose second cell is a word is a head."""
+    if file is None:
+        return []
+    try:
+        with Path(file).open(encoding="utf-8-sig", newline="") as source:
+            rows = [row for row in csv.reader(source) if row and row[0].strip()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read ({error})", where=file) from None
+    short = next((number for number, row in enumerate(rows, start=1) if len(row) < 2), None)
+    if short is not None:
+        raise InputError("has no second column", where=f"{file}: row {short}", fix="loop,value")
+    pairs = [(row[0].strip(), row[1].strip()) for row in rows]
+    return pairs[1:] if pairs and pairs[0][0].lower() in ("loop", "tag", "name") else pairs
+
+
+def _number(text: str, file: str | None) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 <= value < float("inf"):
+        raise InputError(f"{text!r} is no cost", where=file or "--cost", fix="use a number")
+    return value
+
+
+def _trends(files: Sequence[str]) -> dict[str, list[float]]:
+    """Return the bands of earlier surveys by loop, in the order of the files."""
+    found: dict[str, list[float]] = {}
+    for file in files:
+        try:
+            document = json.loads(Path(file).read_text(encoding="utf-8"))
+            for row in document["loops"]:
+                if row["f_s"] is not None and row["f_d"] is not None:
+                    found.setdefault(row["name"], []).append(row["f_s"] + row["f_d"])
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"cannot be read ({error})", where=file) from None
+        except (json.JSONDecodeError, KeyError, TypeError):
+            raise InputError(
+                "is no result of a survey", where=file, fix="give what --json wrote"
+            ) from None
+    return found
+
+
+def _print(found: Any) -> None:
+    table = Table()
+    for name in ("rank", "loop", "verdict", "cause", "band", "f_S %", "confidence", "reason"):
+        table.add_column(name)
+    for entry in found.entries[:SHOWN]:
+        table.add_row(
+            str(entry.rank),
+            entry.name,
+            entry.verdict or entry.status.value,
+            entry.cause or "",
+            f"{100 * entry.band_share:.0f} %" if entry.found else "",
+            f"{entry.f_s:.3g}" if entry.found else "",
+            "" if entry.confidence is None else f"{entry.confidence:.2f}",
+            entry.reason,
+        )
+    console = Console()
+    console.print(table)
+    if len(found.entries) > SHOWN:
+        console.print(f"and {len(found.entries) - SHOWN} more")
+    for group in found.groups:
+        console.print(
+            f"group {group.number}, period {group.period:.3g} s: {', '.join(group.names)}"
+        )
+    rate = 60.0 * len(found.entries) / max(found.seconds, 1e-9)
+    console.print(f"{len(found.entries)} loops in {found.seconds:.0f} s, {rate:.0f} a minute")

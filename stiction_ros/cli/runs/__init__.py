@@ -1,0 +1,1 @@
+"""What commands run: scenarios, processes of nodes, many seeds."""

@@ -1,0 +1,105 @@
+"""The scenarios that come along, and the parameters of their nodes.
+
+The command ``demo`` and the launch file start the same nodes with the same parameters: both
+take them from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError
+
+SCENARIOS = ("tank", "siso")
+STARTED = ("recorder", "estimator", "controller", "plant")
+"""The nodes of a loop, in the order in which they are started."""
+
+
+def find(name: str) -> Path:
+    """Return the file of a scenario: one that comes along, or a ``*.yaml`` file of the user.
+
+    Raises:
+        InputError: neither.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return find_config(name)
+    if name in SCENARIOS:
+        return find_config(f"{name}.scenario.yaml")
+    raise InputError(
+        f"unknown scenario {name!r}",
+        fix=f"use {' or '.join(SCENARIOS)}, or the path of a *.scenario.yaml file",
+    )
+
+
+def node_parameters(path: Path, directory: Path) -> dict[str, dict[str, Any]]:
+    """Return the parameters of all nodes with full paths; the bag goes below ``directory``."""
+    from stiction_ros.online.session import Scenario
+
+    return _placed(Scenario.load(path).nodes, path, directory)
+
+
+def _placed(
+    told: Mapping[str, Mapping[str, Any]], path: Path, directory: Path
+) -> dict[str, dict[str, Any]]:
+    nodes = {node: dict(values) for node, values in told.items()}
+    for values in nodes.values():
+        for key in ("model", "set_points", "monitor_model"):
+            if values.get(key):
+                values[key] = str((path.parent / values[key]).resolve())
+    nodes["recorder"]["directory"] = str((directory / "bag").resolve())
+    return nodes
+
+
+def loop_nodes(
+    path: Path, directory: Path, *, seed: int | None = None, speed: float | None = None
+) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes of a loop, by name, in the order of their start.
+
+    Args:
+        path: scenario file.
+        directory: where the bag goes.
+        seed: of the noise; None for that of the scenario.
+        speed: simulated seconds per second; None for lockstep, as fast as the machine can.
+    """
+    nodes = node_parameters(path, directory)
+    if seed is not None:
+        nodes["plant"]["seed"] = seed
+    if speed is not None:
+        for name in ("plant", "controller", "estimator"):
+            nodes[name].update(pace="realtime", speed=float(speed))
+    return {name: nodes[name] for name in STARTED}
+
+
+def bridged_nodes(
+    path: Path, directory: Path, *, speed: float = 1.0, source: str = "opcua"
+) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes of a loop whose plant is behind a bridge, or elsewhere.
+
+    Args:
+        path: scenario file; it need not have a plant, which is left out.
+        directory: where the bag goes.
+        speed: seconds of the plant per second.
+        source: what the others wait for in place of the plant, an entry of ``wait_for``.
+    """
+    from stiction_ros.online.session import read_nodes
+
+    nodes = _placed(read_nodes(path, without="plant"), path, directory)
+    others = [name for name in STARTED if name != "plant"]
+    for name in ("controller", "estimator"):
+        partners = [source, *(other for other in others if other != name)]
+        nodes[name].update(pace="realtime", speed=float(speed), wait_for=partners)
+    return {name: nodes[name] for name in others}
+
+
+def write_parameters(
+    nodes: Mapping[str, Mapping[str, Any]], path: Path, *, any_namespace: bool = False
+) -> None:
+    """Write a ROS parameter file for ``nodes``, which may be in a namespace."""
+    prefix = "/**/" if any_namespace else ""
+    document = {f"{prefix}{n}": {"ros__parameters": dict(v)} for n, v in nodes.items()}
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Commands of the studies: examples, the paper, scenarios over many seeds."""

@@ -1,0 +1,1 @@
+"""How OP is planned: unaware of friction, by inversion, by exact embedding."""

@@ -1,0 +1,67 @@
+"""Which formulation a mode stands for."""
+
+from __future__ import annotations
+
+import math
+
+from stiction_ros.control.design import ControlDesign
+from stiction_ros.control.formulations.embedding import EmbeddingMpc
+from stiction_ros.control.formulations.formulation import Formulation
+from stiction_ros.control.formulations.inversion import InversionMpc
+from stiction_ros.control.formulations.unaware import UnawareMpc
+from stiction_ros.control.printed.embedding import PrintedEmbeddingMpc
+from stiction_ros.control.printed.inversion import PrintedInversionMpc
+from stiction_ros.control.result import ControlMode
+from stiction_ros.control.valves.beliefs import ValveBeliefs
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+
+ROUNDING = 1e-9  # of a rate limit, by which a kick may exceed it
+
+
+def formulation_of(
+    mode: ControlMode, design: ControlDesign, unaware: UnawareMpc, valves: ValveBeliefs
+) -> Formulation | None:
+    """Return the formulation of ``mode``; None for ``hold``, which plans nothing.
+
+    Args:
+        mode: what is asked for.
+        design: of the controller.
+        unaware: the formulation without friction, which the inversion is built upon.
+        valves: the belief in each valve.
+
+    Raises:
+        InputError: the formulation cannot be set up for these valves, or the rate limit of an OP
+            is below what the smallest jump of its valve takes.
+    """
+    known, paper = valves.frictions, design.paper
+    if mode is ControlMode.HOLD:
+        return None
+    if mode is ControlMode.EMBEDDING and paper is not None:
+        return PrintedEmbeddingMpc(design.model, paper, design.limits, known)
+    if mode is ControlMode.EMBEDDING:
+        weights, spreads = design.embedding, valves.spreads
+        embedding = EmbeddingMpc(design.model, weights, design.limits, known, design.jumps, spreads)
+        _check_rates(design, embedding.least_kicks)
+        return embedding
+    if mode is ControlMode.INVERSION and paper is not None:
+        return PrintedInversionMpc(unaware, known)
+    if mode is ControlMode.INVERSION:
+        inversion = InversionMpc(unaware, known)
+        _check_rates(design, inversion.least_kicks)
+        return inversion
+    return unaware
+
+
+def _check_rates(design: ControlDesign, kicks: FloatArray) -> None:
+    """Raise InputError where OP may not move by the ``kicks`` (m,), %, that its valve needs."""
+    for j, (kick, limit) in enumerate(zip(kicks, design.limits.move, strict=True)):
+        if kick > limit * (1.0 + ROUNDING):
+            name = design.valve_names[j] if design.valve_names else f"valve {j + 1}"
+            enough = math.ceil(100.0 * kick) / 100.0
+            way_out = "leave the controller unaware (mode: unaware)"
+            raise InputError(
+                f"{limit:g} % per sample is less than the kick that moves {name}, {kick:.3g} %",
+                where="op_rate_limits",
+                fix=f"raise it to at least {enough:g}, or {way_out}",
+            )

@@ -1,0 +1,115 @@
+"""The cost (22) of a sequence of controller outputs under He's hard model (4)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.control.printed.laws import PrintedFriction
+from stiction_ros.control.problem.horizon import HorizonCost
+from stiction_ros.control.problem.horizon_qp import slack_weights
+from stiction_ros.control.problem.paper_weights import AugmentedWeights
+from stiction_ros.control.problem.target import Target
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.processes import LinearModel
+
+
+@dataclasses.dataclass(frozen=True)
+class PlanProblem:
+    """What a plan starts from.
+
+    Attributes:
+        state: ξ̂, shape (n,).
+        stem: χ_{−1}, shape (m,), %.
+        target: ξ_ss, χ_ss and the outputs there; u_s = χ_ss, the steady OP that leaves
+            the stem at rest in the middle of its band.
+        before: u_{−1}, shape (m,), %; None where OP was at the stem.
+    """
+
+    state: FloatArray
+    stem: FloatArray
+    target: Target
+    before: FloatArray | None = None
+
+    @property
+    def op_before(self) -> FloatArray:
+        """u_{−1}, shape (m,), %."""
+        return self.stem if self.before is None else self.before
+
+
+class AugmentedCost:
+    r"""Equation (22) summed over the horizon, with the terminal penalty of (19a).
+
+    .. math::
+        \sum_{i=0}^{N-1} (z_i - z_{ss})^T Q_z (z_i - z_{ss}) + \Delta\chi_i^T Q_s \Delta\chi_i
+            + (u_i - u_s)^T R (u_i - u_s) + (\xi_N - \xi_{ss})^T V_F (\xi_N - \xi_{ss}),
+        \quad z_i = (\chi_{i-1}, \xi_i).
+
+    Where the weights have S on Δu as well, as (19a) does, it is added; and where outputs have soft
+    bounds, the squares of how far each sample is beyond them.
+
+    Attributes:
+        soft: how dear that is, shape (p,); 0 where an output has no bounds.
+    """
+
+    def __init__(
+        self,
+        model: LinearModel,
+        weights: AugmentedWeights,
+        frictions: Sequence[PrintedFriction | None],
+        bounds: FloatArray | None = None,
+    ) -> None:
+        """Condense.
+
+        Args:
+            model: the process.
+            weights: of (22).
+            frictions: one entry per valve, None for a healthy one.
+            bounds: soft bounds of the outputs, shape (p, 2), infinite for none; None for none.
+        """
+        self.model, self.weights, self.frictions = model, weights, tuple(frictions)
+        self.part = HorizonCost(model, weights.in_stems)
+        self.horizon = weights.horizon
+        self._bounds = np.array([[-np.inf, np.inf]]) if bounds is None else bounds
+        bounded = np.isfinite(self._bounds).any(axis=1)
+        # Half the square of the largest excess costs as much in the exact formulations.
+        self.soft = np.where(bounded, slack_weights(self.part) / (2.0 * self.horizon), 0.0)
+
+    def stems(self, op: FloatArray, start: FloatArray) -> FloatArray:
+        """Return stems, shape (N, m), %, for ``op`` (N, m), from rest at ``start`` (m,)."""
+        stems = op.copy()
+        for j, friction in enumerate(self.frictions):
+            if friction is not None:
+                stems[:, j] = friction.simulate(op[:, j], start=float(start[j]))
+        return stems
+
+    def __call__(self, situation: PlanProblem, op: FloatArray) -> float:
+        """Return the cost of ``op``, shape (N, m), %, in the units of the weights."""
+        return self.of_stems(situation, op, self.stems(op, situation.stem))
+
+    def of_stems(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> float:
+        """Return the cost of ``op`` when its stems, shape (N, m), are known already."""
+        target, weights = situation.target, self.weights
+        state, last = situation.state - target.state, situation.stem - target.stem
+        plan = stems - target.stem
+        flat = plan.reshape(-1)
+        cost = float(flat @ (0.5 * self.part.hessian @ flat + self.part.linear(state, last)))
+        cost += self.part.constant(state, last)
+        before = np.vstack([last, plan[:-1]])
+        away = op - target.stem
+        cost += float(np.sum(before * (before @ weights.stem)))
+        if weights.op_move is not None:
+            moves = np.diff(np.vstack([situation.op_before, op]), axis=0)
+            cost += float(np.sum(moves * (moves @ weights.op_move)))
+        if self.soft.any():
+            cost += float(np.sum(self.beyond(situation, stems) ** 2 @ self.soft))
+        return cost + float(np.sum(away * (away @ weights.op)))
+
+    def beyond(self, situation: PlanProblem, stems: FloatArray) -> FloatArray:
+        """Return how far each output is beyond its bounds at samples 1 … N, shape (N, p)."""
+        target = situation.target
+        pv = self.part.outputs(situation.state - target.state, stems - target.stem) + target.pv
+        low, high = self._bounds.T
+        return np.asarray(np.maximum(np.maximum(pv - high, low - pv), 0.0))

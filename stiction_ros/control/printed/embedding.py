@@ -1,0 +1,174 @@
+"""Stiction-embedding MPC as the paper prints it, safeguarded by the hard model."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.control.formulations.formulation import Formulation
+from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.control.printed.laws import PrintedFriction, printed_frictions
+from stiction_ros.control.printed.searched_start import SearchedStart
+from stiction_ros.control.printed.smoothed_programme import (
+    ProgrammeStatus,
+    SmoothedProgramme,
+    SoftOutputs,
+)
+from stiction_ros.control.printed.warm_start import compensation
+from stiction_ros.control.problem.horizon import HorizonLimits
+from stiction_ros.control.problem.paper_weights import PaperTuning, WarmStart
+from stiction_ros.control.problem.target import Target
+from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+
+class Choice(enum.StrEnum):
+    """Which of the two sequences is applied."""
+
+    PROGRAMME = "programme"
+    WARM_START = "warm_start"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PrintedPlan(Plan):
+    """A plan, and what it was chosen from.
+
+    Attributes:
+        choice: the sequence with the lower cost (22) under the hard model (4).
+        programme: how IPOPT ended.
+        iterations: of IPOPT.
+        programme_cost, warm_start_cost: (22) under the hard model; inf where there is none.
+    """
+
+    choice: Choice
+    programme: ProgrammeStatus
+    iterations: int
+    programme_cost: float
+    warm_start_cost: float
+
+
+class PrintedEmbeddingMpc(Formulation):
+    """(19) with the augmented model and cost (22): IPOPT from a warm start, then the better.
+
+    At τ = 10⁴ the smoothed model has no slope towards another pattern of slips, so IPOPT
+    keeps or loses the pattern it starts with. Its answer and its warm start are therefore
+    both simulated with the hard model, and the cheaper is applied. Soft bounds of the outputs
+    enter the programme where its answer breaks one without them.
+    """
+
+    mode = ControlMode.EMBEDDING
+
+    def __init__(
+        self,
+        model: LinearModel,
+        tuning: PaperTuning,
+        limits: HorizonLimits,
+        frictions: Sequence[Behaviour | None],
+    ) -> None:
+        """Build the programme once.
+
+        Raises:
+            InputError: no sticky valve, a law without a smoothed form, or bounds that this
+                formulation does not know.
+        """
+        known = printed_frictions(frictions)
+        _check(limits, known)
+        self.tuning, self.frictions = tuning, known
+        self._limits = limits.stem
+        self.cost = AugmentedCost(model, tuning.weights, known, limits.output)
+        self._programme = SmoothedProgramme(model, tuning, known, limits.stem)
+        self._soft = SoftOutputs(limits.output, self.cost.soft)
+        searches = tuning.warm_start is WarmStart.SEARCH
+        self._search = SearchedStart(self.cost, limits.stem) if searches else None
+        self._before: FloatArray | None = None  # u_{k−1}
+
+    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> PrintedPlan | None:
+        """Return the better plan from ξ̂ (n,) and the stem estimates ``last`` (m,), or None."""
+        situation = PlanProblem(state, last, target, self._before)
+        start = self.warm_start(situation)
+        stems = self.cost.stems(start, last)
+        start_cost = self.cost.of_stems(situation, start, stems)
+        found = self._programme.solve(situation, start, stems)
+        if found.op is not None and self._breaks_bounds(situation, found.op):
+            found = self._bounded_programme.solve(situation, start, stems)
+        cost = float("inf") if found.op is None else self.cost(situation, found.op)
+        if not np.isfinite(min(cost, start_cost)):
+            return None
+        if found.op is not None and cost <= start_cost:
+            choice, op = Choice.PROGRAMME, found.op
+        else:
+            choice, op = Choice.WARM_START, start
+        self._before = op[0].copy()
+        stems = self.cost.stems(op, last)
+        return PrintedPlan(
+            op[0].copy(),
+            stems,
+            self._outputs(situation, stems),
+            self.cost.beyond(situation, stems).max(axis=0),
+            self._jumps(stems, last),
+            choice=choice,
+            programme=found.status,
+            iterations=found.iterations,
+            programme_cost=cost,
+            warm_start_cost=start_cost,
+        )
+
+    @functools.cached_property
+    def _bounded_programme(self) -> SmoothedProgramme:
+        model, tuning = self.cost.model, self.tuning
+        return SmoothedProgramme(model, tuning, self.frictions, self._limits, self._soft)
+
+    def _breaks_bounds(self, situation: PlanProblem, op: FloatArray) -> bool:
+        if not self._soft.weights.any():
+            return False
+        return bool(self.cost.beyond(situation, self.cost.stems(op, situation.stem)).any())
+
+    def warm_start(self, situation: PlanProblem) -> FloatArray:
+        """Return the sequence that the programme starts from, shape (N, m), %."""
+        if self._search is not None:
+            found = self._search.find(situation)
+            if found is not None:
+                return found
+        goal, stem = situation.target.stem, situation.stem
+        before = situation.op_before
+        if situation.before is None and self._before is not None:
+            before = self._before
+        if self.tuning.warm_start is WarmStart.NONE:
+            return np.clip(
+                np.tile(before, (self.cost.horizon, 1)), self._limits[:, 0], self._limits[:, 1]
+            )
+        op = np.tile(goal, (self.cost.horizon, 1))
+        for j, friction in enumerate(self.frictions):
+            if friction is not None:
+                ends = float(stem[j]), float(goal[j])
+                a, horizon = self.tuning.first_move, self.cost.horizon
+                op[:, j] = compensation(friction, float(before[j]), ends, horizon, a)
+        return np.clip(op, self._limits[:, 0], self._limits[:, 1])
+
+    def _outputs(self, situation: PlanProblem, stems: FloatArray) -> FloatArray:
+        target, part = situation.target, self.cost.part
+        state = situation.state - target.state
+        now = part.model.c @ state
+        return np.vstack([now, part.outputs(state, stems - target.stem)]) + target.pv
+
+    def _jumps(self, stems: FloatArray, last: FloatArray) -> int:
+        moves = np.diff(np.vstack([last, stems]), axis=0) != 0.0
+        sticky = [j for j, friction in enumerate(self.frictions) if friction is not None]
+        return int(moves[:, sticky].sum())
+
+
+def _check(limits: HorizonLimits, frictions: tuple[PrintedFriction | None, ...]) -> None:
+    if all(friction is None for friction in frictions):
+        raise InputError("0 sticky valves", fix="embedding takes at least one")
+    if np.isfinite(limits.move).any():
+        raise InputError(
+            "the paper's embedding knows no rate limits",
+            where="op_rate_limits",
+            fix="leave them out, or use formulation: exact",
+        )

@@ -1,0 +1,230 @@
+"""The paper's stiction-embedding programme: (17)-(18) smoothed by (6), cost (22), by IPOPT."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.control.printed.augmented_cost import PlanProblem
+from stiction_ros.control.printed.laws import PrintedFriction, directed, smoothed_stem
+from stiction_ros.control.problem.paper_weights import PaperTuning
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.processes import LinearModel
+
+
+class ProgrammeStatus(enum.StrEnum):
+    """How IPOPT ended."""
+
+    SOLVED = "solved"
+    LIMIT = "limit"  # iterations used up; what was reached is kept
+    FAILED = "failed"
+
+
+_SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+_LIMIT = "Maximum_Iterations_Exceeded"
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgrammeResult:
+    """What IPOPT found.
+
+    Attributes:
+        status: how it ended.
+        op: u over the horizon, shape (N, m), %, within the limits; None when failed.
+        cost: (22) under the smoothed model; inf when failed.
+        iterations: number of them.
+    """
+
+    status: ProgrammeStatus
+    op: FloatArray | None
+    cost: float
+    iterations: int
+
+
+@dataclasses.dataclass(frozen=True)
+class SoftOutputs:
+    """Bounds of the outputs, shape (p, 2), and what a squared excess of a sample costs, (p,)."""
+
+    bounds: FloatArray
+    weights: FloatArray
+
+
+class SmoothedProgramme:
+    r"""The programme in u_i, χ_i of sticky valves, and ξ_i, all kept as unknowns.
+
+    .. math::
+        \chi_i = \varphi_S(\chi_{i-1}, u_i), \quad
+        \xi_{i+1} - \xi_{ss} = A (\xi_i - \xi_{ss}) + B (\chi_i - \chi_{ss}), \quad
+        0 \le u_i, \chi_i \le 100.
+
+    Soft bounds of the outputs add the squares of what is beyond them to the cost.
+
+    The steady state of the target carries bias and measured disturbances, which stay as they
+    are over the horizon. A law with a direction of motion brings that as an unknown more, which
+    is 0 at the start: the valve rests. The programme is built once; estimate, target and friction
+    are its parameters.
+    """
+
+    def __init__(
+        self,
+        model: LinearModel,
+        tuning: PaperTuning,
+        frictions: Sequence[PrintedFriction | None],
+        limits: FloatArray,
+        soft: SoftOutputs | None = None,
+    ) -> None:
+        """Build.
+
+        Args:
+            model: the process.
+            tuning: weights, τ and iteration limit.
+            frictions: one entry per valve, None for a healthy one.
+            limits: of stems and OP, shape (m, 2), %.
+            soft: bounds of the outputs; None for none.
+        """
+        self.model, self.tuning, self._soft = model, tuning, soft
+        self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
+        pairs = [friction for friction in frictions if friction is not None]
+        self._friction = np.array([(f.static_friction, f.dynamic_friction) for f in pairs])
+        horizon, m, n = tuning.weights.horizon, len(model.stem0), model.order
+        self._laws = pairs
+        self._directed = [row for row, friction in enumerate(pairs) if directed(friction)]
+        self._shape = (horizon, m + len(self._sticky) + len(self._directed) + n)
+        open_end = np.full((n, 2), [-np.inf, np.inf])
+        turns = np.full((len(self._directed), 2), [-1.0, 1.0])
+        sample = np.vstack([limits, limits[self._sticky], turns, open_end])
+        self._lower, self._upper = np.tile(sample[:, 0], horizon), np.tile(sample[:, 1], horizon)
+        self._limits = limits
+        self._solver = self._build()
+
+    def _build(self) -> Any:
+        import casadi
+
+        model, weights = self.model, self.tuning.weights
+        m, n, sticky = len(model.stem0), model.order, self._sticky
+        start = casadi.SX.sym("z_0", n), casadi.SX.sym("chi_before", m)
+        goal, before = casadi.SX.sym("chi_ss", m), casadi.SX.sym("u_before", m)
+        friction = casadi.SX.sym("friction", len(sticky), 2)
+        pv_goal = casadi.SX.sym("y_ss", len(model.pv0))
+        state, stem = start
+        last, ways = before, [casadi.SX(0.0) for _ in sticky]
+        unknowns, residuals, cost = [], [], 0.0
+        for i in range(weights.horizon):
+            op = casadi.SX.sym(f"u_{i}", m)
+            stuck = casadi.SX.sym(f"chi_{i}", len(sticky))
+            turn = casadi.SX.sym(f"d_{i}", len(self._directed))
+            after = casadi.SX.sym(f"z_{i + 1}", n)
+            unknowns += [op, stuck, turn, after]
+            moved = casadi.SX(op)
+            for row, j in enumerate(sticky):
+                figures = friction[row, 0], friction[row, 1], self.tuning.smoothing
+                memory = stem[j], last[j], ways[row]
+                law = self._laws[row]
+                follows, way = smoothed_stem(law, memory, op[j], figures, casadi.tanh)
+                residuals.append(follows - stuck[row])
+                moved[j] = stuck[row]
+                if row in self._directed:
+                    ways[row] = turn[self._directed.index(row)]
+                    residuals.append(way - ways[row])
+            drive = casadi.mtimes(model.b, moved - goal)
+            residuals.append(casadi.mtimes(model.a, state) + drive - after)
+            cost += _square(stem - goal, weights.stem) + _square(state, weights.state)
+            cost += _square(moved - stem, weights.move) + _square(op - goal, weights.op)
+            if weights.op_move is not None:
+                cost += _square(op - last, weights.op_move)
+            if self._soft is not None:
+                cost += _excess(casadi.mtimes(model.c, after) + pv_goal, self._soft)
+            state, stem, last = after, moved, op
+        cost += _square(state, weights.terminal)
+        problem = {
+            "x": casadi.vertcat(*unknowns),
+            "p": casadi.vertcat(*start, goal, before, casadi.vec(friction), pv_goal),
+            "f": cost,
+            "g": casadi.vertcat(*residuals),
+        }
+        return casadi.nlpsol("stiction_embedding", "ipopt", problem, self._options())
+
+    def _options(self) -> dict[str, Any]:
+        return {
+            "ipopt.max_iter": self.tuning.iterations,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "print_time": False,
+            "calc_lam_p": False,
+            "error_on_fail": False,
+        }
+
+    def solve(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> ProgrammeResult:
+        """Return the local optimum that IPOPT reaches.
+
+        Args:
+            situation: estimate and target.
+            op, stems: the start, shape (N, m) each, %, stems under the hard model.
+        """
+        target = situation.target
+        state = situation.state - target.state
+        parameters = (
+            state,
+            situation.stem,
+            target.stem,
+            situation.op_before,
+            self._friction.T.reshape(-1),
+            target.pv,
+        )
+        solution = self._solver(
+            x0=self._guess(situation, op, stems),
+            p=np.concatenate(parameters),
+            lbx=self._lower,
+            ubx=self._upper,
+            lbg=0.0,
+            ubg=0.0,
+        )
+        stats = self._solver.stats()
+        found = np.array(solution["x"]).reshape(self._shape)[:, : op.shape[1]]
+        cost, iterations = float(solution["f"]), int(stats["iter_count"])
+        status = _status(stats["return_status"])
+        if status is ProgrammeStatus.FAILED or not np.isfinite(found).all():
+            return ProgrammeResult(ProgrammeStatus.FAILED, None, float("inf"), iterations)
+        inside = np.clip(found, self._limits[:, 0], self._limits[:, 1])
+        return ProgrammeResult(status, inside, cost, iterations)
+
+    def _guess(self, situation: PlanProblem, op: FloatArray, stems: FloatArray) -> FloatArray:
+        """Return all unknowns of the start, simulated, shape (N (m + s + n),)."""
+        model, target = self.model, situation.target
+        state = situation.state - target.state
+        states = np.empty((len(op), model.order))
+        for i, drive in enumerate((stems - target.stem) @ model.b.T):
+            state = model.a @ state + drive
+            states[i] = state
+        stuck = stems[:, self._sticky]
+        moves = np.diff(np.vstack([situation.stem[self._sticky], stuck]), axis=0)
+        turns = np.sign(moves[:, self._directed])
+        return np.hstack([op, stuck, turns, states]).reshape(-1)
+
+
+def _status(text: str) -> ProgrammeStatus:
+    if text in _SOLVED:
+        return ProgrammeStatus.SOLVED
+    return ProgrammeStatus.LIMIT if text == _LIMIT else ProgrammeStatus.FAILED
+
+
+def _excess(pv: Any, soft: SoftOutputs) -> Any:
+    import casadi
+
+    cost = casadi.SX(0.0)
+    for j in np.flatnonzero(soft.weights):
+        low, high = soft.bounds[j]
+        above = casadi.fmax(pv[j] - high, 0.0) if np.isfinite(high) else 0.0
+        below = casadi.fmax(low - pv[j], 0.0) if np.isfinite(low) else 0.0
+        cost += soft.weights[j] * (above**2 + below**2)
+    return cost
+
+
+def _square(vector: Any, weight: FloatArray) -> Any:
+    import casadi
+
+    return casadi.mtimes([vector.T, weight, vector])

@@ -1,0 +1,1 @@
+"""The finite-horizon problem: cost, limits, target, the paper's weights."""

@@ -1,0 +1,160 @@
+"""The weights of Section 4.2 by name: as they are printed, and with the misprints mended."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+
+from stiction_ros.control.problem.horizon import HorizonWeights
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+
+class WeightPreset(enum.StrEnum):
+    """Where the weights of a controller come from.
+
+    ``own`` are those of its settings. ``printed`` takes every figure as it stands: max c²_ij is
+    the largest square, and Q_z has six entries, so that the last of the seven states has none.
+    ``corrected`` takes max c²_ij as the square of the largest signed entry, "the maximum
+    element of matrix C", and gives every state its entry in Q_z.
+    """
+
+    OWN = "own"
+    CORRECTED = "corrected"
+    PRINTED = "printed"
+
+
+class WarmStart(enum.StrEnum):
+    """Where the nonlinear programme starts."""
+
+    COMPENSATION = "compensation"  # the sequence (21)
+    SEARCH = "search"  # a small dynamic optimisation
+    NONE = "none"  # OP rests where it is: what the paper's solver would do without help
+
+
+class ProgrammeCost(enum.StrEnum):
+    """What the nonlinear programme minimises."""
+
+    REVISED = "revised"  # (22)
+    PLAIN = "plain"  # (19a) with the weights of the unaware controller, Δu penalised
+
+
+@dataclasses.dataclass(frozen=True)
+class AugmentedWeights:
+    """Penalties of (22) and the terminal penalty of (19a).
+
+    Attributes:
+        horizon: N_H, samples.
+        stem: block of Q_z on χ_{i−1} − χ_ss, shape (m, m).
+        state: block of Q_z on ξ_i − ξ_ss, shape (n, n).
+        move: Q_s on Δχ, shape (m, m).
+        op: R on u_i − u_s, shape (m, m).
+        terminal: V_F on ξ_N − ξ_ss, shape (n, n).
+        op_move: S on Δu, shape (m, m), which (19a) has and (22) has not; None for none.
+    """
+
+    horizon: int
+    stem: FloatArray
+    state: FloatArray
+    move: FloatArray
+    op: FloatArray
+    terminal: FloatArray
+    op_move: FloatArray | None = None
+
+    @property
+    def in_stems(self) -> HorizonWeights:
+        """The part that (19a) has as well, with Δχ in place of Δu."""
+        return HorizonWeights(self.horizon, self.state, self.move, self.terminal)
+
+
+@dataclasses.dataclass(frozen=True)
+class PaperTuning:
+    """The paper's own stiction-embedding controller.
+
+    Attributes:
+        weights: of (22).
+        warm_start: where the programme starts.
+        first_move: a of (21); the paper asks for a > 2.
+        smoothing: τ of (6), 1/%.
+        iterations: limit of IPOPT.
+    """
+
+    weights: AugmentedWeights
+    warm_start: WarmStart = WarmStart.COMPENSATION
+    first_move: float = 2.1
+    smoothing: float = 1e4
+    iterations: int = 100
+
+
+STATE_WEIGHT = 0.01
+TERMINAL_WEIGHT = 1e3
+MOVE_WEIGHTS = (10.0, 100.0)
+STEM_WEIGHT = 1e3
+PRINTED_ENTRIES = 6  # of Q_z
+STEM_MOVE_WEIGHT = 1.0
+OP_WEIGHT = 10.0
+
+
+def unaware_weights(preset: WeightPreset, model: LinearModel, horizon: int) -> HorizonWeights:
+    r"""Return Q, S and V_F of stiction-unaware and stiction-inverting MPC.
+
+    .. math::
+        Q = \frac{C^T C}{\max c_{ij}^2} + 0.01 I, \quad S = \text{diag}(10, 100), \quad
+        V_F = 10^3 I.
+
+    Args:
+        preset: printed or corrected, which say what max c²_ij means.
+        model: A.3 or another with two valves.
+        horizon: N_H, samples.
+
+    Raises:
+        InputError: not two valves, for which S is not printed.
+    """
+    _check_valves(model)
+    n = model.order
+    largest = (model.c**2).max() if preset is WeightPreset.PRINTED else model.c.max() ** 2
+    stage = model.c.T @ model.c / largest + STATE_WEIGHT * np.eye(n)
+    return HorizonWeights(horizon, stage, np.diag(MOVE_WEIGHTS), TERMINAL_WEIGHT * np.eye(n))
+
+
+def augmented_weights(preset: WeightPreset, model: LinearModel, horizon: int) -> AugmentedWeights:
+    r"""Return Q_z, Q_s, R and V_F of stiction-embedding MPC for any number m of valves.
+
+    .. math::
+        Q_z = \text{diag}(10^3 I_m, I_n), \quad Q_s = I_m, \quad R = 10 I_m, \quad V_F = 10^3 I_n.
+
+    ``printed`` leaves entries of Q_z after the sixth at zero.
+    """
+    m, n = model.b.shape[1], model.order
+    diagonal = np.concatenate([np.full(m, STEM_WEIGHT), np.ones(n)])
+    if preset is WeightPreset.PRINTED:
+        diagonal[PRINTED_ENTRIES:] = 0.0
+    return AugmentedWeights(
+        horizon,
+        np.diag(diagonal[:m]),
+        np.diag(diagonal[m:]),
+        STEM_MOVE_WEIGHT * np.eye(m),
+        OP_WEIGHT * np.eye(m),
+        TERMINAL_WEIGHT * np.eye(n),
+    )
+
+
+def plain_weights(unaware: HorizonWeights) -> AugmentedWeights:
+    """Return (19a) as the cost of the augmented model: no Q_z on stems, no Q_s, no R."""
+    none = np.zeros_like(unaware.move)
+    return AugmentedWeights(
+        unaware.horizon, none, unaware.state, none, none, unaware.terminal, unaware.move
+    )
+
+
+def _check_valves(model: LinearModel) -> None:
+    count = model.b.shape[1]
+    if count != len(MOVE_WEIGHTS):
+        raise InputError(
+            f"the paper gives S for {len(MOVE_WEIGHTS)} valves, the loop has {count}",
+            where="preset",
+            fix="use preset: own",
+        )

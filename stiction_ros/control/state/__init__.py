@@ -1,0 +1,1 @@
+"""State and disturbance from PV and the OP that was applied."""

@@ -1,0 +1,1 @@
+"""Where the stems of sticky valves are believed to be."""

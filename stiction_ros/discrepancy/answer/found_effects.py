@@ -1,0 +1,182 @@
+"""What is handed over of each effect: figures with units and intervals, and what it closes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import figures_of
+from stiction_ros.discrepancy.data.gate import DataFinding
+from stiction_ros.discrepancy.decision.decide import LAGS, GapVerdict
+from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
+from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
+from stiction_ros.effects import Behaviour, FloatArray, about
+
+WIDEST = 10.0  # times the range of its signal that an interval of a size may be wide
+WHOLE = 0.95  # of a range of search: an interval that wide holds nothing out
+NO_MEMORY = np.zeros(0)
+SIZES = ("size", "rate", "amplitude")
+
+
+@dataclasses.dataclass(frozen=True)
+class FoundEffect:
+    """One effect that the simulation lacked.
+
+    Attributes:
+        place, effect: as loop models name them.
+        law: which of several laws of one effect, or None.
+        parameters: in engineering units, times in seconds since the first sample.
+        units: of the parameters.
+        intervals: 95 % of each parameter that has one.
+        delta_bic: BIC by which it beats the model without it.
+        closed: share of the free-run excess that is gone with it and not without it; NaN for
+            what no free run shows.
+        verdict: named or ambiguous.
+        alternatives: places and effects that the record does not tell from it.
+        sentence: why it and not its rivals.
+        moves: what it adds to the free run, shape (N, p), units of PV; None for what no free
+            run shows.
+    """
+
+    place: str
+    effect: str
+    law: str | None
+    parameters: Mapping[str, float]
+    units: Mapping[str, str]
+    intervals: Mapping[str, tuple[float, float]]
+    delta_bic: float
+    closed: float
+    verdict: GapVerdict
+    alternatives: tuple[tuple[str, str], ...] = ()
+    sentence: str = ""
+    moves: FloatArray | None = dataclasses.field(default=None, compare=False, repr=False)
+
+    @property
+    def title(self) -> str:
+        """Effect with its law, such as ``stiction (xch)``; the effect alone where it has one."""
+        return self.effect if self.law is None else f"{self.effect} ({self.law})"
+
+    def to_json(self) -> dict[str, object]:
+        """Return the entry of ``effects`` in ``gap --json``."""
+        return {
+            "place": self.place,
+            "effect": self.effect,
+            **({} if self.law is None else {"law": self.law}),
+            "parameters": dict(self.parameters),
+            "units": dict(self.units),
+            "intervals": {key: list(ends) for key, ends in self.intervals.items()},
+            "delta_bic": self.delta_bic,
+            "closed": None if math.isnan(self.closed) else self.closed,
+            "verdict": self.verdict.value,
+            "alternatives": [{"place": p, "effect": e} for p, e in self.alternatives],
+            "sentence": self.sentence,
+        }
+
+
+def units_of(behaviour: Behaviour, place: str) -> dict[str, str]:
+    """Return the units of an effect's parameters by key; a valve's signal is in %."""
+    kind, _, tag = place.partition(":")
+    signal = "%" if kind in ("valve", "load") else f"units of {tag}"
+    return {p.key: p.unit.replace("signal", signal) for p in behaviour.parameters()}
+
+
+def of_data(finding: DataFinding) -> FoundEffect:
+    """Return a finding of the values or of the record as an effect."""
+    return FoundEffect(
+        finding.place,
+        finding.effect,
+        finding.behaviour.law,
+        figures_of(finding.behaviour),
+        units_of(finding.behaviour, finding.place),
+        {},
+        finding.delta_bic,
+        math.nan,
+        GapVerdict.NAMED,
+        sentence="The recorded values themselves show it, before any model is asked",
+    )
+
+
+def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> FoundEffect:
+    """Return a noise larger than declared as an effect.
+
+    Args:
+        laws: that tell it, the best first.
+        declared: score of the declared noise alone.
+        margin: within which laws are not told apart.
+    """
+    best, *others = named_laws(laws, margin)
+    return FoundEffect(
+        best.place,
+        best.behaviour.effect,
+        best.behaviour.law,
+        figures_of(best.behaviour),
+        units_of(best.behaviour, best.place),
+        best.intervals,
+        declared - best.score,
+        math.nan,
+        GapVerdict.AMBIGUOUS if others else GapVerdict.NAMED,
+        tuple((each.place, each.behaviour.effect) for each in others),
+        sentence="What no other effect explains wanders without a relation to OP, more than the "
+        "noise that the model declares",
+    )
+
+
+def own_closed(without: Baseline, base: Baseline) -> float:
+    """Return the share of the excess that is gone with an effect and not without it.
+
+    Where an answer leaves the noise that the model declares, both free runs are whitened by that
+    noise: noise of the equation wanders farther than most effects move PV.
+    """
+    weights = [
+        fit.ar if forms and not fit.enlarged else NO_MEMORY
+        for fit, forms in zip(base.noise, base.declared, strict=True)
+    ]
+    return closed_share(measure_gap(without, weights), measure_gap(base, weights))
+
+
+def moved_by(without: Baseline, base: Baseline) -> FloatArray:
+    """Return what an effect adds to the free run, start and level fitted anew, shape (N, p)."""
+    pairs = zip(without.noise, base.noise, strict=True)
+    return np.column_stack([old.residual - new.residual for old, new in pairs])
+
+
+def on_the_way(place: str, effect: str) -> bool:
+    """Tell whether an effect changes what OP does to PV."""
+    return place.startswith(("valve:", "process:")) or (
+        place.startswith("sensor:") and about(effect).family == LAGS
+    )
+
+
+def holds_nothing_out(
+    effect: AddedEffect, base: Baseline, intervals: Mapping[str, tuple[float, float]]
+) -> bool:
+    """Tell whether an interval allows any size, or next to the whole range of the search."""
+    run, candidate = base.run, effect.fit.candidate
+    kind, _, tag = effect.place.partition(":")
+    if kind in ("valve", "load"):
+        signal = run.runs.op[:, run.model.valve_names.index(tag)]
+    else:
+        signal = run.runs.pv[:, run.model.outputs.index(tag)]
+    span = float(np.ptp(signal))
+    lasts = float(run.runs.time.max())
+    for key, (low, high) in intervals.items():
+        if key in SIZES:
+            reach = span / lasts if key == "rate" else span
+            if low <= 0.0 <= high and candidate.factors:
+                return True
+            if kind != "load" and high - low > WIDEST * reach and reach > 0.0:
+                return True
+    figures = [p.key for p in effect.behaviour.parameters()]
+    for key, axis in zip(figures, candidate.axes, strict=False):
+        if key not in intervals or axis.linear or axis.natural or candidate.factors:
+            continue
+        low, high = (axis.inner(min(max(end, axis.low), axis.high)) for end in intervals[key])
+        whole = axis.inner(axis.high) - axis.inner(axis.low)
+        if whole > 0.0 and high - low > WHOLE * whole:
+            return True
+    return False

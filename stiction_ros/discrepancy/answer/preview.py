@@ -1,0 +1,170 @@
+"""The experiment that would decide, simulated: what each of the rivals would show."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from stiction_ros.discrepancy.answer.results import Discrepancy
+from stiction_ros.effects import Behaviour, FloatArray, from_mapping
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel, Plant
+
+HOLD, RAMP = 30, 60  # samples of each part of the moves of OP
+TRAVEL = 10.0  # % that OP is moved at least
+BANDS = 2.0  # times the friction that it is moved
+MOST = 5  # rivals that are shown
+
+Name = tuple[str, str]
+Figures = Mapping[str, float]
+
+# Figures of a rival that no record tells apart, from those of the effect that stands for it.
+_SAME: dict[tuple[str, str], Callable[[Figures], Figures]] = {
+    ("lag", "pole"): lambda own: {"tau": own["tau"]},
+    ("pole", "lag"): lambda own: {"tau": own["tau"]},
+    ("lag", "lag"): lambda own: {"tau": own["tau"]},
+    ("step", "bias_step"): lambda own: dict(own),
+    ("step", "offset"): lambda own: {"size": own["size"]},
+    ("drift", "drift"): lambda own: dict(own),
+    ("sine", "sine"): lambda own: dict(own),
+    ("stiction", "backlash"): lambda own: {"band": own["f_s"] + own["f_d"]},
+    ("backlash", "stiction"): lambda own: {"f_s": 0.6 * own["band"], "f_d": 0.4 * own["band"]},
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Shown:
+    """What one rival would show.
+
+    Attributes:
+        place, effect: of the rival.
+        stem, pv, true: stem in %, PV as its sensor shows it, and the output itself, shape (K,).
+    """
+
+    place: str
+    effect: str
+    stem: FloatArray
+    pv: FloatArray
+    true: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Preview:
+    """A simulated experiment: OP by hand up, back and in one step, without noise.
+
+    Attributes:
+        valve, output: that are moved and shown.
+        op: shape (K,), %.
+        sample_time: s.
+        rivals: at least two.
+    """
+
+    valve: str
+    output: str
+    op: FloatArray
+    sample_time: float
+    rivals: tuple[Shown, ...]
+
+
+def preview(found: Discrepancy) -> Preview | None:
+    """Return the experiment for the first effect that is left in doubt; None without one."""
+    rivals = _rivals(found)
+    if len(rivals) < 2:
+        return None
+    model = _quiet(found.model_before)
+    tags = {place.partition(":")[2] for place, _ in rivals}
+    valve = next((v for v in model.valve_names if v in tags), model.valve_names[0])
+    output = next((o for o in model.outputs if o in tags), model.outputs[0])
+    j, i = model.valve_names.index(valve), model.outputs.index(output)
+    op = _moves(model, j, rivals)
+    shown = []
+    for (place, effect), behaviour in rivals.items():
+        try:
+            altered = model.with_effect(place, _soon(behaviour, model.sample_time))
+        except InputError:
+            continue  # what changes the record alone has nothing to show in the plant
+        shown.append(Shown(place, effect, *_run(altered, op, j, i)))
+    return Preview(valve, output, op[:, j], model.sample_time, tuple(shown))
+
+
+def _rivals(found: Discrepancy) -> dict[Name, Behaviour]:
+    for effect in found.effects:
+        if not effect.alternatives:
+            continue
+        values = dict(effect.parameters)
+        head = {"effect": effect.effect} | ({} if effect.law is None else {"law": effect.law})
+        rivals: dict[Name, Behaviour] = {(effect.place, effect.effect): from_mapping(head | values)}
+        for place, name in effect.alternatives:
+            same = _SAME.get((effect.effect, name))
+            if same is not None:
+                rivals[place, name] = from_mapping({"effect": name} | dict(same(values)))
+            else:
+                rivals |= _fitted(found, (place, name))
+        if len(rivals) > 1:
+            return dict(list(rivals.items())[:MOST])
+    found_alone: dict[Name, Behaviour] = {}
+    for key in found.alternatives:
+        found_alone |= _fitted(found, key)
+    return dict(list(found_alone.items())[:MOST])
+
+
+def _fitted(found: Discrepancy, key: Name) -> dict[Name, Behaviour]:
+    """Return a rival with the figures that fitted the record best, where it was tried."""
+    for look in reversed(found.looks):
+        for fit in look.scores.fits:
+            if fit.candidate.key == key:
+                behaviour = fit.behaviour(look.scores.base.run)
+                return {} if behaviour is None else {key: behaviour}
+    return {}
+
+
+def _soon(behaviour: Behaviour, step: float) -> Behaviour:
+    """Return the effect with its moment inside the experiment."""
+    values = behaviour.to_mapping()
+    if "time" not in values:
+        return behaviour
+    return from_mapping(values | {"time": HOLD * step})
+
+
+def _moves(model: LoopModel, valve: int, rivals: Mapping[Name, Behaviour]) -> FloatArray:
+    """Return OP by hand, shape (K, m): a hold, up, back, a step, and a hold."""
+    friction = [
+        float(v)
+        for each in rivals.values()
+        for key, v in each.to_mapping().items()
+        if key in ("f_s", "band")
+    ]
+    travel = max([TRAVEL, *(BANDS * each for each in friction)])
+    low, high = model.limits[valve].tolist()
+    middle = float(model.op0[valve])
+    up = np.linspace(0.0, travel, RAMP)
+    path = np.concatenate([np.zeros(2 * HOLD), up, np.full(HOLD, travel), up[::-1], np.zeros(HOLD)])
+    path = np.concatenate([path, np.full(2 * RAMP, travel)])
+    op = np.tile(model.op0, (len(path), 1))
+    op[:, valve] = np.clip(middle + path, low, high)
+    return op
+
+
+def _run(
+    model: LoopModel, op: FloatArray, valve: int, output: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    plant = Plant(model, 0)
+    rows = []
+    for each in op:
+        seen = plant.measure()
+        stem = plant.apply(each)
+        rows.append((stem[valve], seen.pv[output], seen.pv_clean[output]))
+    stems, pv, true = np.array(rows).T
+    return stems, pv, true
+
+
+def _quiet(model: LoopModel) -> LoopModel:
+    """Return the model without noise, at rest at its operating point."""
+    document = model.to_mapping()
+    for entry in document["process"].get("outputs", []):
+        entry.pop("noise", None)
+    document["disturbances"] = []
+    document.pop("initial", None)
+    return LoopModel.from_mapping(document, model.name)

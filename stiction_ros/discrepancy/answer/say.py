@@ -1,0 +1,114 @@
+"""Step 6: one word for all looks, and the experiment that would say more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stiction_ros.discrepancy.answer.found_effects import FoundEffect
+from stiction_ros.discrepancy.answer.results import Look
+from stiction_ros.discrepancy.decision.decide import GapVerdict
+from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.decision.testable import Testable
+from stiction_ros.effects import about
+
+LEFT = 0.4  # of the last effect's score: what may stay unexplained beside a name
+
+
+def overall(
+    effects: Sequence[FoundEffect], looks: Sequence[Look], testable: Sequence[Testable]
+) -> tuple[GapVerdict, tuple[tuple[str, str], ...]]:
+    """Return the verdict of all looks and what stays possible beside the effects.
+
+    With several effects it is that of the largest, which is found first; each effect has a
+    verdict of its own.
+    """
+    last = looks[-1].decision
+    alternatives = [name for effect in effects for name in effect.alternatives]
+    open_set = last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable
+    if not effects:
+        if open_set and last.chosen is not None:
+            names = [*last.chosen.candidate.keys, *last.alternatives]
+            return GapVerdict.AMBIGUOUS, tuple(dict.fromkeys(names))
+        if last.verdict is GapVerdict.UNKNOWN:
+            return GapVerdict.UNKNOWN, ()
+        if last.chosen is not None and not looks[-1].kept:
+            return GapVerdict.NONE, ()
+        if not any(t.testable for t in testable if _physical(t)):
+            return GapVerdict.UNTESTABLE, ()
+        return GapVerdict.NONE, ()
+    if last.verdict is GapVerdict.UNKNOWN and _much_left(effects, looks[-1]):
+        return GapVerdict.UNKNOWN, tuple(alternatives)
+    return effects[0].verdict, tuple(dict.fromkeys(alternatives))
+
+
+def experiment_for(
+    verdict: GapVerdict,
+    effects: Sequence[FoundEffect],
+    alternatives: Sequence[tuple[str, str]],
+    testable: Sequence[Testable],
+) -> str:
+    """Return what to do to learn more; empty when there is nothing to tell apart."""
+    if verdict is GapVerdict.UNTESTABLE:
+        return "; ".join(dict.fromkeys(t.experiment for t in testable if not t.testable))
+    if verdict is GapVerdict.UNKNOWN:
+        return "record the stem position and a second sensor, and move the set-point in steps"
+    if not alternatives:
+        return ""
+    names = {effect for _, effect in alternatives}
+    names |= {effect.effect for effect in effects if effect.alternatives}
+    told = (about(name).separation for name in sorted(names))
+    hints = dict.fromkeys(text for text in told if text)
+    return "; ".join(hints) or "move the set-point in larger steps and record the stem position"
+
+
+def reason_for(effect: AddedEffect, looks: Sequence[Look]) -> str:
+    """Return one sentence: why an effect, and not its rivals."""
+    key = effect.fit.candidate.key
+    found = [each for each in looks if each.scores.of(*key) is not None]
+    if not found:
+        return ""
+    own_looks = [
+        each
+        for each in found
+        if each.decision.chosen is not None and each.decision.chosen.candidate.key == key
+    ]
+    look = (own_looks or found)[0]  # else it came in at the end, in the stead of others
+    own = look.scores.of(*key)
+    assert own is not None
+    rivals = [
+        fit
+        for fit in sorted(look.scores.fits, key=lambda fit: -fit.evidence)
+        if fit.candidate.key not in (key, *effect.alternatives)
+    ]
+    gained = f"It gains {own.evidence:.0f} BIC over no effect"
+    if not rivals:
+        return gained
+    second = rivals[0]
+    if second.evidence <= 0.0:
+        return f"{gained}; no other effect gains anything"
+    rival = called(second.candidate.place, second.candidate.effect, second.candidate.law)
+    return f"{gained}, the next best ({rival}) {second.evidence:.0f}"
+
+
+def called(place: str, effect: str, law: str | None = None) -> str:
+    """Return an effect for people, such as ``stiction (he) of valve V1``."""
+    kind, _, tag = place.partition(":")
+    effect = effect.replace("_", " ") + (f" ({law})" if law else "")
+    words = {
+        "valve": f"{effect} of valve {tag}",
+        "load": f"{effect} of the load at {tag}",
+        "process": f"{effect} of the process to {tag}",
+        "disturbance": f"{effect} of a disturbance on {tag}",
+        "sensor": f"{effect} of the sensor of {tag}",
+    }
+    return words.get(kind, effect)
+
+
+def _physical(entry: Testable) -> bool:
+    return entry.place.startswith(("valve:", "process:"))
+
+
+def _much_left(effects: Sequence[FoundEffect], look: Look) -> bool:
+    outside = [fit for fit in look.scores.fits if not fit.candidate.inside]
+    left = max((fit.delta_bic for fit in outside), default=0.0)
+    return left > LEFT * max(effect.delta_bic for effect in effects)

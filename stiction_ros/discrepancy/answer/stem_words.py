@@ -1,0 +1,103 @@
+"""What a recorded stem says of its valve by itself, before any process is asked."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import figures_of
+from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.effects import Behaviour, FloatArray
+
+LATEST = 20  # samples that a stem may come late
+TELLS = 0.5  # of the squared distance from OP that an effect has to explain to be told
+ACCURATE = 0.01  # of the span of OP: a stem that near follows it
+
+
+@dataclasses.dataclass(frozen=True)
+class StemLook:
+    """A recorded stem against OP.
+
+    Attributes:
+        valve: tag.
+        off: root mean square of stem less OP, %, a constant taken out.
+        constant: that constant, %.
+        late: samples by which the stem matches OP best.
+        behaviour: the effect of the valve that explains most of the distance; None where none
+            explains enough.
+        share: of the squared distance that it explains, 0 to 1.
+        span: of OP, %.
+    """
+
+    valve: str
+    off: float
+    constant: float
+    late: int
+    behaviour: Behaviour | None
+    share: float
+    span: float
+
+    @property
+    def sentence(self) -> str:
+        """What it says, for people."""
+        head = f"the stem of {self.valve} is recorded: it stands {self.off:.2g} % off OP"
+        if abs(self.constant) > self.off:
+            head += f" about a constant {self.constant:.3g} %"
+        if self.off <= ACCURATE * self.span:
+            return (
+                f"{head} and follows it, so that what the simulation misses lies behind the valve"
+            )
+        if self.late:
+            head += f", and matches it best {self.late} samples later"
+        if self.behaviour is None:
+            return f"{head}; no single effect of a valve explains that"
+        figures = ", ".join(f"{k} {v:.3g}" for k, v in figures_of(self.behaviour).items())
+        share = f"{100.0 * self.share:.0f} %"
+        return f"{head}; {self.behaviour.title()} ({figures}) explains {share} of that by the stem"
+
+
+def look_at_stems(run: FreeRun) -> tuple[StemLook, ...]:
+    """Return what every stem says that is recorded throughout."""
+    if any(record.stem is None for record in run.runs.records):
+        return ()
+    return tuple(_look(run, j) for j in range(len(run.model.valves)))
+
+
+def _look(run: FreeRun, valve: int) -> StemLook:
+    name = run.model.valve_names[valve]
+    parts = []
+    for record in run.runs.records:
+        assert record.stem is not None
+        parts.append(record.stem[:, record.valves.index(name)])
+    stem = np.concatenate(parts)
+    op = run.stems[:, valve]
+    constant = float(np.median(stem - op))
+    before = _left(stem, op[:, None])[0]
+    best, share = None, TELLS
+    for candidate in valve_candidates(run):
+        if not isinstance(candidate, ValveCandidate) or candidate.valve != valve:
+            continue
+        points = candidate.values(candidate.grid())
+        left = _left(stem, candidate.stems(run, points))
+        k = int(np.argmin(left))
+        gone = 1.0 - float(left[k]) / max(float(before), 1e-300)
+        if gone > share:
+            best, share = candidate.behaviour(run, points[k], np.zeros(0)), gone
+    shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in range(LATEST + 1)]
+    return StemLook(
+        name,
+        float(np.sqrt(before / len(stem))),
+        constant,
+        int(np.argmin(shifted)),
+        best,
+        share if best is not None else 0.0,
+        float(np.ptp(op)),
+    )
+
+
+def _left(stem: FloatArray, tried: FloatArray) -> FloatArray:
+    """Return the squared distances of tried stems, constants taken out, shape (G,)."""
+    away = tried - stem[:, None]
+    return np.asarray(np.sum((away - away.mean(axis=0)) ** 2, axis=0))

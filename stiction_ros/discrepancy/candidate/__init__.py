@@ -1,0 +1,1 @@
+"""Candidates: one change of a model each, with figures to be searched."""

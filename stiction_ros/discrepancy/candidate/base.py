@@ -1,0 +1,229 @@
+"""What a candidate is: one change of the current model, with figures to be searched."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from stiction_ros.discrepancy.likelihood.noise import BoolArray
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.effects import Axis, Behaviour, FloatArray, Parameter, Seen, about
+from stiction_ros.effects.behaviour import SimulatesGrid
+
+_RANKED = 200  # points of a grid that may be among the best ones
+_NEIGHBOURS = 1.5  # steps of the first grid
+_TINY = 1e-300
+
+
+@dataclasses.dataclass(frozen=True)
+class Response:
+    """What a candidate adds to the free run, for G points of its grid.
+
+    Attributes:
+        shifts: per output, shape (N, G): added as it is.
+        sizes: per output, shape (N, G, s): added with s factors that least squares finds.
+        possible: which points are figures that the effect can have, shape (G,); None for all.
+            What is said of the others is never used.
+    """
+
+    shifts: Mapping[int, FloatArray]
+    sizes: Mapping[int, FloatArray] = dataclasses.field(default_factory=dict)
+    possible: BoolArray | None = None
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """Indices of the outputs that it touches."""
+        return tuple(sorted({*self.shifts, *self.sizes}))
+
+    def pick(self, point: int) -> Response:
+        """Return the response at one point of the grid."""
+        return Response(
+            {i: v[:, point : point + 1] for i, v in self.shifts.items()},
+            {i: v[:, point : point + 1] for i, v in self.sizes.items()},
+            None if self.possible is None else self.possible[point : point + 1],
+        )
+
+    @property
+    def impossible(self) -> bool:
+        """Whether no point is possible."""
+        return self.possible is not None and not self.possible.any()
+
+
+class GridBehaviour(SimulatesGrid, Protocol):
+    """What a candidate needs of a behaviour: whole grids at once, and one by its figures."""
+
+    effect: ClassVar[str]
+    law: ClassVar[str | None]
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """Return the parameters in the order of the grid's columns."""
+        ...
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Behaviour:
+        """Return the behaviour with the given values by key."""
+        ...
+
+
+class Candidate(ABC):
+    """One change of the current model.
+
+    Attributes:
+        place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``.
+        axes: of the figures that are searched; may be empty.
+        factors: number of figures that least squares finds.
+        twins: places and effects that no record of OP and PV tells from this one.
+        dated: whether its first axis is a moment of the record.
+        contains: places and effects of the catalogue that are parts of it.
+        most_of: share of what it gains that such a part has to gain to be looked at first.
+        needle: whether its optimum is narrower than any lattice is fine.
+        sharp: whether its likelihood has peaks a sample wide, so that it is searched under
+            white noise as well, which blurs them.
+        inside: whether it belongs to the catalogue; others show only that something is amiss.
+    """
+
+    place: str
+    effect: str
+    axes: tuple[Axis, ...] = ()
+    factors: int = 0
+    twins: tuple[tuple[str, str], ...] = ()
+    inside: bool = True
+    dated: bool = False
+    contains: tuple[tuple[str, str], ...] = ()
+    most_of: float = 0.5
+    needle: bool = False
+    sharp: bool = False
+
+    @abstractmethod
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        """Return the response for points of shape (G, axes), in values."""
+
+    @abstractmethod
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+        """Return the effect with these figures; None outside the catalogue."""
+
+    def count(self, point: FloatArray) -> int:
+        """Return the number of free figures at a point, for BIC."""
+        return len(self.axes) + self.factors
+
+    def grid(self) -> FloatArray:
+        """Return the first grid in coordinates of the search, shape (G, axes)."""
+        if not self.axes:
+            return np.zeros((1, 0))
+        meshed = np.meshgrid(*[axis.grid() for axis in self.axes], indexing="ij")
+        return np.stack([each.ravel() for each in meshed], axis=1)
+
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        """Return values for coordinates of the search, both of shape (G, axes)."""
+        if not self.axes:
+            return coordinates
+        return np.stack([axis.outer(coordinates[:, d]) for d, axis in enumerate(self.axes)], axis=1)
+
+    def possible(self, points: FloatArray) -> BoolArray:
+        """Return which points, values of shape (G, axes), are figures that the effect can have."""
+        return np.ones(len(points), dtype=bool)
+
+    def coordinates(self, point: FloatArray) -> FloatArray:
+        """Return the coordinates of the search of one point, both of shape (axes,)."""
+        return np.array([a.inner(v) for a, v in zip(self.axes, point.tolist(), strict=True)])
+
+    def apart(self, coordinates: FloatArray, loss: FloatArray, most: int) -> list[int]:
+        """Return the best points that are no neighbours of each other in the first grid.
+
+        Args:
+            coordinates: of the search, shape (G, axes).
+            loss: shape (G,), the least is best.
+            most: how many at most.
+        """
+        steps = np.array([max(axis.step, _TINY) for axis in self.axes])
+        chosen: list[int] = []
+        for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
+            away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]
+            if all(each.max(initial=0.0) > _NEIGHBOURS for each in away):
+                chosen.append(place)
+            if len(chosen) == most:
+                break
+        return chosen
+
+    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return values in a box around a point, shape (G, axes); for needles alone.
+
+        Args:
+            point: values, shape (axes,).
+            cube: points between −1 and 1, shape (G, axes).
+            size: of the box, 1 for the largest.
+        """
+        raise NotImplementedError(f"{self.name} is no needle")
+
+    def lead(self, point: FloatArray) -> float:
+        """Return how far from OP a stem stands before the first sample, %."""
+        return 0.0
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        """Tell whether its figures are of engineering size.
+
+        Args:
+            point: searched figures, shape (axes,).
+            factors: figures found by least squares, shape (s,).
+        """
+        return abs(float(point[0])) >= self.about.least if len(point) else True
+
+    def reference(self, seen: Seen) -> tuple[float, ...]:
+        """Return searched figures of engineering size; those left out are 0, or the nearest end.
+
+        Args:
+            seen: the signal that it acts on.
+        """
+        return self.about.reference(seen)
+
+    def signal(self, run: FreeRun) -> FloatArray:
+        """Return the signal that it acts on, shape (N,)."""
+        return run.forced[:, 0]
+
+    @property
+    def about(self) -> type[Behaviour]:
+        """What is known of its effect; nothing of one outside the catalogue."""
+        return about(self.effect) if self.inside else Behaviour
+
+    @property
+    def absorbed(self) -> bool:
+        """Whether another linear process would do as well."""
+        return self.about.absorbed
+
+    def at_bound(self, point: FloatArray) -> bool:
+        """Tell whether a figure lies on the bound of its range: then it is no figure."""
+        return any(axis.bounds(v) for axis, v in zip(self.axes, point.tolist(), strict=True))
+
+    def keeps(self, run: FreeRun, point: FloatArray) -> float | None:
+        """Return e^(−T_s/τ) where it is a lag that may act on the noise too; None elsewhere."""
+        return None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Place and effect."""
+        return self.place, self.effect
+
+    @property
+    def keys(self) -> tuple[tuple[str, str], ...]:
+        """Place and effect, its own first, of all that it stands for."""
+        return (self.key, *self.twins)
+
+    @property
+    def name(self) -> str:
+        """Name for people, such as ``valve:V1 stiction (he)``."""
+        return f"{self.place} {self.effect}" + (f" ({self.law})" if self.law else "")
+
+    @property
+    def law(self) -> str | None:
+        """Law, where its effect has several; None elsewhere."""
+        return None
+
+
+def figures_of(behaviour: Behaviour) -> dict[str, float]:
+    """Return the parameters of an effect by key, in engineering units."""
+    return {p.key: float(getattr(behaviour, p.attribute)) for p in behaviour.parameters()}

@@ -1,0 +1,146 @@
+"""Candidates in the process, between its valves and its sensors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
+from stiction_ros.discrepancy.candidate.valve import lag_axis, lasts
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
+from stiction_ros.effects import (
+    Axis,
+    Behaviour,
+    ExtraDelay,
+    ExtraPole,
+    FloatArray,
+    Leak,
+    ProcessGain,
+)
+from stiction_ros.processes import Process
+
+LONGEST_DELAY = 20
+LEAST_CHANGE = 0.03  # of the gain
+LEAST_GAIN = 0.25
+INTEGRATES = 0.05  # of the record: a process with a longer time constant may leak
+
+
+class OutputCandidate(Candidate):
+    """A change of one output alone."""
+
+    def __init__(self, run: FreeRun, output: int, place: str, effect: str) -> None:
+        """Take the output's index and the kind of place, such as ``process``."""
+        self.output = output
+        self.place = f"{place}:{run.model.outputs[output]}"
+        self.effect = effect
+
+    def signal(self, run: FreeRun) -> FloatArray:
+        return run.forced[:, self.output]
+
+    def twin(self, run: FreeRun, place: str, effect: str) -> OutputCandidate:
+        """Name another effect that no record of OP and PV tells from this one."""
+        self.twins = (*self.twins, (f"{place}:{run.model.outputs[self.output]}", effect))
+        return self
+
+
+class FilterCandidate(OutputCandidate):
+    """A linear change between process and sensor: pole, delay, leak."""
+
+    def __init__(self, run: FreeRun, output: int, kind: type[GridBehaviour], axis: Axis) -> None:
+        """Take the output's index, the behaviour and its one figure."""
+        super().__init__(run, output, "process", kind.effect)
+        self.kind, self.axes = kind, (axis,)
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        parts = []
+        for rows in run.runs.slices:
+            values = run.forced[rows, self.output]
+            step = run.runs.sample_time
+            start = self.starts(points, float(values[0]))
+            parts.append(self.kind.simulate_grid(points[:, :1], values, start, step))
+        response = end_to_end(parts)
+        response -= run.forced[:, self.output, None]
+        return Response({self.output: response})
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        """Return what the filters rest at before the first sample, shape (G,)."""
+        return np.full(len(points), first)
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return self.kind.from_mapping({self.kind.parameters()[0].key: float(point[0])})
+
+
+class PoleCandidate(FilterCandidate):
+    """One more lag of the output, by its time constant and where it begins."""
+
+    def __init__(self, run: FreeRun, output: int) -> None:
+        """Take the output's index."""
+        super().__init__(run, output, ExtraPole, lag_axis(run))
+        span = float(np.ptp(run.forced[:, output]))
+        self.axes = (*self.axes, Axis(-10.0 * span, 10.0 * span, 1, linear=True))
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        return lasts(self, point)
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        return first + points[:, 1]
+
+    def count(self, point: FloatArray) -> int:
+        return 1
+
+    def keeps(self, run: FreeRun, point: FloatArray) -> float | None:
+        return math.exp(-run.runs.sample_time / max(float(point[0]), 1e-9))
+
+
+class GainCandidate(OutputCandidate):
+    """Another gain: the free run itself, by a factor."""
+
+    factors = 1
+
+    def __init__(self, run: FreeRun, output: int) -> None:
+        """Take the output's index."""
+        super().__init__(run, output, "process", "gain")
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        return Response({}, {self.output: run.forced[:, self.output][:, None, None]})
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        """Refuse a process that hardly answers at all: that is a valve that does not move."""
+        return abs(float(factors[0])) >= LEAST_CHANGE and 1.0 + float(factors[0]) >= LEAST_GAIN
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return ProcessGain(float(np.clip(1.0 + factors[0], 0.01, 100.0)))
+
+
+def slowest(process: Process, sample_time: float) -> float:
+    """Return the longest time constant of a process, samples; inf where it integrates."""
+    poles = np.abs(np.linalg.eigvals(process.linear(sample_time).a))
+    largest = float(poles.max(initial=0.0))
+    if largest >= 1.0 - 1e-9:
+        return math.inf
+    return -1.0 / math.log(largest) if largest > 0.0 else 0.0
+
+
+def output_candidates(run: FreeRun) -> list[Candidate]:
+    """Return the candidates in the process, for every output that moves."""
+    found: list[Candidate] = []
+    part = run.runs.longest
+    longest = part.stop - part.start
+    step = run.runs.sample_time
+    memory = slowest(run.model.process, step)
+    for i in range(run.forced.shape[1]):
+        if float(np.ptp(run.forced[:, i])) <= 0.0:
+            continue
+        found += [
+            GainCandidate(run, i),
+            PoleCandidate(run, i).twin(run, "sensor", "lag"),
+            FilterCandidate(
+                run, i, ExtraDelay, Axis(1.0, LONGEST_DELAY, LONGEST_DELAY, natural=True)
+            ),
+        ]
+        if memory > INTEGRATES * longest:
+            lowest = max(0.3 / longest, 0.5 / memory) / step
+            rates = Axis(lowest, 0.3 / step, 18, logarithmic=True)
+            found.append(FilterCandidate(run, i, Leak, rates))
+    return found

@@ -1,0 +1,228 @@
+"""Candidates of behaviours that say themselves on which axes they are searched."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.candidate.output import OutputCandidate
+from stiction_ros.discrepancy.candidate.valve import ValveCandidate
+from stiction_ros.discrepancy.candidate.wave import surprises
+from stiction_ros.discrepancy.likelihood.noise import BoolArray
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, seen_of
+from stiction_ros.effects import Axis, Behaviour, FloatArray, Seen, behaviours
+from stiction_ros.errors import InputError
+
+ON_OUTPUTS = ("process", "disturbance", "sensor")
+
+
+class PluggedValve(ValveCandidate):
+    """A behaviour at the end of a valve's chain, by its own axes."""
+
+    def __init__(self, run: FreeRun, valve: int, kind: type[Behaviour]) -> None:
+        """Take the valve's index and the behaviour."""
+        axes = axes_of(kind, seen_of(run, run.stems[:, valve]))
+        super().__init__(run, valve, kind, axes)
+        self._about = kind
+
+    def possible(self, points: FloatArray) -> BoolArray:
+        return possible(self._about, points)
+
+    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return stem positions, shape (N, G), %; OP where the figures are not possible."""
+        rows = self.possible(points)
+        if rows.all():
+            return super().stems(run, points)
+        stems = np.repeat(run.stems[:, self.valve, None], len(points), axis=1)
+        if rows.any():
+            stems[:, rows] = super().stems(run, points[rows])
+        return stems
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        return dataclasses.replace(super().respond(run, points), possible=self.possible(points))
+
+    @property
+    def about(self) -> type[Behaviour]:
+        return self._about
+
+
+class PluggedLoad(Candidate):
+    """A behaviour that enters the process beside the stem of a valve, by its own axes."""
+
+    def __init__(
+        self, run: FreeRun, valve: int, kind: type[Behaviour], moments: FloatArray
+    ) -> None:
+        """Take the valve's index, the behaviour, and moments, s, at which PV surprises most."""
+        self.valve, self._about = valve, kind
+        self.place, self.effect = f"load:{run.model.valves[valve].name}", kind.effect
+        self.axes = axes_of(kind, seen_of(run, np.zeros(len(run.runs))))
+        self.dated, self._moments = is_dated(kind), moments
+
+    def grid(self) -> FloatArray:
+        return with_moments(super().grid(), self.axes, self._moments if self.dated else None)
+
+    @property
+    def about(self) -> type[Behaviour]:
+        return self._about
+
+    @property
+    def law(self) -> str | None:
+        return self._about.law
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        wave = simulated(run, self._about, points, np.zeros(len(run.runs)))
+        entering = run.stems[:, self.valve, None] + wave
+        reached = [i for i in range(run.forced.shape[1]) if run.responses.reaches(i, self.valve)]
+        shifts = {i: run.drive(i, self.valve, entering) - run.forced[:, i : i + 1] for i in reached}
+        return Response(shifts or {0: np.zeros(wave.shape)}, possible=self.possible(points))
+
+    def possible(self, points: FloatArray) -> BoolArray:
+        return possible(self._about, points)
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return made(self._about, point)
+
+
+class PluggedOutput(OutputCandidate):
+    """A behaviour in the process, on an output or at its sensor, by its own axes."""
+
+    def __init__(
+        self, run: FreeRun, output: int, place: str, kind: type[Behaviour], moments: FloatArray
+    ) -> None:
+        """Take the output's index, the place, the behaviour, and when PV surprises most, s."""
+        super().__init__(run, output, place, kind.effect)
+        self._about, self._kind = kind, place
+        self.axes = axes_of(kind, seen_of(run, self.signal(run)))
+        self.dated, self._moments = is_dated(kind), moments
+
+    def grid(self) -> FloatArray:
+        return with_moments(super().grid(), self.axes, self._moments if self.dated else None)
+
+    @property
+    def about(self) -> type[Behaviour]:
+        return self._about
+
+    @property
+    def law(self) -> str | None:
+        return self._about.law
+
+    def signal(self, run: FreeRun) -> FloatArray:
+        """Return what it acts on: nothing, the output of the process, or what a sensor sees."""
+        if self._kind == "disturbance":
+            return np.zeros(len(run.runs))
+        values = run.forced[:, self.output]
+        return values if self._kind == "process" else values + run.known[:, self.output]
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        incoming = self.signal(run)
+        return Response(
+            {self.output: simulated(run, self._about, points, incoming) - incoming[:, None]},
+            possible=self.possible(points),
+        )
+
+    def possible(self, points: FloatArray) -> BoolArray:
+        return possible(self._about, points)
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return made(self._about, point)
+
+
+def plugged_candidates(run: FreeRun, whitened: list[FloatArray]) -> list[Candidate]:
+    """Return a candidate for every place of every behaviour that names axes.
+
+    Args:
+        run: of the current model.
+        whitened: per output the innovations, shape (N,).
+    """
+    found: list[Candidate] = []
+    everywhere = surprises(run, whitened)
+    for kind in behaviours():
+        if kind.axes.__func__ is Behaviour.axes.__func__:  # type: ignore[attr-defined]
+            continue
+        for j in range(len(run.model.valves)):
+            if "valve" in kind.places:
+                found.append(PluggedValve(run, j, kind))
+            if "load" in kind.places:
+                found.append(PluggedLoad(run, j, kind, everywhere))
+        for i in range(len(run.model.outputs)):
+            places = [place for place in ON_OUTPUTS if place in kind.places]
+            moments = surprises(run, [whitened[i]])
+            found += [PluggedOutput(run, i, place, kind, moments) for place in places]
+    return [candidate for candidate in found if candidate.axes and _has_a_point(candidate)]
+
+
+def _has_a_point(candidate: Candidate) -> bool:
+    return bool(candidate.possible(candidate.values(candidate.grid())).any())
+
+
+def possible(kind: type[Behaviour], points: FloatArray) -> BoolArray:
+    """Return which rows of figures a behaviour takes, shape (G,).
+
+    Axes span a box; a law may refuse a part of it, as f_D > f_S.
+    """
+    found = np.ones(len(points), dtype=bool)
+    for g, point in enumerate(points):
+        try:
+            made(kind, point)
+        except InputError:
+            found[g] = False
+    return found
+
+
+def axes_of(kind: type[Behaviour], seen: Seen) -> tuple[Axis, ...]:
+    """Return the axes of a behaviour.
+
+    Raises:
+        InputError: not one for each of its parameters.
+    """
+    axes = kind.axes(seen)
+    if axes and len(axes) != len(kind.parameters()):
+        raise InputError(
+            f"{len(axes)} axes for {len(kind.parameters())} parameters",
+            where=f"{kind.__module__}.{kind.__name__}.axes",
+            fix="return one axis for each parameter, in their order, or none at all",
+        )
+    return axes
+
+
+def with_moments(
+    grid: FloatArray, axes: tuple[Axis, ...], moments: FloatArray | None
+) -> FloatArray:
+    """Return a grid, shape (G, axes), with further values of its first axis, a moment in s."""
+    if moments is None or not len(moments):
+        return grid
+    first = np.clip(moments, axes[0].low, axes[0].high)
+    others = np.unique(grid[:, 1:], axis=0)
+    more = np.column_stack([np.repeat(first, len(others)), np.tile(others, (len(first), 1))])
+    return np.unique(np.vstack([grid, more]), axis=0)
+
+
+def is_dated(kind: type[Behaviour]) -> bool:
+    """Tell whether the first figure of a behaviour is a moment of the record."""
+    return kind.parameters()[0].key == "time"
+
+
+def simulated(
+    run: FreeRun, kind: type[Behaviour], points: FloatArray, values: FloatArray
+) -> FloatArray:
+    """Return what a behaviour makes of a signal, shape (N, G), record by record.
+
+    The signal as it is where the figures are not possible.
+    """
+    step, taken = run.runs.sample_time, possible(kind, points)
+    out = np.repeat(values[:, None], len(points), axis=1)
+    if taken.any():
+        parts = [
+            kind.simulate_grid(points[taken], values[rows], float(values[rows.start]), step)
+            for rows in run.runs.slices
+        ]
+        out[:, taken] = end_to_end(parts)
+    return out
+
+
+def made(kind: type[Behaviour], point: FloatArray) -> Behaviour:
+    """Return the behaviour with the figures of a point."""
+    keys = [entry.key for entry in kind.parameters()]
+    return kind.from_mapping(dict(zip(keys, point.tolist(), strict=True)))

@@ -1,0 +1,254 @@
+"""Candidates at a valve: one more effect behind those that the model has already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
+from stiction_ros.effects import (
+    Axis,
+    Backlash,
+    Behaviour,
+    Characteristic,
+    FloatArray,
+    HeStiction,
+    Lag,
+    Saturation,
+    Seen,
+    Slew,
+    XchStiction,
+)
+
+Rows = Callable[[FloatArray], FloatArray]
+LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
+SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
+LEAST_LAG = 5.0  # times the shortest lag that is searched, a fifth of a sample
+LEAST_TRAVEL = 0.1  # of the span of OP
+_NEGLIGIBLE = 1e-9
+
+
+class ValveCandidate(Candidate):
+    """A behaviour at the end of a valve's chain.
+
+    Its stems start at rest at the first OP; stiction, backlash and a lag have one more figure,
+    where the stem stood then.
+    """
+
+    def __init__(
+        self, run: FreeRun, valve: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
+    ) -> None:
+        """Take the valve's index, the behaviour and the figures that are searched."""
+        self.valve, self.kind, self.axes = valve, kind, axes
+        self.place = f"valve:{run.model.valves[valve].name}"
+        self.effect = kind.effect
+        self.twins = ()
+        self.needle = kind is HeStiction
+
+    @property
+    def law(self) -> str | None:
+        return self.kind.law
+
+    def signal(self, run: FreeRun) -> FloatArray:
+        return run.stems[:, self.valve]
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
+        return points
+
+    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return stem positions, shape (N, G), %."""
+        low, high = run.model.limits[self.valve]
+        rows = self.rows(points)
+        parts = []
+        for part in run.runs.slices:
+            values = run.stems[part, self.valve]
+            start = self.starts(points, float(values[0]))
+            parts.append(self.kind.simulate_grid(rows, values, start, run.runs.sample_time))
+        stems = end_to_end(parts)
+        return np.clip(stems, low, high, out=stems)
+
+    def starts(self, points: FloatArray, first: float) -> FloatArray:
+        """Return where the stems stand before the first sample, shape (G,), %."""
+        return np.array([first + self.lead(point) for point in points])
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        stems = self.stems(run, points)
+        shifts, least = {}, _NEGLIGIBLE * max(float(np.ptp(run.forced)), 1e-9)
+        for i in range(run.forced.shape[1]):
+            if not run.responses.reaches(i, self.valve):
+                continue
+            shift = run.drive(i, self.valve, stems)
+            shift -= run.forced[:, i : i + 1]
+            if max(float(shift.max()), -float(shift.min())) > least:
+                shifts[i] = shift
+        return Response(shifts or {0: np.zeros((len(stems), len(points)))})
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        row = self.rows(point[None, :])[0]
+        values = dict(zip((p.key for p in self.kind.parameters()), row.tolist(), strict=False))
+        return self.kind.from_mapping(values)
+
+
+class StictionCandidate(ValveCandidate):
+    """Stiction by f_S, f_D / f_S and the place of the stem in its band at the start."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
+
+    def lead(self, point: FloatArray) -> float:
+        return 0.98 * float(point[0] * point[2])
+
+    def count(self, point: FloatArray) -> int:
+        return 2
+
+    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return points around one in the sum of the frictions and their difference, the jump.
+
+        The sum, how far OP goes back before the stem follows, is told well by any record; the
+        jump much less.
+        """
+        total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
+        totals = total * np.exp(SUM_BOX * size * cube[:, 0])
+        jumps = np.clip(jump + JUMP_BOX * total * size * cube[:, 1], 0.0, totals)
+        low, high = self.axes[0].low, self.axes[0].high
+        static = np.clip(0.5 * (totals + jumps), low, high)
+        leads = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
+        return np.column_stack([static, (totals - jumps) / (totals + jumps), leads])
+
+
+class BacklashCandidate(ValveCandidate):
+    """Backlash by its band and the place of the stem in it at the start."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return points[:, :1]
+
+    def lead(self, point: FloatArray) -> float:
+        return 0.49 * float(point[0] * point[1])
+
+    def count(self, point: FloatArray) -> int:
+        return 1
+
+
+class LagCandidate(ValveCandidate):
+    """A lag by its time constant and the place of the stem at the start."""
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        return lasts(self, point)
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return points[:, :1]
+
+    def lead(self, point: FloatArray) -> float:
+        return float(point[1])
+
+    def count(self, point: FloatArray) -> int:
+        return 1
+
+
+class SaturationCandidate(ValveCandidate):
+    """A stem that stops short of what OP asks, at one end or both."""
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return np.column_stack([np.minimum(points[:, 0], points[:, 1]), points.max(axis=1)])
+
+    def count(self, point: FloatArray) -> int:
+        low, high = self.axes[0].low, self.axes[1].high
+        return int(point[0] > low) + int(point[1] < high)
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        """Refuse ends that leave hardly any travel: whatever holds it, such a valve stands."""
+        span = self.axes[1].high - self.axes[0].low
+        return abs(float(point[1] - point[0])) >= LEAST_TRAVEL * span
+
+    def reference(self, seen: Seen) -> tuple[float, ...]:
+        return self.axes[0].low, float(np.quantile(seen.values, 0.95))
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        """Return the saturation; an end that OP never reaches is the valve's, if any."""
+        low, high = self.rows(point[None, :])[0].tolist()
+        ends = run.model.limits[self.valve].tolist()
+        if low <= self.axes[0].low and np.isfinite(ends[0]):
+            low = ends[0]
+        if high >= self.axes[1].high and np.isfinite(ends[1]):
+            high = ends[1]
+        return Saturation(low, high)
+
+
+def departures(run: FreeRun, candidate: Candidate, point: FloatArray) -> int:
+    """Return how often a candidate's stem leaves a rest.
+
+    0 for what acts at no valve, and where all travel together is less than the band.
+    """
+    if not isinstance(candidate, ValveCandidate):
+        return 0
+    stems = candidate.stems(run, point[None, :])[:, 0]
+    moves = [np.diff(stems[rows]) for rows in run.runs.slices]
+    if sum(float(np.abs(each).sum()) for each in moves) < float(point[0]):
+        return 0
+    return sum(int(((each[1:] != 0.0) & (each[:-1] == 0.0)).sum()) for each in moves)
+
+
+def valve_candidates(run: FreeRun) -> list[Candidate]:
+    """Return the candidates at every valve whose OP moves."""
+    found: list[Candidate] = []
+    for j in range(len(run.model.valves)):
+        op = run.stems[:, j]
+        span = float(np.quantile(op, 0.998) - np.quantile(op, 0.002))
+        if span > 0.0:
+            found += _at_valve(run, j, op, span)
+    return found
+
+
+def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candidate]:
+    step = run.runs.sample_time
+    moves = np.abs(np.concatenate([np.diff(op[rows]) for rows in run.runs.slices]))
+    fastest = max(float(moves.max()), 1e-9) / step
+    low, high = float(op.min()), float(op.max())
+    # A controller that winds up spends most of its time beyond the stem's end.
+    lower, upper = np.quantile(op, [0.95, 0.05]).tolist()
+    # He's slips depend on f_S and f_D to the last digits: its optimum is a needle.
+    start = Axis(-1.0, 1.0, 1)
+    fine = (
+        Axis(0.01 * span, LARGEST * span, 160, logarithmic=True),
+        Axis(0.0, 1.0, 17, natural=True),
+        start,
+    )
+    rough = (
+        Axis(0.01 * span, LARGEST * span, 50, logarithmic=True),
+        Axis(0.0, 1.0, 9, natural=True),
+    )
+    return [
+        StictionCandidate(run, j, HeStiction, fine),
+        StictionCandidate(run, j, XchStiction, (*rough, start)),
+        BacklashCandidate(
+            run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True), start)
+        ),
+        ValveCandidate(
+            run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
+        ),
+        LagCandidate(run, j, Lag, (lag_axis(run), Axis(-2.0 * span, 2.0 * span, 1, linear=True))),
+        SaturationCandidate(
+            run,
+            j,
+            Saturation,
+            (Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)),
+        ),
+        ValveCandidate(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
+    ]
+
+
+def lasts(candidate: Candidate, point: FloatArray) -> bool:
+    """Tell whether a lag is longer than a sample.
+
+    Between samples a signal moves on: less than one of them may be the sampling's own.
+    """
+    return float(point[0]) >= LEAST_LAG * candidate.axes[0].low
+
+
+def lag_axis(run: FreeRun) -> Axis:
+    """Return the range of time constants that a record tells."""
+    step = run.runs.sample_time
+    return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)

@@ -1,0 +1,1 @@
+"""What is wrong with the records, before any effect is searched."""

@@ -1,0 +1,142 @@
+"""OP recomputed from PV and SP: was the recorded controller at work, on the recorded clock?"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+
+import numpy as np
+
+from stiction_ros.discrepancy.data.gate import DataFinding
+from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.effects import FloatArray, TimeShift, Tuning
+from stiction_ros.loop import LoopModel, PiTuning
+
+LONGEST_SHIFT = 30
+EXACT = 0.02  # of the moves of OP: what rounding of the signals may leave
+MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
+
+
+class ControllerStatus(enum.StrEnum):
+    """How OP and a PI law agree.
+
+    ``SAME``: OP is what the recorded tuning gives. ``OTHER``: another tuning or another
+    clock gives it. ``UNEXPLAINED``: no PI law gives it. ``NOT_ASKED``: SP is not recorded,
+    or the loop is no single one.
+    """
+
+    SAME = "same"
+    OTHER = "other"
+    UNEXPLAINED = "unexplained"
+    NOT_ASKED = "not_asked"
+
+
+@dataclasses.dataclass(frozen=True)
+class ControllerCheck:
+    """What recomputing OP shows.
+
+    Attributes:
+        status: see :class:`ControllerStatus`.
+        finding: another tuning or a time shift.
+        left: share of the moves of OP that the best PI law leaves, 0 to 1.
+        clock_known: whether the record's clock of PV against OP is shown to be right.
+    """
+
+    status: ControllerStatus
+    finding: DataFinding | None
+    left: float
+    clock_known: bool
+
+
+def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
+    r"""Compare the moves of OP with :math:`K [(e_k - e_{k-1}) + (T_s/T_i) e_k]`.
+
+    Without a recorded tuning, gain and integral time are fitted: then only the clock can be
+    checked. Samples at which OP rests at a limit are left out.
+    """
+    single = len(model.valves) == 1 and len(model.outputs) == 1
+    if not single or any(record.sp is None for record in runs.records):
+        return ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
+    laws = [_fit(model, runs, shift) for shift in range(LONGEST_SHIFT + 1)]
+    best = min(range(len(laws)), key=lambda shift: laws[shift].left * (1.0 + 1e-3 * shift))
+    recorded = model.controller
+    own = math.inf if recorded is None else _left(model, runs, recorded, 0)
+    if recorded is not None and own <= max(EXACT, 2.0 * laws[0].left) and best == 0:
+        known = laws[0].left < EXACT
+        return ControllerCheck(ControllerStatus.SAME, None, own, known)
+    law = laws[best]
+    if law.left > EXACT:
+        return ControllerCheck(ControllerStatus.UNEXPLAINED, None, law.left, False)
+    if recorded is None and best == 0:
+        return ControllerCheck(ControllerStatus.SAME, None, law.left, True)
+    if best > 0:
+        finding = _finding("time_shift", TimeShift(float(best)), own, laws[0], law)
+    else:
+        assert recorded is not None
+        if _alike(recorded, law):
+            return ControllerCheck(ControllerStatus.SAME, None, own, False)
+        finding = _finding("tuning", Tuning(law.gain, law.integral_time), own, None, law)
+    return ControllerCheck(ControllerStatus.OTHER, finding, law.left, True)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Law:
+    gain: float
+    integral_time: float
+    left: float
+    samples: int
+
+
+def _alike(recorded: PiTuning, law: _Law) -> bool:
+    """Tell whether two tunings differ by less than matters.
+
+    A controller that scans more often than the record seems to have a slightly different one.
+    """
+    ratios = law.gain / recorded.gain, law.integral_time / recorded.integral_time
+    return all(1.0 / (1.0 + MATTERS) < ratio < 1.0 + MATTERS for ratio in ratios)
+
+
+def _finding(
+    effect: str, behaviour: Tuning | TimeShift, own: float, before: _Law | None, law: _Law
+) -> DataFinding:
+    reference = own if math.isfinite(own) else (before or law).left
+    ratio = max(reference, 1e-6) / max(law.left, 1e-6)
+    gain = 2.0 * law.samples * math.log(max(ratio, 1.0)) - 2.0 * math.log(max(law.samples, 2))
+    return DataFinding("data", effect, behaviour, gain)
+
+
+def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, FloatArray]:
+    """Return the moves of OP, shape (n,), and (e_k − e_{k−1}, T_s e_k), shape (n, 2)."""
+    low, high = model.limits[0]
+    moves, columns = [], []
+    for record, rows in zip(runs.records, runs.slices, strict=True):
+        assert record.sp is not None
+        op = runs.op[rows, 0]
+        count = len(op) - shift
+        sp = record.sp[:count, record.outputs.index(model.outputs[0])]
+        error = sp - runs.pv[rows, 0][shift:]
+        inside = (op[1:count] > low) & (op[1:count] < high)
+        part = np.column_stack([np.diff(error), runs.sample_time * error[1:]])
+        moves.append(np.diff(op[:count])[inside])
+        columns.append(part[inside])
+    return np.concatenate(moves), np.vstack(columns)
+
+
+def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:
+    moves, columns = _regression(model, runs, shift)
+    if len(moves) < 10 or not np.any(moves):
+        return _Law(0.0, 1.0, 1.0, len(moves))
+    gain, integral = np.linalg.lstsq(columns, moves, rcond=None)[0].tolist()
+    left = moves - columns @ np.array([gain, integral])
+    share = float(np.linalg.norm(left) / np.linalg.norm(moves))
+    time = gain / integral if integral != 0.0 and gain / integral > 0.0 else 1e9
+    return _Law(gain, min(time, 1e9), share, len(moves))
+
+
+def _left(model: LoopModel, runs: Runs, tuning: PiTuning, shift: int) -> float:
+    moves, columns = _regression(model, runs, shift)
+    if not np.any(moves):
+        return math.inf
+    left = moves - columns @ np.array([tuning.gain, tuning.gain / tuning.integral_time])
+    return float(np.linalg.norm(left) / np.linalg.norm(moves))

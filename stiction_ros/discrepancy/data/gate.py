@@ -1,0 +1,305 @@
+"""Step 1, the gate: what is wrong with the data, and what it can show at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, BoolArray, autoregression, whiten
+from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
+from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+SHOWN = (Freeze, Clip, Quantisation)
+"""What is looked for here."""
+LONGEST_REST = 12
+ENDS = 6
+MOST_CLIPPED = 0.5  # of the rows: what stands at its ends more often is no clipped measurement
+ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
+OFTEN_HELD = 0.2  # of the samples
+LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
+ALONE = 8.0  # usual distances from the mean of both neighbours, beyond which one is a spike
+COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
+
+
+@dataclasses.dataclass(frozen=True)
+class DataFinding:
+    """An effect that the recorded values themselves show.
+
+    Attributes:
+        place, effect: as loop models name them.
+        behaviour: with its figures.
+        delta_bic: by how much shorter the values are told with it.
+        record: index of the record.
+    """
+
+    place: str
+    effect: str
+    behaviour: Behaviour
+    delta_bic: float
+    record: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Gate:
+    """What the data allow.
+
+    Attributes:
+        usable: per output the rows whose PV is a measurement, shape (p, N).
+        findings: frozen, clipped and rounded PVs, but for what the model has already.
+        thinned: per output whether values were held or interpolated.
+        quantum: per output the distance of PV's values; 0 where they are as good as continuous.
+        rounding: the same, where it is coarse enough to matter; 0 elsewhere.
+        set_point_moves: per output, over all records; None where SP is not recorded.
+        reversals: of OP per valve.
+        notes: remarks for people.
+        alone: per output, how many single samples far off both neighbours were left out.
+    """
+
+    usable: BoolArray
+    findings: tuple[DataFinding, ...]
+    thinned: tuple[bool, ...]
+    quantum: tuple[float, ...]
+    rounding: tuple[float, ...]
+    set_point_moves: tuple[int, ...] | None
+    reversals: tuple[int, ...]
+    notes: tuple[str, ...]
+    alone: tuple[int, ...] = ()
+
+
+def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
+    """Return the records end to end, their usable rows marked, and what the gate saw.
+
+    Raises:
+        InputError: as :func:`join_records`.
+    """
+    runs = join_records(model, records)
+    gate = look_at_data(model, runs)
+    seen = dataclasses.replace(runs, usable=gate.usable, quanta=gate.rounding, thinned=gate.thinned)
+    return seen, gate
+
+
+def look_at_data(model: LoopModel, runs: Runs) -> Gate:
+    """Return what the recorded values allow, before any model is asked."""
+    usable = np.ones((len(model.outputs), len(runs)), dtype=bool)
+    findings: list[DataFinding] = []
+    quanta, rounding, notes, thinned = [], [], [], []
+    lonely = [0] * len(model.outputs)
+    for i, name in enumerate(model.outputs):
+        quantum = quantum_of(runs.pv[:, i])
+        quanta.append(quantum)
+        rounded = _rounded(runs, i, name, quantum)
+        for r, rows in enumerate(runs.slices):
+            values = runs.pv[rows, i]
+            if not rounded:  # values on a coarse lattice rest, and meet at its ends, anyway
+                frozen = _frozen(values, name, r, runs.sample_time)
+                clipped = _clipped(values, name, r, quantum)
+                for finding, where in (*frozen, *clipped):
+                    usable[i, rows] &= ~where
+                    findings.append(finding)
+            alone = _alone(values)
+            if alone.any():
+                usable[i, rows] &= ~alone
+                lonely[i] += int(alone.sum())
+                notes.append(f"{int(alone.sum())} samples of {name} stand alone and are not scored")
+            if _compressed(values):
+                notes.append(
+                    f"{name} lies on straight lines: a historian has thinned it out, small "
+                    "effects are lost"
+                )
+        findings += rounded
+        rounding.append(quantum if rounded else 0.0)
+        whole = [runs.pv[rows, i] for rows in runs.slices]
+        thinned.append(any(_compressed(v) or (not rounded and _held(v)) for v in whole))
+    findings = [finding for finding in findings if not known_already(model, runs, finding)]
+    for j, valve in enumerate(model.valve_names):
+        if np.ptp(runs.op[:, j]) == 0.0:
+            notes.append(f"OP of {valve} never moves: nothing can be said of that valve")
+    return Gate(
+        usable,
+        tuple(findings),
+        tuple(thinned),
+        tuple(quanta),
+        tuple(rounding),
+        _moves(model, runs),
+        tuple(_reversals(runs, j) for j in range(len(model.valves))),
+        tuple(dict.fromkeys(notes)),
+        tuple(lonely),
+    )
+
+
+def known_already(model: LoopModel, runs: Runs, finding: DataFinding) -> bool:
+    """Tell whether the model has an effect that shows what a finding says.
+
+    That is one of the same kind whose figures are the same as far as the values tell: a quantum
+    to :data:`ALIKE`, a rest within two samples, and the ends that the values meet.
+    """
+    output = model.outputs.index(finding.place.partition(":")[2])
+    values = runs.pv[runs.slices[finding.record], output]
+    return any(
+        type(effect) is type(finding.behaviour)
+        and _same(effect, finding.behaviour, values, runs.sample_time)
+        for effect in model.sensors[output]
+    )
+
+
+def _same(known: Behaviour, found: Behaviour, values: FloatArray, sample_time: float) -> bool:
+    if isinstance(known, Quantisation) and isinstance(found, Quantisation):
+        return abs(known.quantum - found.quantum) <= ALIKE * found.quantum
+    if isinstance(known, Freeze) and isinstance(found, Freeze):
+        begins = abs(known.onset - found.onset) <= 2.0 * sample_time
+        ends = known.onset + known.duration - found.onset - found.duration
+        return begins and abs(ends) <= 2.0 * sample_time
+    if isinstance(known, Clip) and isinstance(found, Clip):
+        width = ALIKE * max(float(np.ptp(values)), 1e-300)
+        pairs = ((known.low, found.low), (known.high, found.high))
+        met = [(mine, seen) for mine, seen in pairs if values.min() <= seen <= values.max()]
+        return all(abs(mine - seen) <= width for mine, seen in met)
+    return False
+
+
+def quantum_of(values: FloatArray) -> float:
+    """Return the distance of the values; 0 where there is none above the digits of a float."""
+    distinct = np.unique(values)
+    if len(distinct) < 2:
+        return 0.0
+    steps = np.diff(distinct)
+    smallest = float(steps.min())
+    if smallest <= 1e-7 * max(float(np.abs(distinct).max()), 1e-300):
+        return 0.0
+    ratio = steps / smallest
+    if float(np.abs(ratio - np.rint(ratio)).max()) > 1e-3 * float(ratio.max()) ** 0.5:
+        return 0.0
+    return smallest
+
+
+def _frozen(
+    values: FloatArray, name: str, record: int, sample_time: float
+) -> list[tuple[DataFinding, BoolArray]]:
+    """Return each rest of PV that is too long for its noise, with its rows."""
+    same = np.concatenate([[False], np.diff(values) == 0.0])
+    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    if not len(begins):
+        return []
+    lengths = ends - begins
+    usual = np.delete(lengths, int(np.argmax(lengths)))
+    share = min(usual.sum() / max(len(values) - lengths.max(), 1), 0.99)
+    natural = math.log(max(len(values), 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
+    found = []
+    longest = int(np.argmax(lengths))
+    length = int(lengths[longest])
+    level = values[begins[longest]]
+    # What stands at the end of all values is an end of the sensor's range, not a frozen value.
+    at_an_end = level in (values.min(), values.max())
+    if length >= LONGEST_REST + 3.0 * natural and not at_an_end:
+        where = np.zeros(len(values), dtype=bool)
+        where[begins[longest] : ends[longest]] = True
+        onset, duration = begins[longest] * sample_time, length * sample_time
+        behaviour = Freeze(float(onset), float(duration))
+        bits = length * 2.0 * math.log(1.0 / max(share, 1.0 / len(values)))
+        gain = bits - 2.0 * math.log(len(values))
+        found.append((DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where))
+    return found
+
+
+def _clipped(
+    values: FloatArray, name: str, record: int, quantum: float
+) -> list[tuple[DataFinding, BoolArray]]:
+    """Return the ends of the range at which PV stands again and again, with their rows."""
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        return []
+    at_low, at_high = values == low, values == high
+    limits = [low, high]
+    where = np.zeros(len(values), dtype=bool)
+    gain, ends = 0.0, 0
+    for k, at in enumerate((at_low, at_high)):
+        count = int(at.sum())
+        beside = 0
+        if quantum:
+            beside = int((np.abs(values - limits[k] - (1 - 2 * k) * quantum) < 0.5 * quantum).sum())
+        visits = int((np.diff(at.astype(int)) == 1).sum())
+        if count >= ENDS and (visits >= 2 or count >= LONGEST_REST) and count > 3 * beside:
+            where |= at
+            ends += 1
+            gain += 2.0 * count * math.log(len(values) / 10.0)
+        else:
+            limits[k] += (2 * k - 1) * 10.0 * (high - low)  # beyond what was seen
+    if not ends or int(where.sum()) > MOST_CLIPPED * len(values):
+        return []
+    gain -= ends * math.log(len(values))
+    behaviour = Clip(limits[0], limits[1])
+    return [(DataFinding(f"sensor:{name}", "clip", behaviour, gain, record), where)]
+
+
+def _rounded(runs: Runs, output: int, name: str, quantum: float) -> list[DataFinding]:
+    """Return a quantum that is coarse against what PV does not tell beforehand."""
+    values = runs.pv[:, output]
+    if quantum <= 0.0 or _surprise(runs, output) > COARSE * quantum:
+        return []
+    levels = len(np.unique(values))
+    gain = 2.0 * len(values) * math.log(max(len(values) / levels, 1.0)) - math.log(len(values))
+    if gain <= 0.0:
+        return []
+    return [DataFinding(f"sensor:{name}", "quantisation", Quantisation(quantum), gain)]
+
+
+def _surprise(runs: Runs, output: int) -> float:
+    """Return the standard deviation of PV's innovations under an autoregression of its own."""
+    values = runs.pv[:, output] - runs.pv[:, output].mean()
+    rows = np.ones(len(values), dtype=bool)
+    for part in runs.slices:
+        rows[part.start : part.start + MAX_ORDER] = False
+    if not rows.any():
+        return math.inf
+    return float(np.std(whiten(values, autoregression(values, rows))[rows]))
+
+
+def _held(values: FloatArray) -> bool:
+    """Tell whether many values are exactly those before them: reported by exception."""
+    return float(np.mean(np.diff(values) == 0.0)) > OFTEN_HELD
+
+
+def _alone(values: FloatArray) -> BoolArray:
+    """Return single samples far off both neighbours, which are near each other."""
+    found = np.zeros(len(values), dtype=bool)
+    if len(values) < 3:
+        return found
+    beside = 0.5 * (values[:-2] + values[2:])
+    away, apart = values[1:-1] - beside, np.abs(values[2:] - values[:-2])
+    usual = float(np.median(np.abs(away)))
+    scale = max(usual, LATTICE * float(np.ptp(values)))
+    found[1:-1] = (np.abs(away) > ALONE * scale) & (apart < 0.5 * np.abs(away))
+    return found
+
+
+def _compressed(values: FloatArray) -> bool:
+    bends = np.abs(np.diff(values, 2))
+    scale = float(np.ptp(values))
+    straight = float(np.mean((bends <= 1e-9 * scale) & (np.abs(np.diff(values))[1:] > 0.0)))
+    return straight > 0.5
+
+
+def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:
+    if any(record.sp is None for record in runs.records):
+        return None
+    moves = np.zeros(len(model.outputs), dtype=int)
+    for record in runs.records:
+        assert record.sp is not None
+        columns = [record.outputs.index(name) for name in model.outputs]
+        moves += (np.diff(record.sp[:, columns], axis=0) != 0.0).sum(axis=0)
+    return tuple(moves.tolist())
+
+
+def _reversals(runs: Runs, valve: int) -> int:
+    count = 0
+    for rows in runs.slices:
+        signs = np.sign(np.diff(runs.op[rows, valve]))
+        signs = signs[signs != 0.0]
+        count += int((signs[1:] != signs[:-1]).sum())
+    return count

@@ -1,0 +1,196 @@
+"""Steps 5 and 6: what the scores allow to say."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+from collections.abc import Callable, Sequence
+
+from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE
+from stiction_ros.effects import Backlash, Stiction
+
+JUMP_SURE = 10.0  # BIC by which a jump is there
+JUMP_ABSENT = 3.0  # BIC by which it is not
+OFTEN = 8  # departures from rest that must show no jump before it is said to be absent
+CLEAR = 40.0  # BIC below which friction is told, but not of which kind
+FRICTION = "friction"  # families of effects
+LAGS = "lag"
+SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
+DOUBTFUL = 3.0  # standard deviations
+MOMENT = 10.0  # what held-out rows may lose by an effect of one moment
+
+
+class GapVerdict(enum.StrEnum):
+    """What the workflow says.
+
+    ``NONE``: no effect beats the current model. ``NAMED``: one does, and its rivals.
+    ``AMBIGUOUS``: one of a set does. ``UNKNOWN``: there is a gap, but the catalogue does not
+    explain it. ``UNTESTABLE``: the record could not show the effects.
+
+    Examples:
+        >>> from stiction_ros import GapVerdict
+        >>> GapVerdict("named") is GapVerdict.NAMED
+        True
+    """
+
+    NONE = "none"
+    NAMED = "named"
+    AMBIGUOUS = "ambiguous"
+    UNKNOWN = "unknown"
+    UNTESTABLE = "untestable"
+
+
+@dataclasses.dataclass(frozen=True)
+class Decision:
+    """What the scores of one look say.
+
+    Attributes:
+        verdict: none, named, ambiguous or unknown.
+        chosen: the best candidate of the catalogue, or None.
+        alternatives: places and effects that cannot be told from it.
+        inseparable: whether the alternatives are its twins or its family, so that adding it
+            serves for all of them.
+        reason: one sentence.
+    """
+
+    verdict: GapVerdict
+    chosen: CandidateFit | None
+    alternatives: tuple[tuple[str, str], ...]
+    inseparable: bool
+    reason: str
+
+
+def decide(
+    fits: Sequence[CandidateFit],
+    margin: float,
+    threshold: float,
+    departures: Callable[[CandidateFit], int],
+) -> Decision:
+    """Return what may be said.
+
+    Args:
+        fits: of all candidates.
+        margin: evidence, in BIC, by which the best must beat its rivals outside its family.
+        threshold: evidence by which it must beat the current model.
+        departures: how often the stem of a fit leaves a rest.
+    """
+    ranked = sorted(fits, key=lambda fit: -fit.evidence)
+    passed = [
+        f for f in ranked if f.candidate.inside and f.evidence >= threshold and large_enough(f)
+    ]
+    kept = [f for f in passed if confirmed(f)]
+    outside = [f for f in ranked if not f.candidate.inside and confirmed(f)]
+    stranger = outside[0] if outside else None
+    if not kept:
+        if stranger is not None and stranger.evidence >= threshold + margin:
+            return _unknown(stranger, "nothing in the catalogue explains the gap")
+        if passed and passed[0].evidence >= threshold + SURE:
+            return _unknown(passed[0], "the held-out rows do not confirm it")
+        reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
+        return Decision(GapVerdict.NONE, None, (), False, reason)
+    best = kept[0]
+    if stranger is not None and stranger.evidence > best.evidence and not _part(best, stranger):
+        return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
+    best, family = friction_kind(best, ranked, departures)
+    rivals = [
+        f
+        for f in ranked
+        if f.candidate.inside
+        and f.candidate.key != best.candidate.key
+        and f.evidence > max(best.evidence - margin, 0.0)
+        and large_enough(f)
+        and not _same_family(f, best)
+    ]
+    others = [f.candidate.key for f in rivals]
+    names = list(dict.fromkeys([*family, *best.candidate.twins, *others]))
+    for rival in rivals:
+        names += [twin for twin in rival.candidate.twins if twin not in names]
+    if names:
+        reason = "OP and PV do not tell them apart"
+        one_family = all(_lags(f) and _lags(best) for f in rivals)
+        return Decision(GapVerdict.AMBIGUOUS, best, tuple(names), one_family, reason)
+    return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
+
+
+def confirmed(fit: CandidateFit) -> bool:
+    """Tell whether the held-out rows bear an effect out, chance allowed for."""
+    return borne_out(fit.delta_bic, fit.held_gain, fit.candidate.dated)
+
+
+def borne_out(delta_bic: float, held_gain: float, dated: bool) -> bool:
+    """Tell whether held-out rows bear out what the training rows gain.
+
+    An effect that is there gains a third as much on the third as many rows, in the mean; the
+    gain S of a known wave has the standard deviation 2 √S. Below nought, and by more than
+    three of these below what is due, the held-out rows refuse it. What comes at one moment
+    shows in the block of that moment, the other blocks gain nothing but chance.
+    """
+    if dated:
+        return held_gain > -MOMENT
+    due = max(delta_bic, 0.0) / (HELD_SHARE - 1)
+    return held_gain > min(0.0, due - DOUBTFUL * 2.0 * math.sqrt(due))
+
+
+def large_enough(fit: CandidateFit) -> bool:
+    """Tell whether an effect has an engineering size, inside of what was searched."""
+    if fit.candidate.at_bound(fit.point):
+        return False
+    return fit.candidate.large_enough(fit.point, fit.factors)
+
+
+def _unknown(stranger: CandidateFit, reason: str) -> Decision:
+    return Decision(
+        GapVerdict.UNKNOWN,
+        None,
+        (),
+        False,
+        f"{stranger.candidate.name} would explain the gap by {stranger.evidence:.0f}; {reason}",
+    )
+
+
+def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
+    """Tell whether a fit is most of what a rival outside the catalogue contains."""
+    part = fit.candidate.key in stranger.candidate.contains
+    return part and fit.evidence > stranger.candidate.most_of * stranger.evidence
+
+
+def _lags(fit: CandidateFit) -> bool:
+    return fit.candidate.about.family == LAGS
+
+
+def _same_family(one: CandidateFit, other: CandidateFit) -> bool:
+    friction = one.candidate.about.family == other.candidate.about.family == FRICTION
+    return friction and one.candidate.place == other.candidate.place
+
+
+def friction_kind(
+    best: CandidateFit,
+    ranked: Sequence[CandidateFit],
+    departures: Callable[[CandidateFit], int],
+) -> tuple[CandidateFit, tuple[tuple[str, str], ...]]:
+    """Return stiction or backlash by the test of the jump, and the other one in doubt.
+
+    Args:
+        best: any fit; what is no friction is returned as it is.
+        ranked: all fits, the best one first.
+        departures: how often the stem of a fit leaves a rest.
+    """
+    if best.candidate.about.family != FRICTION:
+        return best, ()
+    rivals = [f for f in ranked if _same_family(f, best) and f.evidence > 0.0 and confirmed(f)]
+    jumping = [f for f in rivals if f.candidate.effect == Stiction.effect]
+    plain = [f for f in rivals if f.candidate.effect == Backlash.effect]
+    if not jumping or not plain:
+        return best, ()
+    jump = jumping[0].evidence - plain[0].evidence
+    if best.evidence < CLEAR:  # too little to tell whether there is a jump
+        other = jumping[0] if best.candidate.effect == Backlash.effect else plain[0]
+        return best, (other.candidate.key,)
+    if jump > JUMP_SURE:
+        return jumping[0], ()
+    if jump < -JUMP_ABSENT and departures(plain[0]) >= OFTEN:
+        return plain[0], ()
+    first, second = (jumping[0], plain[0]) if jump > 0.0 else (plain[0], jumping[0])
+    return first, (second.candidate.key,)

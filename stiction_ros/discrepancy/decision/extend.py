@@ -1,0 +1,210 @@
+"""Step 7: an effect becomes a block of the loop model, or is rolled back."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import Candidate
+from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out
+from stiction_ros.discrepancy.decision.measured_stem import stem_misfit
+from stiction_ros.discrepancy.decision.scores import all_candidates
+from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
+from stiction_ros.effects import Behaviour, FloatArray
+from stiction_ros.loop import LoopModel
+
+ROUNDS = 2
+GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow
+WORTH = 10.0
+
+
+@dataclasses.dataclass(frozen=True)
+class AddedEffect:
+    """One effect that became part of the model.
+
+    Attributes:
+        fit: its last fit, with every other added effect in place.
+        behaviour: with its figures.
+        alternatives: places and effects that the record does not tell from it.
+    """
+
+    fit: CandidateFit
+    behaviour: Behaviour
+    alternatives: tuple[tuple[str, str], ...]
+
+    @property
+    def place(self) -> str:
+        """Where it acts."""
+        return self.fit.candidate.place
+
+    @property
+    def effect(self) -> str:
+        """What it is."""
+        return self.fit.candidate.effect
+
+
+@dataclasses.dataclass(frozen=True)
+class Extension:
+    """The model after one more effect.
+
+    Attributes:
+        added: all effects that stayed.
+        base: of the model with them.
+        kept: whether the last effect stayed.
+        reason: why it did not.
+    """
+
+    added: tuple[AddedEffect, ...]
+    base: Baseline
+    kept: bool
+    reason: str
+
+
+def extend(
+    bare: LoopModel, runs: Runs, added: Sequence[AddedEffect], new: AddedEffect, base: Baseline
+) -> Extension:
+    """Add an effect, fit all added effects together, and see whether the gap has shrunk.
+
+    Args:
+        bare: the model without any added effect.
+        runs: the records.
+        added: effects of earlier looks.
+        new: the one to be added.
+        base: of the model with ``added``.
+    """
+    effects = refit_together(bare, runs, [*added, new])
+    worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
+    after_base = Baseline.of(run_with(bare, runs, worth))
+    trouble = _trouble(base, after_base, new.fit.candidate.dated) or _stem_trouble(base, after_base)
+    if trouble:
+        return Extension(tuple(added), base, False, trouble)
+    return Extension(tuple(worth), after_base, True, "")
+
+
+def has_friction(added: Sequence[AddedEffect], fit: CandidateFit) -> bool:
+    """Tell whether a fit is one more friction of a valve that has one already.
+
+    The two laws tell one thing in two ways: the second one mends the figures of the first.
+    """
+    family = fit.candidate.about.family
+    return family == FRICTION and any(
+        each.place == fit.candidate.place and each.fit.candidate.about.family == family
+        for each in added
+    )
+
+
+def refit_together(
+    bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]
+) -> list[AddedEffect]:
+    """Return effects, each fitted again behind the others."""
+    fitted = list(effects)
+    for _ in range(ROUNDS if len(fitted) > 1 else 1):
+        fitted = [_refit(bare, runs, fitted, k) for k in range(len(fitted))]
+    return fitted
+
+
+def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> FreeRun:
+    """Return the free run with effects at the end of their chains.
+
+    Every sticky stem starts where the fit puts it.
+    """
+    model, leads = bare, {}
+    for effect in effects:
+        model = model.with_effect(effect.place, effect.behaviour)
+        kind, _, tag = effect.place.partition(":")
+        if kind == "valve":
+            leads[tag] = effect.fit.candidate.lead(effect.fit.point)
+    return FreeRun(model, runs, leads)
+
+
+def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> Baseline:
+    """Return the baseline of a model with effects, their linear figures left open.
+
+    A drift, a sine or a gain that was found beside something that was not yet in the model is
+    a little wrong; what comes next is fitted together with it.
+    """
+    run = run_with(bare, runs, others)
+    return Baseline.of(run, columns=open_columns(run, others))
+
+
+def left_open(base: Baseline, added: Sequence[AddedEffect]) -> Baseline:
+    """Return the baseline of added effects, their linear figures left open where there are any."""
+    if not any(effect.fit.candidate.factors for effect in added):
+        return base
+    return Baseline.of(base.run, columns=open_columns(base.run, added))
+
+
+def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]:
+    """Return per output the free columns and those of linear figures, shape (N, q)."""
+    columns = list(run.free)
+    for effect in added:
+        candidate, point = effect.fit.candidate, effect.fit.point
+        if candidate.factors:
+            for i, sizes in candidate.respond(run, point[None, :]).sizes.items():
+                columns[i] = np.hstack([columns[i], sizes[:, 0]])
+    return columns
+
+
+def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
+    """Return effect k fitted again behind all others."""
+    base = base_beside(bare, runs, effects[:k] + effects[k + 1 :])
+    candidate = same_candidate(all_candidates(base), effects[k].fit.candidate)
+    if candidate is None:
+        return effects[k]
+    candidate.twins = effects[k].fit.candidate.twins
+    point = effects[k].fit.point
+    fit = fit_candidate(base, base.run.gap, candidate, point if len(point) else None)
+    behaviour = fit.behaviour(base.run)
+    assert behaviour is not None
+    return dataclasses.replace(effects[k], fit=fit, behaviour=behaviour)
+
+
+def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
+    """Return the candidate of the same place, effect and behaviour; None when there is none."""
+    for candidate in candidates:
+        alike = candidate.key == wanted.key
+        if alike and getattr(candidate, "kind", None) is getattr(wanted, "kind", None):
+            return candidate
+    return None
+
+
+def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:
+    """Return why the effect must go again; empty when the held-out rows bear it out."""
+    if not borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated):
+        return "the innovations of the held-out rows do not become smaller"
+    return ""
+
+
+def moved_away(base: Baseline, after_base: Baseline) -> bool:
+    """Tell whether the squared error of the free run has grown by more than chance.
+
+    Held-out blocks are independent witnesses: their growths, weighed by the innovations, have
+    a mean and a standard error.
+    """
+    growths: list[FloatArray] = []
+    for old, new, blocks in zip(base.noise, after_base.noise, base.blocks, strict=True):
+        unit = max(old.innovation_std, 1e-300)
+        growth = np.where(blocks.held, (new.residual / unit) ** 2 - (old.residual / unit) ** 2, 0.0)
+        begins = np.flatnonzero(np.diff(np.concatenate([[0], blocks.held.astype(int)])) == 1)
+        if len(begins):
+            growths.append(np.add.reduceat(growth, begins))
+    if not growths:
+        return False
+    blocks_of_one = min(len(each) for each in growths)
+    total = np.sum([each[:blocks_of_one] for each in growths], axis=0)
+    if blocks_of_one < 3:
+        return float(total.sum()) > 0.0
+    return float(total.mean()) > GROWN * float(total.std(ddof=1)) / math.sqrt(blocks_of_one)
+
+
+def _stem_trouble(base: Baseline, after_base: Baseline) -> str:
+    """Return where the measured stems contradict the effect; empty where they do not."""
+    for j, valve in enumerate(base.run.model.valve_names):
+        old = stem_misfit(base.run, j, base.run.stems[:, j])
+        if stem_misfit(base.run, j, after_base.run.stems[:, j]) > old:
+            return f"the measured stem of {valve} is further from that effect than without it"
+    return ""

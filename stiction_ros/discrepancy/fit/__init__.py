@@ -1,0 +1,1 @@
+"""The best figures of a candidate, and how sure they are."""

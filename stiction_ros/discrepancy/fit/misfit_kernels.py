@@ -1,0 +1,140 @@
+"""Squared innovations for every point of a grid of responses, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.compiled import compiled
+from stiction_ros.discrepancy.likelihood.kernels import inner_product
+from stiction_ros.effects import FloatArray
+
+IntArray = NDArray[np.int64]
+_RIDGE = 1e-10
+_TINY = 1e-300
+
+
+@compiled
+def left_of_shifts(
+    target: FloatArray,
+    shift: FloatArray,
+    rows: IntArray,
+    basis: FloatArray,
+    ar: FloatArray,
+) -> FloatArray:
+    """Return the squared innovations that each response leaves, shape (G,).
+
+    Args:
+        target: whitened gap without the shared columns, shape (n,).
+        shift: responses, shape (N, G).
+        rows: of ``target`` among the N, rising.
+        basis: orthonormal, of the whitened shared columns, shape (n, r).
+        ar: φ, shape (p,).
+    """
+    size, rank = shift.shape[1], basis.shape[1]
+    squares, inside = np.zeros(size), np.zeros((rank, size))
+    white = np.empty(size)
+    for n in range(len(rows)):
+        k, wanted = rows[n], target[n]
+        for g in range(size):
+            white[g] = wanted - shift[k, g]
+        for i in range(min(len(ar), k)):
+            factor = ar[i]
+            for g in range(size):
+                white[g] += factor * shift[k - 1 - i, g]
+        for g in range(size):
+            squares[g] += white[g] * white[g]
+        for c in range(rank):
+            weight = basis[n, c]
+            for g in range(size):
+                inside[c, g] += weight * white[g]
+    for c in range(rank):
+        for g in range(size):
+            squares[g] -= inside[c, g] * inside[c, g]
+    return squares
+
+
+@compiled
+def whitened_shifts(shift: FloatArray, rows: IntArray, ar: FloatArray) -> FloatArray:
+    """Return the rows of whitened responses alone, shape (n, G); arguments as above."""
+    size = shift.shape[1]
+    white = np.empty((len(rows), size))
+    for n in range(len(rows)):
+        k = rows[n]
+        for g in range(size):
+            white[n, g] = shift[k, g]
+        for i in range(min(len(ar), k)):
+            factor = ar[i]
+            for g in range(size):
+                white[n, g] -= factor * shift[k - 1 - i, g]
+    return white
+
+
+@compiled
+def _whitened(
+    sizes: FloatArray, point: int, rows: IntArray, basis: FloatArray, ar: FloatArray
+) -> FloatArray:
+    """Return the columns of one point without the shared ones, shape (s, n)."""
+    count = sizes.shape[2]
+    free = np.empty((count, len(rows)))
+    for s in range(count):
+        for n in range(len(rows)):
+            k = rows[n]
+            value = sizes[k, point, s]
+            for i in range(min(len(ar), k)):
+                value -= ar[i] * sizes[k - 1 - i, point, s]
+            free[s, n] = value
+        for c in range(len(basis)):
+            part = inner_product(basis[c], free[s])
+            for n in range(len(rows)):
+                free[s, n] -= part * basis[c, n]
+    return free
+
+
+@compiled
+def _solved(gram: FloatArray, cross: FloatArray) -> FloatArray:
+    """Return the solution of positive definite equations; both arguments are used up."""
+    count = len(cross)
+    for i in range(count):
+        for j in range(i):
+            share = gram[i, j] / gram[j, j]
+            cross[i] -= share * cross[j]
+            for k in range(j, count):
+                gram[i, k] -= share * gram[j, k]
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            cross[i] -= gram[i, j] * cross[j]
+        cross[i] /= gram[i, i]
+    return cross
+
+
+@compiled
+def taken_by_sizes(
+    target: FloatArray,
+    sizes: FloatArray,
+    rows: IntArray,
+    basis: FloatArray,
+    ar: FloatArray,
+) -> FloatArray:
+    """Return the squares that least squares of the factors takes away, shape (G,).
+
+    Args:
+        target, rows, ar: as for :func:`left_of_shifts`.
+        sizes: columns of the factors, shape (N, G, s).
+        basis: as for :func:`left_of_shifts`, but of shape (r, n).
+    """
+    points, count = sizes.shape[1], sizes.shape[2]
+    taken = np.empty(points)
+    gram, cross = np.empty((count, count)), np.empty(count)
+    for g in range(points):
+        free = _whitened(sizes, g, rows, basis, ar)
+        for s in range(count):
+            cross[s] = inner_product(free[s], target)
+            for t in range(s + 1):
+                gram[s, t] = gram[t, s] = inner_product(free[s], free[t])
+        ridge = _RIDGE * np.trace(gram) + _TINY
+        for s in range(count):
+            gram[s, s] += ridge
+        wanted = cross.copy()
+        taken[g] = inner_product(_solved(gram, wanted), cross)
+    return taken

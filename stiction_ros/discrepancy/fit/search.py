@@ -1,0 +1,398 @@
+"""The best figures of one candidate: a grid simulated at once, then ever smaller grids."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats import qmc
+
+from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.fit.misfit import misfit
+from stiction_ros.discrepancy.fit.settled import settled
+from stiction_ros.discrepancy.fit.shared_factors import shared_factors
+from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag, declared_noise
+from stiction_ros.discrepancy.likelihood.grouped import best_noise
+from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, given_noise, noise_forms
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.effects import Behaviour, FloatArray
+
+LEADERS = 4
+STARTS = 4
+MOMENTS = 241
+REACH = 4.0  # points of the first grid, wider than a held-out block
+SLOW = np.array([0.8])
+SHRINK = 0.4
+THROWS = 10
+THROWN = 400
+THROW_SHRINK = 0.7
+CENTRES = 5
+ROUNDS = 5
+POLISHES = 8
+NEXT_TO_NOTHING = 0.02  # BIC
+SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
+_FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end in either
+_TINY = 1e-300
+
+
+@dataclasses.dataclass(frozen=True)
+class Baseline:
+    """The current model alone: its gap, its noise, and what every fit shares.
+
+    Attributes:
+        run: the free run.
+        columns: per output the columns that every fit projects out, shape (N, q).
+        blocks: per output the fitted and the held-out rows.
+        noise: per output the fit of the gap without any change.
+        plain: the same as if nothing were rounded, for the search.
+        declared: per output φ of the noise that the model declares; none where it declares none.
+    """
+
+    run: FreeRun
+    columns: tuple[FloatArray, ...]
+    blocks: tuple[Blocks, ...]
+    noise: tuple[NoiseFit, ...]
+    plain: tuple[NoiseFit, ...]
+    declared: tuple[tuple[FloatArray, ...], ...]
+
+    @classmethod
+    def of(
+        cls,
+        run: FreeRun,
+        gap: FloatArray | None = None,
+        columns: Sequence[FloatArray] | None = None,
+    ) -> Baseline:
+        """Fit the noise of the current model; ``gap``, shape (N, p), replaces the recorded one."""
+        gap = run.gap if gap is None else gap
+        shared = tuple(run.free if columns is None else columns)
+        blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
+        declared = tuple(
+            () if noise is None or thinned else (noise.ar,)
+            for noise, thinned in zip(declared_noise(run.model), run.runs.thinned, strict=True)
+        )
+        forms = [
+            noise_forms(gap[:, i], shared[i], blocks[i], _FIRST_GUESSES, declared[i])
+            for i in range(gap.shape[1])
+        ]
+        plain = tuple(best_noise(each) for each in forms)
+        noise = tuple(
+            best_noise(each, quantum, own)
+            for each, quantum, own in zip(forms, run.runs.quanta, blocks, strict=True)
+        )
+        return cls(run, shared, blocks, noise, plain, declared)
+
+    def under_declared(self, output: int) -> NoiseFit:
+        """Return the fit of an output's gap under the noise that the model declares."""
+        gap, columns, blocks = self.run.gap[:, output], self.columns[output], self.blocks[output]
+        fits = [given_noise(gap, columns, blocks, ar) for ar in self.declared[output]]
+        return best_noise(fits, self.run.runs.quanta[output], blocks)
+
+    @property
+    def bic(self) -> float:
+        """BIC of the current model, but for what every candidate shares with it."""
+        return sum(fit.bic(0) for fit in self.noise)
+
+    def held_gain(self, before: Baseline) -> float:
+        """Return −2 log likelihood that it gains on the held-out rows against another model."""
+        return sum(
+            old.held_minus_two_log - new.held_minus_two_log
+            for old, new in zip(before.noise, self.noise, strict=True)
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class CandidateFit:
+    """One candidate at its best.
+
+    Attributes:
+        candidate: which.
+        point: searched figures, shape (axes,).
+        factors: figures found by least squares, shape (s,).
+        noise: per output that it touches, the noise that is left.
+        delta_bic: by how much it beats the current model alone on the training rows; negative
+            when it does not.
+        held_gain: −2 log likelihood that it gains on the held-out rows, with the figures of
+            the training rows.
+    """
+
+    candidate: Candidate
+    point: FloatArray
+    factors: FloatArray
+    noise: Mapping[int, NoiseFit]
+    delta_bic: float
+    held_gain: float
+
+    @property
+    def evidence(self) -> float:
+        """By how much it beats the current model on all rows: fitted ones and foretold ones."""
+        return self.delta_bic + self.held_gain
+
+    def behaviour(self, run: FreeRun) -> Behaviour | None:
+        """Return the effect with its figures; None outside the catalogue."""
+        return self.candidate.behaviour(run, self.point, self.factors)
+
+
+def fit_candidate(
+    base: Baseline, gap: FloatArray, candidate: Candidate, around: FloatArray | None = None
+) -> CandidateFit:
+    """Return the best figures of a candidate by the likelihood of the innovations.
+
+    Args:
+        base: of the current model.
+        gap: what is to be explained, shape (N, p).
+        candidate: the change.
+        around: a point near which alone is searched, shape (axes,), values; None everywhere.
+    """
+    search = _Search(base, gap, candidate)
+    centres = search.coarse()[:STARTS] if around is None else [candidate.coordinates(around)]
+    for centre in centres:
+        search.refine(centre, 0.7)
+    if candidate.sharp and around is None:
+        for centre in search.coarse_white():
+            search.refine(centre, 0.7, white=True)
+    if candidate.needle and around is None and search.best().delta_bic > 0.0:
+        search.scatter()
+    if candidate.dated:
+        if len(candidate.axes) > 1:
+            search.polish()
+        return search.exact(_dated(search))
+    search.polish()
+    return search.exact(search.best())
+
+
+def _dated(search: _Search) -> CandidateFit:
+    """Return the best fit with its moment found on all rows, the held-out ones included.
+
+    A moment within a held-out block leaves no other trace than before and after it.
+    """
+    base, found = search.base, search.best()
+    every = tuple(Blocks(b.train | b.held, np.zeros_like(b.held)) for b in base.blocks)
+    whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
+    axis = search.candidate.axes[0]
+    centre, reach = axis.inner(float(found.point[0])), REACH * axis.step
+    coordinates = np.tile(search.candidate.coordinates(found.point), (MOMENTS, 1))
+    coordinates[:, 0] = np.linspace(centre - reach, centre + reach, MOMENTS)
+    values = search.candidate.values(coordinates)
+    response = search.candidate.respond(base.run, values)
+    best = whole.best_of(values, response, [found.noise, base.noise])
+    other = search.judge(best, search.candidate.respond(base.run, best[None, :]))
+    return max(*search.judged.values(), other, key=lambda fit: fit.evidence)
+
+
+class _Search:
+    """The state of one search: the best point so far, judged by the exact likelihood."""
+
+    def __init__(self, base: Baseline, gap: FloatArray, candidate: Candidate) -> None:
+        self.base, self.gap, self.candidate = base, gap, candidate
+        self.found: CandidateFit | None = None
+        self.judged: dict[tuple[float, ...], CandidateFit] = {}
+
+    def coarse(self) -> list[FloatArray]:
+        """Return the best points of the first grid, under several guesses of the noise."""
+        grid = self.candidate.grid()
+        values = self.candidate.values(grid)
+        response = self.candidate.respond(self.base.run, values)
+        guesses: list[Mapping[int, FloatArray]] = [
+            {i: self.base.noise[i].ar for i in response.outputs},
+            {i: np.zeros(0) for i in response.outputs},
+            dict.fromkeys(response.outputs, SLOW),
+        ]
+        guesses += [
+            {i: self.base.declared[i][0] for i in response.outputs}
+            for _ in range(all(len(forms) and len(forms[0]) for forms in self.base.declared))
+        ]
+        leaders: dict[int, float] = {}
+        for _ in range(3):
+            for ar in guesses:
+                squares = misfit(self.base, self.gap, response, ar)
+                for point in self.candidate.apart(grid, squares, LEADERS):
+                    if point not in leaders:
+                        fit = self.judge(values[point], response.pick(point))
+                        leaders[point] = fit.delta_bic
+            best = self.best()
+            guesses = [{i: fit.ar for i, fit in best.noise.items()}]
+        order = sorted(leaders, key=lambda point: -leaders[point])
+        return [grid[point] for point in order]
+
+    def coarse_white(self) -> list[FloatArray]:
+        """Return the best points of the first grid under white noise."""
+        grid = self.candidate.grid()
+        response = self.candidate.respond(self.base.run, self.candidate.values(grid))
+        white = {i: np.zeros(0) for i in response.outputs}
+        squares = misfit(self.base, self.gap, response, white)
+        return [grid[point] for point in self.candidate.apart(grid, squares, STARTS)]
+
+    def refine(self, centre: FloatArray, size: float, white: bool = False) -> None:
+        """Search smaller and smaller grids around a point.
+
+        Args:
+            centre: coordinates of the search, shape (axes,).
+            size: of the first one, in steps of the first grid.
+            white: whether the points of a grid are compared under white noise.
+        """
+        if not self.candidate.axes:
+            self._try(self.candidate.grid())
+            return
+        best = self._try(np.array([centre]), white=white)
+        for _ in range(ROUNDS):
+            best = self._around(best, size, white)
+            size *= SHRINK
+
+    def polish(self) -> None:
+        """Search on around the best point until smaller grids gain next to nothing."""
+        if not self.candidate.axes or self.best().delta_bic <= 0.0:
+            return
+        best = self.candidate.coordinates(self.best().point), self.best()
+        size = 0.7 * SHRINK**ROUNDS
+        for _ in range(POLISHES):
+            better = self._around(best, size)
+            if better[1].delta_bic < best[1].delta_bic + NEXT_TO_NOTHING:
+                size *= SHRINK
+            best = better
+
+    def _around(
+        self, best: tuple[FloatArray, CandidateFit], size: float, white: bool = False
+    ) -> tuple[FloatArray, CandidateFit]:
+        """Return the best of a grid around a point and that point, with its coordinates."""
+        axes = self.candidate.axes
+        steps = np.array([axis.step for axis in axes])
+        whole = np.array([axis.whole for axis in axes])
+        offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDE for a in axes])))
+        span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
+        found = self._try(best[0] + offsets * span, best[1], white)
+        return found if white or found[1].delta_bic >= best[1].delta_bic else best
+
+    def scatter(self) -> None:
+        """Search scattered points in ever smaller boxes around the best point.
+
+        The optimum of He's law is a needle in a valley: stems that differ in one slip differ
+        for long. Points of a lattice miss it however fine they are along the valley.
+        """
+        halton = qmc.Halton(len(self.candidate.axes), seed=0)
+        size = 1.0
+        for _ in range(THROWS):
+            leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:CENTRES]
+            cubes = 2.0 * halton.random(THROWN * len(leading)) - 1.0
+            parts = np.split(cubes, len(leading))
+            values = np.vstack(
+                [
+                    self.candidate.scattered(fit.point, cube, size)
+                    for fit, cube in zip(leading, parts, strict=True)
+                ]
+            )
+            response = self.candidate.respond(self.base.run, values)
+            self.best_of(values, response, [*(fit.noise for fit in leading), self.base.noise])
+            for ar in (np.zeros(0), SLOW):
+                self._judge_best(values, response, dict.fromkeys(response.outputs, ar))
+            size *= THROW_SHRINK
+
+    def best(self) -> CandidateFit:
+        """Return the best fit that was seen."""
+        assert self.found is not None
+        return self.found
+
+    def best_of(
+        self,
+        values: FloatArray,
+        response: Response,
+        guesses: Sequence[Mapping[int, NoiseFit] | Sequence[NoiseFit]],
+    ) -> FloatArray:
+        """Return the best of several points, each the best one under one guess of the noise."""
+        fits = [
+            self._judge_best(values, response, {i: noise[i].ar for i in response.outputs})
+            for noise in guesses
+        ]
+        return max(fits, key=lambda fit: fit.delta_bic).point
+
+    def _judge_best(
+        self, values: FloatArray, response: Response, ar: Mapping[int, FloatArray]
+    ) -> CandidateFit:
+        best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        return self.judge(values[best], response.pick(best))
+
+    def _try(
+        self, coordinates: FloatArray, like: CandidateFit | None = None, white: bool = False
+    ) -> tuple[FloatArray, CandidateFit]:
+        """Judge the point of a grid that is best under the noise of another fit."""
+        ar = {i: noise.ar for i, noise in enumerate(self.base.noise)}
+        if like is not None:
+            ar |= {i: noise.ar for i, noise in like.noise.items()}
+        if white:
+            ar = dict.fromkeys(ar, np.zeros(0))
+        coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
+        values = self.candidate.values(coordinates)
+        response = self.candidate.respond(self.base.run, values)
+        best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
+        return coordinates[best], self.judge(values[best], response.pick(best))
+
+    def judge(self, values: FloatArray, response: Response) -> CandidateFit:
+        """Return the fit at one point of the search; the best one is remembered."""
+        key = tuple(values.tolist())
+        if key in self.judged:
+            return self.judged[key]
+        fit = self._fit(values, response, rounded=False)
+        self.judged[key] = fit
+        if self.found is None or fit.delta_bic > self.found.delta_bic:
+            self.found = fit
+        return fit
+
+    def exact(self, fit: CandidateFit) -> CandidateFit:
+        """Return a fit by the likelihood of rounded values, where an output is rounded."""
+        if not any(self.base.run.runs.quanta):
+            return fit
+        response = self.candidate.respond(self.base.run, fit.point[None, :])
+        return self._fit(fit.point, response, rounded=True)
+
+    def _fit(self, values: FloatArray, response: Response, rounded: bool) -> CandidateFit:
+        factors = np.zeros(0)
+        if response.impossible:
+            unmoved = {i: self.base.noise[i] for i in response.outputs}
+            return CandidateFit(self.candidate, values, factors, unmoved, -np.inf, 0.0)
+        noise = {i: self._noise(i, response, values, None, rounded) for i in response.outputs}
+        if response.sizes:
+            own = {i: sizes[:, 0] for i, sizes in response.sizes.items()}
+            first = next(iter(own))
+            factors = noise[first].coefficients[: own[first].shape[1]]
+            if len(own) > 1:
+                factors = shared_factors(own, self.base.columns, noise, self.base.blocks)
+                noise = {
+                    i: self._noise(i, response, values, factors, rounded) for i in response.outputs
+                }
+        gained, held = -self.candidate.count(values) * self._price(response), 0.0
+        before = self.base.noise if rounded else self.base.plain
+        for i, left in noise.items():
+            gained += before[i].bic(0) - left.bic(0)
+            held += before[i].held_minus_two_log - left.held_minus_two_log
+        return CandidateFit(self.candidate, values, factors, noise, gained, held)
+
+    def _noise(
+        self,
+        i: int,
+        response: Response,
+        values: FloatArray,
+        factors: FloatArray | None,
+        rounded: bool,
+    ) -> NoiseFit:
+        """Return what a response leaves of an output, its factors given or open."""
+        columns, target = self.base.columns[i], self.gap[:, i]
+        if i in response.shifts:
+            target = target - response.shifts[i][:, 0]
+        if i in response.sizes:
+            sizes = response.sizes[i][:, 0]
+            if factors is None:
+                columns = np.hstack([sizes, columns])
+            else:
+                target = target - sizes @ factors
+        forms = self.base.declared[i]
+        keep = self.candidate.keeps(self.base.run, values)
+        if forms and keep is not None:  # what slows PV may or may not slow its noise
+            forms = (*forms, *(behind_lag(ar, keep) for ar in forms))
+        blocks = self.base.blocks[i]
+        fits = noise_forms(target, columns, blocks, (None, self.base.noise[i].ar), forms)
+        return best_noise(fits, self.base.run.runs.quanta[i] if rounded else 0.0, blocks)
+
+    def _price(self, response: Response) -> float:
+        rows = sum(self.base.noise[i].rows for i in response.outputs)
+        return float(np.log(max(rows, 2)))

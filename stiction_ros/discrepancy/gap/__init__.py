@@ -1,0 +1,1 @@
+"""What the gap is: how large, where, and how much of it is noise."""

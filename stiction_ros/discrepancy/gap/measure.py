@@ -1,0 +1,89 @@
+"""Step 2: how large the gap is, in free run and in one step, against its noise floor."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.likelihood.noise import whiten
+from stiction_ros.effects import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputGap:
+    """The gap of one output on the held-out rows, units of the output.
+
+    Attributes:
+        name: tag.
+        free_run_rmse: of PV less the free run.
+        one_step_rmse: of the innovations.
+        floor_free_run: stationary standard deviation of the AR noise.
+        floor_one_step: standard deviation of its innovations on the fitted rows.
+    """
+
+    name: str
+    free_run_rmse: float
+    one_step_rmse: float
+    floor_free_run: float
+    floor_one_step: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``gap --json``."""
+        return {
+            "free_run_rmse": self.free_run_rmse,
+            "one_step_rmse": self.one_step_rmse,
+            "noise_floor": {"free_run": self.floor_free_run, "one_step": self.floor_one_step},
+        }
+
+
+def measure_gap(
+    base: Baseline, weights: Sequence[FloatArray] | None = None
+) -> tuple[OutputGap, ...]:
+    """Return the gap of every output on rows that no figure was fitted to.
+
+    Args:
+        base: the model.
+        weights: per output φ by which its free run is whitened, none of them for no output;
+            None whitens none.
+    """
+    found = []
+    for i, name in enumerate(base.run.model.outputs):
+        noise, held = base.noise[i], base.blocks[i].held
+        residual, floor = noise.residual, noise.stationary_std
+        if weights is not None and len(weights[i]):
+            residual, floor = whiten(residual, weights[i]), np.inf
+        found.append(
+            OutputGap(
+                name,
+                _rms(residual[held]),
+                _rms(noise.innovations[held]),
+                min(floor, _rms(residual[base.blocks[i].train])),
+                noise.innovation_std,
+            )
+        )
+    return tuple(found)
+
+
+def closed_share(before: tuple[OutputGap, ...], after: tuple[OutputGap, ...]) -> float:
+    """Return the share of the free-run excess over the noise floor that is gone.
+
+    The floor is that of the model with its effects, since what the effect caused counts as
+    noise before. Outputs are weighted by their excess in units of their innovations. 0 where
+    there was no excess.
+    """
+    excess, gone = 0.0, 0.0
+    for old, new in zip(before, after, strict=True):
+        floor, unit = new.floor_free_run, max(new.floor_one_step, 1e-300)
+        much = max(old.free_run_rmse - floor, 0.0) / unit
+        left = max(new.free_run_rmse - floor, 0.0) / unit
+        excess += much
+        gone += much - left
+    return gone / excess if excess > 0.0 else 0.0
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")

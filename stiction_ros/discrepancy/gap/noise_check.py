@@ -1,0 +1,88 @@
+"""The noise that was found against the one that the model declares."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+
+LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
+LAGS = 20
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputNoise:
+    """The noise of one output, units of the output.
+
+    Attributes:
+        name: tag.
+        declared: standard deviation of the innovations as the model has it; NaN where the
+            model declares none.
+        found: of those that the answer leaves, under the declared form.
+        disagrees: whether they are larger than declared, or depend on each other.
+        memory: samples after which the strongest dependence comes; 0 where there is none.
+    """
+
+    name: str
+    declared: float
+    found: float
+    disagrees: bool
+    memory: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``gap --json``; a missing declaration is null."""
+        return {
+            "declared": None if math.isnan(self.declared) else self.declared,
+            "found": self.found,
+            "disagrees": self.disagrees,
+        }
+
+
+def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
+    """Return declared and found noise of every output under a model."""
+    found = []
+    for i, (name, declared) in enumerate(
+        zip(base.run.model.outputs, declared_noise(base.run.model), strict=True)
+    ):
+        fit, quantum = base.noise[i], base.run.runs.quanta[i]
+        if declared is None:
+            found.append(OutputNoise(name, math.nan, fit.innovation_std, False, 0))
+            continue
+        expected = math.sqrt(declared.std**2 + quantum**2 / 12.0)
+        larger = fit.innovation_std > LARGER * expected
+        memory = _memory(base, i) if fit.enlarged else 0
+        found.append(
+            OutputNoise(name, declared.std, fit.innovation_std, fit.enlarged or larger, memory)
+        )
+    return tuple(found)
+
+
+def _memory(base: Baseline, output: int) -> int:
+    """Return the lag at which what is left depends on itself most."""
+    rows = base.blocks[output].train | base.blocks[output].held
+    values = np.where(rows, base.noise[output].residual, 0.0)
+    values = values - values[rows].mean() * rows
+    whole = float(values @ values)
+    if whole <= 0.0:
+        return 0
+    shares = [float(values[lag:] @ values[:-lag]) / whole for lag in range(1, LAGS + 1)]
+    return 1 + int(np.argmax(np.abs(shares)))
+
+
+def noise_sentences(noises: tuple[OutputNoise, ...], sample_time: float) -> list[str]:
+    """Return where and how far the noise is another than declared, for people."""
+    said = []
+    for each in noises:
+        if not each.disagrees:
+            continue
+        size = f"{each.name}: innovations of {each.found:.3g} where the model declares "
+        size += f"{each.declared:.3g}"
+        if each.memory:
+            size += f", and they depend on each other over {each.memory * sample_time:.3g} s"
+        said.append(size)
+    return said

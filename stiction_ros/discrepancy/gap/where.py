@@ -1,0 +1,229 @@
+"""Step 3, where the gap is: in time, at which moves, at which place, at which frequency."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.likelihood.noise import BoolArray, left_by, projector
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop.set_points import set_point_moves
+
+KNOTS = 60
+LEAST_ROWS = 30
+WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
+CLEAR = 1.5  # times the usual size of innovations
+STRONG = 0.5  # share of a track's variance
+
+
+@dataclasses.dataclass(frozen=True)
+class Track:
+    """A slow disturbance at one place that would close the gap, smoothed.
+
+    Attributes:
+        place: ``valve:TAG`` or ``disturbance:TAG``.
+        wave: shape (N,), % at a valve, units of the output at a disturbance.
+        gain: −2 log likelihood that it gains, less two per degree of freedom that it uses.
+        follows: share of its variance that OP, direction of OP, PV and time each explain.
+    """
+
+    place: str
+    wave: FloatArray
+    gain: float
+    follows: dict[str, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Where:
+    """Where the gap of one model is.
+
+    Attributes:
+        sentences: for people.
+        tracks: one per place, the one that gains most first.
+        lines: strongest period of the gap per output, s.
+    """
+
+    sentences: tuple[str, ...]
+    tracks: tuple[Track, ...]
+    lines: tuple[float, ...]
+
+
+def locate(base: Baseline) -> Where:
+    """Return where the gap of the current model is."""
+    tracks = sorted(_tracks(base), key=lambda track: -track.gain)
+    sentences: list[str] = []
+    lines = []
+    for i, name in enumerate(base.run.model.outputs):
+        sentences += _at_moments(base, i, name)
+        period, share = _line(base, i)
+        lines.append(period)
+        if share > STRONG:
+            sentences.append(
+                f"{name}: {100 * share:.0f} % of the gap has a period of {period:.4g} s"
+            )
+    if tracks and tracks[0].gain > 10.0:
+        first = tracks[0]
+        sentences.append(f"a slow disturbance at {first.place} would close most of the gap")
+        for what, share in first.follows.items():
+            if share > STRONG:
+                sentences.append(f"that disturbance follows {what} (R² {share:.2f})")
+    return Where(tuple(sentences), tuple(tracks), tuple(lines))
+
+
+def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
+    """Return at which moments the innovations are larger than elsewhere."""
+    noise = base.noise[output]
+    scored = base.blocks[output].train | base.blocks[output].held
+    squares = noise.innovations**2
+    usual = float(np.median(squares[scored])) if scored.any() else 0.0
+    if usual <= 0.0:
+        return []
+    found = []
+    for what, moments in _moments(base).items():
+        rows = moments & scored
+        if 5 <= rows.sum() < 0.5 * scored.sum():
+            ratio = float(np.sqrt(np.mean(squares[rows]) / np.mean(squares[scored & ~rows])))
+            if ratio > CLEAR:
+                found.append(f"{name}: innovations are {ratio:.1f} times larger {what}")
+    moment, ratio = _change(noise.residual, scored)
+    if ratio > STRONG:
+        at = base.run.runs.time[moment]
+        found.append(f"{name}: the gap's level changes at {at:.4g} s")
+    return found
+
+
+def _moments(base: Baseline) -> dict[str, BoolArray]:
+    """Return rows shortly after moves of SP, after reversals of OP, and with OP at a limit."""
+    run = base.run
+    count = len(run.runs)
+    found: dict[str, BoolArray] = {}
+    moved = np.zeros(count, dtype=bool)
+    for record, rows in zip(run.runs.records, run.runs.slices, strict=True):
+        if record.sp is not None:
+            moved[rows][set_point_moves(record.sp)] = True
+    reach = max(run.responses.skip + 10, 10)
+    if moved.any():
+        found["after moves of the set-point"] = _after(moved, reach)
+    for j, valve in enumerate(run.model.valves):
+        op = run.runs.op[:, j]
+        if valve.limits is not None:
+            found[f"while OP of {valve.name} is at a limit"] = np.isin(op, valve.limits)
+    return found
+
+
+def _after(moments: BoolArray, reach: int) -> BoolArray:
+    kernel = np.ones(reach)
+    return np.asarray(np.convolve(moments.astype(float), kernel)[: len(moments)] > 0.0)
+
+
+def _change(residual: FloatArray, scored: BoolArray) -> tuple[int, float]:
+    """Return the moment of the largest change of level and the share of variance it explains."""
+    values = np.where(scored, residual, 0.0)
+    mean = values[scored].mean() if scored.any() else 0.0
+    total = float(np.sum((values[scored] - mean) ** 2))
+    if total <= 0.0:
+        return 0, 0.0
+    count = np.cumsum(scored).astype(float)
+    summed = np.cumsum(np.where(scored, residual - mean, 0.0))
+    weight = count * (count[-1] - count) / count[-1]
+    inside = weight > 0.05 * count[-1]
+    gain = np.where(inside, summed**2 / np.maximum(weight, 1e-9), 0.0)
+    moment = int(np.argmax(gain))
+    return moment, float(gain[moment]) / total
+
+
+def _line(base: Baseline, output: int) -> tuple[float, float]:
+    """Return the strongest period of the gap in seconds and its share of the variance."""
+    values = base.noise[output].residual
+    part = values[base.run.runs.longest]
+    part = part - part.mean()
+    power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
+    power[:2] = 0.0
+    peak = int(np.argmax(power))
+    total = float(power.sum())
+    share = float(power[max(peak - 2, 0) : peak + 3].sum()) / total if total > 0.0 else 0.0
+    return len(part) * base.run.runs.sample_time / max(peak, 1), share
+
+
+def _tracks(base: Baseline) -> list[Track]:
+    run = base.run
+    hats = _hats(base)
+    found = []
+    for i, name in enumerate(run.model.outputs):
+        if int(base.blocks[i].train.sum()) < LEAST_ROWS:
+            continue
+        found.append(_track(base, i, f"disturbance:{name}", hats, hats))
+        for j, valve in enumerate(run.model.valves):
+            moved = run.drive(i, j, run.stems[:, j, None] + hats) - run.forced[:, i, None]
+            if np.ptp(moved) > 0.0:
+                found.append(_track(base, i, f"valve:{valve.name}", hats, moved))
+    return found
+
+
+def _hats(base: Baseline) -> FloatArray:
+    """Return piecewise linear functions of time, shape (N, K)."""
+    count = len(base.run.runs)
+    at = np.linspace(0.0, count - 1.0, min(KNOTS, max(count // 10, 3)))
+    width = at[1] - at[0]
+    rows = np.arange(count)[:, None]
+    return np.asarray(np.maximum(1.0 - np.abs(rows - at) / width, 0.0))
+
+
+def _track(base: Baseline, output: int, place: str, hats: FloatArray, columns: FloatArray) -> Track:
+    """Return the smooth wave at a place by penalised least squares, its weight by AIC.
+
+    What is left counts as white: the noise model would take the slow part of the gap for noise.
+    """
+    train = base.blocks[output].train
+    basis = projector(base.columns[output][train])
+    target = left_by(basis, base.run.gap[train, output])
+    inner = left_by(basis, columns[train])
+    gram, cross = inner.T @ inner, inner.T @ target
+    rough = np.diff(np.eye(columns.shape[1]), axis=0)
+    penalty = rough.T @ rough
+    scale = float(np.trace(gram)) / max(float(np.trace(penalty)), 1e-300)
+    rows, before = len(target), max(float(target @ target), 1e-300)
+    best, wave = -np.inf, np.zeros(len(hats))
+    for weight in WEIGHTS * scale:
+        held = gram + weight * penalty + 1e-9 * float(np.trace(gram)) * np.eye(len(gram))
+        beta = np.linalg.solve(held, cross)
+        left = max(float(np.sum((target - inner @ beta) ** 2)), 1e-300)
+        freedom = float(np.trace(np.linalg.solve(held, gram)))
+        gain = rows * float(np.log(before / left)) - 2.0 * freedom
+        if gain > best:
+            best, wave = gain, hats @ beta
+    return Track(place, wave, best, _follows(base, output, wave))
+
+
+def _follows(base: Baseline, output: int, wave: FloatArray) -> dict[str, float]:
+    """Return R² of the wave on OP, the direction of OP, PV and time, one at a time."""
+    run = base.run.runs
+    found = {"PV": _share(wave, run.pv[:, output]), "time": _share(wave, run.time)}
+    for j, valve in enumerate(base.run.model.valve_names):
+        op = run.op[:, j]
+        found[f"OP of {valve}"] = _share(wave, op)
+        found[f"the direction of OP of {valve}"] = _share(wave, _direction(op))
+    return found
+
+
+def _direction(op: FloatArray) -> FloatArray:
+    """Return ±1: which way OP went last by more than a tenth of its span."""
+    out, last, state = np.zeros(len(op)), float(op[0]), 0.0
+    least = 0.1 * float(np.ptp(op))
+    for k, value in enumerate(op.tolist()):
+        if value - last > least:
+            last, state = value, 1.0
+        elif last - value > least:
+            last, state = value, -1.0
+        elif (value - last) * state > 0.0:
+            last = value
+        out[k] = state
+    return out
+
+
+def _share(wave: FloatArray, driver: FloatArray) -> float:
+    if float(np.std(wave)) <= 0.0 or float(np.std(driver)) <= 0.0:
+        return 0.0
+    return float(np.corrcoef(wave, driver)[0, 1] ** 2)

@@ -1,0 +1,1 @@
+"""How likely a gap is: autoregressive noise, declared or found, and rounded values."""

@@ -1,0 +1,237 @@
+"""The likelihood of a gap: linear columns projected out, autoregressive noise, innovations."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from stiction_ros.discrepancy.likelihood.kernels import (
+    NOTHING,
+    best_autoregression,
+    orthonormal,
+    sums_of_squares,
+    turn,
+)
+from stiction_ros.effects import FloatArray
+
+MAX_ORDER = 6
+ROUNDS = 4
+SURPRISE = 5.0  # standard deviations that one held-out row may count
+ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
+VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
+_TINY = 1e-300
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Blocks:
+    """Which samples are fitted and which are kept back.
+
+    Attributes:
+        train, held: rows, shape (N,); a row is in at most one of them.
+    """
+
+    train: BoolArray
+    held: BoolArray
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseFit:
+    r"""One output's gap under autoregressive noise, its linear part fitted by least squares.
+
+    .. math::
+        g_k &= x_k^T \beta + r_k \\
+        r_k &= \varphi_1 r_{k-1} + \ldots + \varphi_p r_{k-p} + e_k, \quad p \le 6
+
+    Attributes:
+        ar: φ, shape (p,).
+        innovation_std: of e on the training rows, units of the output.
+        coefficients: β, shape (q,).
+        residual: r, shape (N,).
+        minus_two_log: n (log 2πσ² + 1) on the n training rows.
+        rows: n.
+        held_minus_two_log: −2 log likelihood of the held-out rows with the trained figures;
+            innovations beyond 5 σ count as 5 σ, so that no single row outweighs all others.
+        held_rows: their number.
+        price: what its φ cost in BIC; nothing for those that the model declares.
+        enlarged: whether it is another noise than the one that the model declares.
+    """
+
+    ar: FloatArray
+    innovation_std: float
+    coefficients: FloatArray
+    residual: FloatArray
+    minus_two_log: float
+    rows: int
+    held_minus_two_log: float
+    held_rows: int
+    price: float
+    enlarged: bool = False
+
+    @property
+    def innovations(self) -> FloatArray:
+        """Innovations e, shape (N,); the first p reach before the record and are not used."""
+        return whiten(self.residual, self.ar)
+
+    @property
+    def stationary_std(self) -> float:
+        """Standard deviation of r under its own model; inf where that is not stationary."""
+        return self.innovation_std * math.sqrt(_gain_of_noise(self.ar))
+
+    def bic(self, parameters: int) -> float:
+        """Return −2 log likelihood, the price of φ and ``parameters`` log n."""
+        return self.minus_two_log + self.price + parameters * math.log(max(self.rows, 2))
+
+
+def whiten(values: FloatArray, ar: FloatArray) -> FloatArray:
+    """Return values_k − Σ φ_i values_{k−i} along the first axis; zeros before the start."""
+    out = np.array(values, dtype=float, copy=True)
+    for lag, coefficient in enumerate(ar.tolist(), start=1):
+        out[lag:] -= coefficient * values[:-lag]
+    return out
+
+
+def coloured(white: FloatArray, ar: FloatArray) -> FloatArray:
+    """Return r_k = Σ φ_i r_{k−i} + white_k along the first axis: the inverse of :func:`whiten`."""
+    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), white, axis=0))
+
+
+def fit_noise(
+    target: FloatArray, columns: FloatArray, blocks: Blocks, start: FloatArray | None = None
+) -> NoiseFit:
+    """Fit the linear columns and the noise to a gap by Gaussian likelihood, in turns.
+
+    Args:
+        target: the gap, shape (N,).
+        columns: linear columns, shape (N, q).
+        blocks: rows; the first :data:`MAX_ORDER` of every run are in neither.
+        start: φ to begin with; None begins with white noise.
+
+    Returns:
+        The best of the turns; the order p is the one of least BIC.
+    """
+    train, target = blocks.train, np.ascontiguousarray(target)
+    rows = np.ascontiguousarray(columns.T)
+    ar = np.zeros(0) if start is None else start
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    for _ in range(ROUNDS):
+        sure, beta = turn(rows, target, train, ar)
+        if not sure:
+            beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])
+        residual = target - columns @ beta
+        fitted, score = best_autoregression(residual, train, MAX_ORDER)
+        if best is not None and score >= best[0] - 1e-3:
+            break
+        best = (score, beta, fitted)
+        ar = fitted
+    assert best is not None
+    found = _result(target - columns @ best[1], best[1], best[2], blocks)
+    return dataclasses.replace(found, price=len(found.ar) * math.log(max(found.rows, 2)))
+
+
+def noise_forms(
+    target: FloatArray,
+    columns: FloatArray,
+    blocks: Blocks,
+    starts: Sequence[FloatArray | None],
+    declared: Sequence[FloatArray] = (),
+) -> list[NoiseFit]:
+    """Fit the linear columns under the declared noise, and under a larger one with its price.
+
+    Args:
+        target, columns, blocks: as for :func:`fit_noise`.
+        starts: φ with which the search for a noise of its own begins; None is white.
+        declared: φ of the noise that the model declares, several where an effect may or may
+            not colour it; none where it declares nothing.
+    """
+    fits = [fit_noise(target, columns, blocks, start) for start in starts]
+    if declared:
+        fits = [dataclasses.replace(fit, price=fit.price + ENLARGED, enlarged=True) for fit in fits]
+        fits += [given_noise(target, columns, blocks, ar) for ar in declared]
+    return fits
+
+
+def given_noise(
+    target: FloatArray, columns: FloatArray, blocks: Blocks, ar: FloatArray
+) -> NoiseFit:
+    """Fit the linear columns under noise whose φ are given, its spread left open."""
+    train = blocks.train
+    white = whitened_columns(columns, ar, train)
+    beta = _solve(white, whiten(target, ar)[train])
+    residual = target - columns @ beta
+    unseen = ~white.any(axis=0)
+    if unseen.any():  # the innovations do not show them, the free run does
+        beta[unseen] = _solve(columns[train][:, unseen], residual[train])
+        residual = target - columns @ beta
+    return _result(residual, beta, ar, blocks)
+
+
+def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return columns whitened, shape (n, q), zero where nothing but rounding is left of them.
+
+    Noise of an equation that has settled hides how its run began.
+    """
+    white = whiten(columns, ar)[rows]
+    lengths, before = np.linalg.norm(white, axis=0), np.linalg.norm(columns[rows], axis=0)
+    white[:, lengths <= VANISHED * before] = 0.0
+    return white
+
+
+def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:
+    rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
+    variance = max(inside / max(rows, 1), _TINY)
+    log = math.log(2.0 * math.pi * variance)
+    return NoiseFit(
+        ar,
+        math.sqrt(variance),
+        beta,
+        residual,
+        rows * (log + 1.0),
+        rows,
+        held * log + outside / variance,
+        held,
+        0.0,
+    )
+
+
+def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return φ of the order of least BIC, least squares on ``rows``, shape (p ≤ 6,)."""
+    return best_autoregression(residual, rows, MAX_ORDER)[0]
+
+
+def projector(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns, shape (n, r), numerical dependence left out."""
+    return np.ascontiguousarray(orthonormal(columns.T.copy()).T)
+
+
+def left_by(basis: FloatArray, values: FloatArray) -> FloatArray:
+    """Return what an orthonormal basis, shape (n, r), leaves of values, shape (n, …)."""
+    return np.asarray(values - basis @ (basis.T @ values))
+
+
+def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
+    if not columns.shape[1]:
+        return np.zeros(0)
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > NOTHING, scale, np.inf)
+    return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
+
+
+def _gain_of_noise(ar: FloatArray) -> float:
+    """Return the variance of an autoregressive process of unit innovations."""
+    order = len(ar)
+    if not order:
+        return 1.0
+    companion = np.vstack([ar, np.eye(order)[:-1]])
+    if np.abs(np.linalg.eigvals(companion)).max() >= 1.0 - 1e-9:
+        return math.inf
+    start = np.zeros((order, order))
+    start[0, 0] = 1.0
+    flat = np.linalg.solve(np.eye(order**2) - np.kron(companion, companion), start.ravel())
+    return float(flat[0])

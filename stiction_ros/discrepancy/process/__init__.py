@@ -1,0 +1,1 @@
+"""The process fitted anew behind the effects, where it is not given."""

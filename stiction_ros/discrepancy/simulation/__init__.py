@@ -1,0 +1,1 @@
+"""The model driven by the recorded OP, for one stem or many."""

@@ -1,0 +1,268 @@
+"""The free run: a loop model driven by the recorded OP of one or more records."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks, BoolArray
+from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
+from stiction_ros.effects import Behaviour, FloatArray, Seen
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+HELD_SHARE = 4
+BLOCKS = 24
+PHASES = (0, 1, 3)  # of the held-out blocks, record by record
+SHORTEST_BLOCK = 20
+
+
+@dataclasses.dataclass(frozen=True)
+class Runs:
+    """Records of one loop laid end to end; nothing reaches from one into the next.
+
+    Attributes:
+        records: at least one, of one loop.
+        op: shape (N, m), %, within the limits of the valves.
+        pv: shape (N, p).
+        time: seconds since the first sample of the own record, shape (N,).
+        slices: rows of each record.
+        usable: per output the rows whose PV can be scored, shape (p, N).
+        quanta: per output the step of a coarse rounding; 0 where there is none.
+        thinned: per output whether values were held or interpolated, so that their noise is
+            no longer that of the loop.
+    """
+
+    records: tuple[Record, ...]
+    op: FloatArray
+    pv: FloatArray
+    time: FloatArray
+    slices: tuple[slice, ...]
+    usable: BoolArray
+    quanta: tuple[float, ...]
+    thinned: tuple[bool, ...]
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds between two samples."""
+        return self.records[0].sample_time
+
+    @property
+    def longest(self) -> slice:
+        """Rows of the longest record."""
+        return max(self.slices, key=lambda rows: rows.stop - rows.start)
+
+    def __len__(self) -> int:
+        return len(self.op)
+
+
+def join_records(
+    model: LoopModel, records: Sequence[Record], usable: BoolArray | None = None
+) -> Runs:
+    """Return the records end to end, signals in the order of the model.
+
+    Raises:
+        InputError: no record, other tags or another sample time than the model's.
+    """
+    if not records:
+        raise InputError("no record", where=model.name, fix="give one record at least")
+    for record in records:
+        _check(model, record)
+    op = np.vstack([r.op[:, [r.valves.index(v) for v in model.valve_names]] for r in records])
+    pv = np.vstack([r.pv[:, [r.outputs.index(o) for o in model.outputs]] for r in records])
+    ends = np.cumsum([len(r) for r in records]).tolist()
+    slices = tuple(slice(end - len(r), end) for r, end in zip(records, ends, strict=True))
+    if usable is None:
+        usable = np.ones((pv.shape[1], len(pv)), dtype=bool)
+    low, high = model.limits.T
+    time = np.concatenate([r.time for r in records])
+    count = pv.shape[1]
+    op = np.clip(op, low, high)
+    none = (0.0,) * count, (False,) * count
+    return Runs(tuple(records), op, pv, time, slices, usable, *none)
+
+
+def _check(model: LoopModel, record: Record) -> None:
+    for what, wanted, found in (
+        ("valve", model.valve_names, record.valves),
+        ("output", model.outputs, record.outputs),
+    ):
+        for name in wanted:
+            if name not in found:
+                raise InputError(
+                    f"has no {what} {name!r}",
+                    where=record.name,
+                    fix=f"it has {', '.join(found)}; choose columns with --op and --pv",
+                )
+    if abs(record.sample_time - model.sample_time) > 1e-3 * model.sample_time:
+        raise InputError(
+            f"is sampled every {record.sample_time:g} s, the model every {model.sample_time:g} s",
+            where=record.name,
+            fix="fit a model to this sample time",
+        )
+
+
+def end_to_end(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the parts of every record below each other; one alone is not copied."""
+    return parts[0] if len(parts) == 1 else np.vstack(parts)
+
+
+class FreeRun:
+    """The current model under the recorded OP, and what small changes of it would give.
+
+    The state at the start, and a constant, of every record are left open: they are columns
+    that every fit projects out.
+
+    Attributes:
+        model, runs: what runs, over what.
+        leads: of valves whose last effect starts with its stem that far from OP, %.
+        stems: positions of the current model, shape (N, m), %.
+        loads: what enters the process beside them, shape (N, m), %.
+        forced: outputs of the process, shape (N, p), but for the free columns.
+        known: what disturbances and sensors of the current model add, shape (N, p).
+        free: per output the free columns, shape (N, q).
+    """
+
+    def __init__(
+        self, model: LoopModel, runs: Runs, leads: Mapping[str, float] | None = None
+    ) -> None:
+        """Run the model once.
+
+        Args:
+            model: what runs.
+            runs: over what.
+            leads: of valves whose last effect starts with its stem that far from OP, %.
+
+        Raises:
+            InputError: the model's free run is not finite.
+        """
+        self.model, self.runs = model, runs
+        self.leads = dict(leads or {})
+        self.responses: Responses = responses_of(model.process, model.sample_time)
+        self.stems = np.column_stack(
+            [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
+        )
+        self.loads = self._loads()
+        self.forced = np.column_stack([self.drive(i)[:, 0] for i in range(len(model.outputs))])
+        self.known = np.column_stack([self._known(i) for i in range(len(model.outputs))])
+        self.free = [self._free(i) for i in range(len(model.outputs))]
+        if not (np.isfinite(self.forced).all() and all(np.isfinite(f).all() for f in self.free)):
+            raise InputError(
+                "its free run grows without bound", where=model.name, fix="use a stable model"
+            )
+
+    @property
+    def gap(self) -> FloatArray:
+        """PV less the free run, shape (N, p), free columns not yet taken out."""
+        return np.asarray(self.runs.pv - self.forced - self.known)
+
+    def blocks(self, output: int) -> Blocks:
+        """Return the rows that are fitted and those kept back, interleaved."""
+        first = np.zeros(len(self.runs), dtype=bool)
+        for rows in self.runs.slices:
+            first[rows.start : rows.start + self.responses.skip + MAX_ORDER] = True
+        usable = _with_past(self.runs.usable[output]) & ~first
+        size = max(len(self.runs) // BLOCKS, SHORTEST_BLOCK)
+        kept = np.zeros(len(self.runs), dtype=bool)
+        for r, rows in enumerate(self.runs.slices):
+            # The first block of a record is fitted: nothing else holds its state at the start.
+            place = np.arange(rows.stop - rows.start) // size + PHASES[r % len(PHASES)]
+            kept[rows] = place % HELD_SHARE == HELD_SHARE - 2
+        return Blocks(usable & ~kept, usable & kept)
+
+    def drive(
+        self, output: int, valve: int | None = None, stems: FloatArray | None = None
+    ) -> FloatArray:
+        """Return one output, shape (N, G), with the stems of one valve replaced.
+
+        Args:
+            output: its index.
+            valve: whose stems are replaced; None keeps all.
+            stems: shape (N, G), %, without what enters beside them.
+        """
+        parts = []
+        for rows in self.runs.slices:
+            inputs = self._inputs(rows)
+            if valve is not None and stems is not None:
+                inputs[valve] = stems[rows] + self.loads[rows, valve, None]
+            parts.append(self.responses.forced(output, inputs))
+        return end_to_end(parts)
+
+    def valve_chain(self, valve: int, effects: Sequence[Behaviour]) -> FloatArray:
+        """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""
+        low, high = self.model.limits[valve]
+        stem = self.runs.op[:, valve].copy()
+        lead = self.leads.get(self.model.valves[valve].name, 0.0)
+        for rows in self.runs.slices:
+            for k, effect in enumerate(effects):
+                first = float(stem[rows.start]) + (lead if k == len(effects) - 1 else 0.0)
+                stem[rows] = effect.simulate(stem[rows], first, self.runs.sample_time)
+        return np.asarray(np.clip(stem, low, high))
+
+    def _free(self, output: int) -> FloatArray:
+        blocks = [self.responses.free(output, self._inputs(rows)) for rows in self.runs.slices]
+        return np.asarray(block_diag(*blocks))
+
+    def _inputs(self, rows: slice) -> list[FloatArray]:
+        """Return what enters the process in one record, per valve, each of shape (N, 1)."""
+        entering = self.stems[rows] + self.loads[rows]
+        return [entering[:, j : j + 1] for j in range(entering.shape[1])]
+
+    def _loads(self) -> FloatArray:
+        loads = np.zeros_like(self.stems)
+        names = self.model.valve_names
+        for disturbance in self.model.disturbances:
+            if not disturbance.load:
+                continue
+            for rows in self.runs.slices:
+                loads[rows, names.index(disturbance.place)] += disturbance.behaviour.simulate(
+                    np.zeros(rows.stop - rows.start), 0.0, self.runs.sample_time
+                )
+        return loads
+
+    def _known(self, output: int) -> FloatArray:
+        name = self.model.outputs[output]
+        added = np.zeros(len(self.runs))
+        for rows in self.runs.slices:
+            zeros = np.zeros(rows.stop - rows.start)
+            for disturbance in self.model.disturbances:
+                if disturbance.load:
+                    continue
+                wave = disturbance.behaviour.simulate(zeros, 0.0, self.runs.sample_time)
+                if disturbance.place == name:
+                    added[rows] += wave
+                elif disturbance.place not in self.model.outputs:
+                    response = self.responses.load(output, disturbance.place, wave[:, None])
+                    added[rows] += 0.0 if response is None else response[:, 0]
+            added[rows] += self._sensed(output, self.forced[rows, output] + added[rows])
+        return added
+
+    def _sensed(self, output: int, values: FloatArray) -> FloatArray:
+        """Return what the sensor's linear and additive effects change, shape (N,).
+
+        Frozen, clipped and rounded values are left out of scoring or count as noise.
+        """
+        shown = values
+        for effect in self.model.sensors[output]:
+            if not effect.in_values:
+                shown = effect.simulate(shown, float(shown[0]), self.runs.sample_time)
+        return np.asarray(shown - values)
+
+
+def seen_of(run: FreeRun, signal: FloatArray) -> Seen:
+    """Return what is told of a signal, shape (N,), to whoever says what is to be searched."""
+    moves = np.concatenate([np.diff(signal[rows]) for rows in run.runs.slices])
+    fastest = float(np.abs(moves).max(initial=0.0)) / run.runs.sample_time
+    return Seen(signal, fastest, run.runs.sample_time)
+
+
+def _with_past(usable: BoolArray) -> BoolArray:
+    """Return the usable rows whose noise can be foretold: the rows before them are usable too."""
+    found = usable.copy()
+    for lag in range(1, MAX_ORDER + 1):
+        found[lag:] &= usable[:-lag]
+    return found

@@ -1,0 +1,253 @@
+"""Responses of a process to stem positions, for many stems at once."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from scipy.signal import lfilter
+
+from stiction_ros.discrepancy.simulation.response_kernels import filtered, tank_states
+from stiction_ros.effects import Filter, FloatArray, LinearFilter
+from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank
+
+
+class Responses(ABC):
+    """What a process makes of stem positions; state and level at the start are free columns.
+
+    Attributes:
+        skip: first samples of a run that depend on stems before it.
+    """
+
+    skip: int
+
+    @abstractmethod
+    def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        """Return one output, shape (N, G), but for what :meth:`free` spans.
+
+        Args:
+            output: its index.
+            stems: per valve positions in %, shape (N, G) or (N, 1).
+        """
+
+    @abstractmethod
+    def reaches(self, output: int, valve: int) -> bool:
+        """Return whether a valve moves an output."""
+
+    @abstractmethod
+    def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        """Return columns, shape (N, n): responses to the state at the start and a constant."""
+
+    @abstractmethod
+    def load(self, output: int, upset: str, values: FloatArray) -> FloatArray | None:
+        """Return the response, shape (N, G), to deviations of a further input; None without."""
+
+
+class LinearResponses(Responses):
+    """Transfer functions of a linear process about its operating point."""
+
+    def __init__(self, process: Process, sample_time: float) -> None:
+        """Take ARX equations as they are, other linear processes by their matrices."""
+        model = process.linear(sample_time)
+        self.upsets = process.measured_disturbances
+        count = len(process.outputs)
+        if isinstance(process, ArxProcess):
+            self._numerators, self._denominators = _of_equations(process)
+            self.skip = max(n.size for row in self._numerators for n in row)
+            self._rests = [_recursion_starts(d) for d in self._denominators]
+        else:
+            den = np.real(np.poly(model.a)) if model.order else np.ones(1)
+            self._denominators = [den] * count
+            self._numerators = [
+                [_numerator(model, den, model.b[:, j], i) for j in range(model.b.shape[1])]
+                for i in range(count)
+            ]
+            self.skip = 0
+            self._rests = [_state_starts(model, den, i) for i in range(count)]
+        self._loads = [
+            [_numerator(model, self._denominators[i], model.e[:, d], i) for d in range(e)]
+            for i in range(count)
+            for e in [model.e.shape[1]]
+        ]
+
+    def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        count, denominator = len(stems[0]), self._denominators[output]
+        pairs = list(zip(self._numerators[output], stems, strict=True))
+        many = [pair for pair in pairs if pair[1].shape[1] > 1] or pairs[:1]
+        more = np.zeros(count)
+        for numerator, stem in pairs:
+            if all(stem is not other for _, other in many):
+                more += np.convolve(numerator, stem[:, 0] - stem[0, 0])[:count]
+        total = filtered(many[0][0], denominator, np.ascontiguousarray(many[0][1]), more)
+        for numerator, stem in many[1:]:
+            total += filtered(numerator, denominator, np.ascontiguousarray(stem), np.zeros(count))
+        return total
+
+    def reaches(self, output: int, valve: int) -> bool:
+        return bool(self._numerators[output][valve].any())
+
+    def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        count = len(stems[0])
+        denominator = self._denominators[output]
+        columns = []
+        for numerator in self._rests[output]:
+            impulse = np.zeros(count)
+            impulse[: len(numerator)] = numerator[:count]
+            columns.append(lfilter([1.0], denominator, impulse))
+        columns.append(lfilter([1.0], denominator, np.ones(count)))
+        return np.column_stack(columns)
+
+    def load(self, output: int, upset: str, values: FloatArray) -> FloatArray | None:
+        if upset not in self.upsets:
+            return None
+        numerator = self._loads[output][self.upsets.index(upset)]
+        return np.asarray(lfilter(numerator, self._denominators[output], values, axis=0))
+
+
+class TankResponses(Responses):
+    """The stirred tank itself: with its valves given, C and T obey linear equations each.
+
+    One sample of (A.1) by the Runge-Kutta method of :meth:`StirredTank.advance` is affine in
+    the state, x_{k+1} = r_k x_k + s_k, with r and s known from the stems of the sample.
+    """
+
+    skip = 0
+
+    def __init__(self, tank: StirredTank) -> None:
+        """Take the tank's own parameters and step."""
+        self.tank = tank
+
+        p = tank.parameters
+        self._share = tank.sample_time / 60.0 / p.volume
+        self._flow = np.array([p.flow_b, p.flow_a_max / 100.0])
+        heat = p.latent_heat / (p.density * p.heat_capacity)
+        of_a, of_b = p.flow_a_max / 100.0, p.flow_b
+        self._inlets = (
+            np.array([of_b * p.concentration_b, of_a * p.concentration_a, 0.0]),
+            np.array([of_b * p.temperature_b, of_a * p.temperature_a, p.steam_max / 100.0 * heat]),
+        )
+
+    def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        first, second = (np.ascontiguousarray(stem) for stem in stems)
+        if not self.reaches(output, 1):
+            second = second[:, :1].copy()
+        return tank_states(first, second, self._flow, self._inlets[output], self._share)
+
+    def reaches(self, output: int, valve: int) -> bool:
+        return bool(valve == 0 or self._inlets[output][2] != 0.0)
+
+    def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        z = -self._share * (self._flow[0] + self._flow[1] * stems[0][:, 0])
+        ratio = 1.0 + z * (1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0)
+        start = np.concatenate([[1.0], np.cumprod(ratio)[:-1]])
+        return np.column_stack([start, np.ones(len(ratio))])
+
+    def load(self, output: int, upset: str, values: FloatArray) -> FloatArray | None:
+        return None
+
+
+class AlteredResponses(Responses):
+    """Another process's responses behind the linear effects on its outputs."""
+
+    def __init__(self, process: AlteredProcess, sample_time: float) -> None:
+        """Take the process without its effects, and these as filters."""
+        self._inner = responses_of(process.inner, sample_time)
+        self.skip = self._inner.skip
+        self._filters = [
+            [_of_filter(e.filter(sample_time)) for e in chain if isinstance(e, LinearFilter)]
+            for chain in process.effects
+        ]
+
+    def _pass(self, output: int, values: FloatArray) -> FloatArray:
+        """Return what the effects make of values that were zero before the start."""
+        for numerator, denominator in self._filters[output]:
+            values = lfilter(numerator, denominator, values, axis=0)
+        return values
+
+    def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        values, rest = self._inner.forced(output, stems), np.zeros(len(stems[0]))
+        values -= values[:1].copy()
+        for numerator, denominator in self._filters[output]:
+            values = filtered(numerator, denominator, values, rest)  # its first row is zero
+        return values
+
+    def reaches(self, output: int, valve: int) -> bool:
+        return self._inner.reaches(output, valve)
+
+    def free(self, output: int, stems: list[FloatArray]) -> FloatArray:
+        columns = [self._pass(output, self._inner.free(output, stems))]
+        impulse = np.eye(len(stems[0]), 1)
+        for numerator, denominator in self._filters[output]:
+            for lag in range(min(len(denominator) - 1, 2)):
+                columns.append(lfilter([1.0], denominator, np.roll(impulse, lag, axis=0), axis=0))
+            if len(denominator) == 1 and len(numerator) > 1:
+                columns.append(np.eye(len(impulse), min(len(numerator) - 1, 2)))
+        columns.append(np.ones((len(impulse), 1)))
+        return np.hstack(columns)
+
+    def load(self, output: int, upset: str, values: FloatArray) -> FloatArray | None:
+        inner = self._inner.load(output, upset, values)
+        return None if inner is None else self._pass(output, inner)
+
+
+def responses_of(process: Process, sample_time: float) -> Responses:
+    """Return the responses of a process."""
+    if isinstance(process, AlteredProcess):
+        return AlteredResponses(process, sample_time)
+    if isinstance(process, StirredTank):
+        return TankResponses(process)
+    return LinearResponses(process, sample_time)
+
+
+def _of_equations(process: ArxProcess) -> tuple[list[list[FloatArray]], list[FloatArray]]:
+    numerators, denominators = [], []
+    for equation in process.equations:
+        row = []
+        for valve in process.valves:
+            if valve not in equation.b:
+                row.append(np.zeros(1))
+                continue
+            row.append(np.concatenate([np.zeros(1 + equation.delay[valve]), equation.b[valve]]))
+        numerators.append(row)
+        denominators.append(np.concatenate([[1.0], equation.a]))
+    return numerators, denominators
+
+
+def _recursion_starts(denominator: FloatArray) -> list[FloatArray]:
+    """Return impulses at the first n_a samples: together they reach every past of an equation."""
+    return [np.eye(len(denominator) - 1)[i] for i in range(len(denominator) - 1)]
+
+
+def _numerator(
+    model: LinearModel, denominator: FloatArray, column: FloatArray, output: int
+) -> FloatArray:
+    """Return the numerator of C (qI − A)⁻¹ b in powers of q⁻¹."""
+    impulse, state = [0.0], column
+    for _ in range(model.order):
+        impulse.append(float(model.c[output] @ state))
+        state = model.a @ state
+    return np.asarray(np.convolve(denominator, impulse)[: model.order + 1])
+
+
+def _state_starts(model: LinearModel, denominator: FloatArray, output: int) -> list[FloatArray]:
+    """Return the numerators of the responses to each state at the start."""
+    rows, row = [], model.c[output]
+    for _ in range(model.order):
+        rows.append(row)
+        row = row @ model.a
+    responses = np.array(rows).reshape(model.order, model.order)
+    return [np.convolve(denominator, responses[:, i])[: model.order] for i in range(model.order)]
+
+
+def _of_filter(entry: Filter) -> tuple[FloatArray, FloatArray]:
+    """Return numerator and denominator in powers of q⁻¹, common zeros at the end cut off."""
+    size = len(entry.b)
+    denominator = np.real(np.poly(entry.a)) if size else np.ones(1)
+    impulse, state = [entry.d], entry.b
+    for _ in range(size):
+        impulse.append(float(entry.c @ state))
+        state = entry.a @ state
+    numerator = np.convolve(denominator, impulse)[: size + 1]
+    while len(denominator) > 1 and denominator[-1] == 0.0:
+        denominator = denominator[:-1]
+    return np.asarray(numerator), np.asarray(denominator)

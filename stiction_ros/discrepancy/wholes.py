@@ -1,0 +1,196 @@
+"""Whole explanations, compared over the same rows: few effects before many."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+
+from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, run_with
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.gap.noise_effects import noise_effects
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.process.change import ChangedProcess, changed_process
+from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.loop import LoopModel
+
+LAWS = 100.0  # BIC that a law of the noise may gain over an autoregression
+APART = 5.0  # samples between a step and its opposite that are outliers together
+CANCEL = 0.25  # of the larger one, that such two may leave
+SINGLES = 4  # effects of the first look that are tried alone against several together
+
+
+@dataclasses.dataclass(frozen=True)
+class Whole:
+    """One explanation: the effects of a model, and the noise that is left.
+
+    Attributes:
+        effects: fitted together.
+        base: of the model with them.
+        score: −2 log likelihood of fitted and held-out rows, and the price of all figures.
+    """
+
+    effects: tuple[AddedEffect, ...]
+    base: Baseline
+    score: float
+
+    def worth(self, margin: float) -> float:
+        """Return what is to be least: an effect more must gain the margin."""
+        return self.score + margin * len(self.effects)
+
+
+def whole(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Whole:
+    """Return the explanation by effects with their present figures.
+
+    Args:
+        bare: the model without any of them.
+        runs: the records.
+        effects: those of the explanation.
+    """
+    base = Baseline.of(run_with(bare, runs, effects))
+    score = sum(fit.bic(0) + fit.held_minus_two_log for fit in base.noise)
+    rows = max(fit.rows for fit in base.noise)
+    figures = sum(each.fit.candidate.count(each.fit.point) for each in effects)
+    return Whole(tuple(effects), base, score + figures * math.log(max(rows, 2)))
+
+
+def with_laws(found: Whole) -> Whole:
+    """Return the explanation with its larger noise told by a law, where that is better."""
+    score = found.score
+    declared = declared_noise(found.base.run.model)
+    for i, (fit, own) in enumerate(zip(found.base.noise, declared, strict=True)):
+        if own is None or not fit.enlarged:
+            continue
+        laws = noise_effects(found.base, i, own)
+        if laws:
+            score += min(laws[0].score - fit.bic(0) - fit.held_minus_two_log, 0.0)
+    return dataclasses.replace(found, score=score)
+
+
+def best_whole(
+    bare: LoopModel,
+    runs: Runs,
+    added: Sequence[AddedEffect],
+    singles: Sequence[AddedEffect],
+    margin: float,
+) -> Whole:
+    """Return the best of all subsets of what was found, and of single effects in its stead.
+
+    Args:
+        bare: the model without any effect.
+        runs: the records.
+        added: what was found, one after the other.
+        singles: effects of the first look that may explain alone what took several.
+        margin: that every further effect has to gain.
+    """
+    tried = [whole(bare, runs, added)]
+    if added:
+        tried.append(whole(bare, runs, ()))
+    if len(added) > 1:
+        for count in range(1, len(added)):
+            for part in itertools.combinations(added, count):
+                tried.append(whole(bare, runs, refit_together(bare, runs, part)))
+        known = {each.fit.candidate.key for each in added}
+        others = [each for each in singles if each.fit.candidate.key not in known][:SINGLES]
+        tried += [whole(bare, runs, [alone]) for alone in others]
+    least = min(each.worth(margin) for each in tried)
+    near = [with_laws(each) for each in tried if each.worth(margin) < least + LAWS]
+    best = min(near, key=lambda each: each.worth(margin))
+    if len(best.effects) != 1 or len(added) < 2:
+        return best
+    close = [
+        other.effects[0].fit.candidate.keys
+        for other in near
+        if len(other.effects) == 1 and other.worth(margin) < best.worth(margin) + margin
+    ]
+    return dataclasses.replace(best, effects=(_in_doubt(best.effects[0], close),))
+
+
+def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
+    """Return effects without steps that another one takes back a few samples later.
+
+    Rows that stand apart from all others look like a step and its opposite.
+    """
+    steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
+    gone: list[AddedEffect] = []
+    for one, other in itertools.combinations(steps, 2):
+        if (
+            one.place != other.place
+            or one.effect != other.effect
+            or _is_in(one, gone)
+            or _is_in(other, gone)
+        ):
+            continue
+        apart = abs(float(one.fit.point[0] - other.fit.point[0]))
+        sizes = float(one.fit.factors[0]), float(other.fit.factors[0])
+        if apart <= APART * sample_time and abs(sum(sizes)) <= CANCEL * max(map(abs, sizes)):
+            gone += [one, other]
+    return tuple(each for each in effects if not _is_in(each, gone))
+
+
+def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
+    return any(effect is each for each in others)
+
+
+def _in_doubt(effect: AddedEffect, rivals: Sequence[tuple[tuple[str, str], ...]]) -> AddedEffect:
+    """Return an effect with the rivals that explain as much alone."""
+    names = [*effect.alternatives, *(name for keys in rivals for name in keys)]
+    own = (effect.place, effect.effect)
+    others = tuple(name for name in dict.fromkeys(names) if name != own)
+    return dataclasses.replace(effect, alternatives=others)
+
+
+@dataclasses.dataclass(frozen=True)
+class Mended:
+    """An explanation behind a process that was changed.
+
+    Attributes:
+        changed: the process.
+        whole: the effects behind it.
+        worth: as of a whole, the changes included: together they have to gain the margin, and
+            each figure has its price.
+    """
+
+    changed: ChangedProcess
+    whole: Whole
+    worth: float
+
+
+def suspicious(base: Baseline) -> bool:
+    """Tell whether an explanation leaves more than the declared noise, or none is declared."""
+    return any(
+        fit.enlarged or not forms for fit, forms in zip(base.noise, base.declared, strict=True)
+    )
+
+
+def best_with_process(
+    bare: LoopModel,
+    runs: Runs,
+    added: Sequence[AddedEffect],
+    singles: Sequence[AddedEffect],
+    margin: float,
+) -> Mended | None:
+    """Return the best explanation with another process and all, one, or none of the effects.
+
+    Args:
+        bare: the model without any effect.
+        runs: the records.
+        added: what was found with the process as it is.
+        singles: effects that may stand alone beside another process, though none was found.
+        margin: that the changes together have to gain.
+    """
+    parts: list[tuple[AddedEffect, ...]] = [(), *((each,) for each in (*added, *singles))]
+    if len(added) > 1:
+        parts.append(tuple(added))
+    found = []
+    for part in parts:
+        changed = changed_process(bare, runs, part)
+        if changed is None:
+            continue
+        effects = refit_together(changed.model, runs, part) if part else ()
+        own = whole(changed.model, runs, effects)
+        rows = max(fit.rows for fit in own.base.noise)
+        price = margin + len(changed.changes) * math.log(max(rows, 2))
+        found.append(Mended(changed, own, own.worth(margin) + price))
+    return min(found, key=lambda each: each.worth, default=None)

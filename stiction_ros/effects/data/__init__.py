@@ -1,0 +1,1 @@
+"""Effects of the record and its controller. One behaviour a file."""

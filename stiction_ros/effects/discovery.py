@@ -1,0 +1,145 @@
+"""Which behaviours there are: found by their folder, by entry point, or made known by hand.
+
+An effect is one file with one class (or a few). It is known as soon as it lies in one of
+
+- the folders of this package, one per place;
+- ``stiction_ros/effects/own``, and the folders that the environment variable
+  ``STICTION_EFFECTS`` lists, separated as in PATH;
+- a module that an installed package names as an entry point of ``stiction_ros.effects``;
+
+or when :func:`register` was called with its class.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import inspect
+import os
+import pkgutil
+import traceback
+from importlib import metadata
+from importlib.machinery import FileFinder
+from types import ModuleType
+
+from stiction_ros.effects.behaviour import Behaviour
+from stiction_ros.errors import InputError
+
+FOLDERS = ("friction", "valve", "process", "disturbance", "sensor", "data", "own")
+GROUP = "stiction_ros.effects"
+
+_registered: list[type[Behaviour]] = []
+
+
+def register(kind: type[Behaviour]) -> type[Behaviour]:
+    """Make a behaviour known to this process; also as a decorator.
+
+    Args:
+        kind: its class.
+
+    Raises:
+        InputError: another behaviour has its name.
+
+    Examples:
+        >>> from stiction_ros import effects
+        >>> effects.register(effects.Backlash) is effects.Backlash  # known already
+        True
+    """
+    if kind not in behaviours():
+        _refuse_twins((*behaviours(), kind))
+        _registered.append(kind)
+    return kind
+
+
+def behaviours() -> tuple[type[Behaviour], ...]:
+    """Return all behaviours that are known, by folder and file."""
+    return (*_found(), *_registered)
+
+
+@functools.cache
+def _found() -> tuple[type[Behaviour], ...]:
+    modules = [module for folder in FOLDERS for module in _modules_in(f"{GROUP}.{folder}")]
+    modules += [_loaded(entry) for entry in metadata.entry_points(group=GROUP)]
+    found = [kind for module in modules for kind in _kinds_of(module)]
+    found = list(dict.fromkeys(found))
+    _refuse_twins(tuple(found))
+    return tuple(found)
+
+
+def _modules_in(package: str) -> list[ModuleType]:
+    folder = importlib.import_module(package)
+    for path in folder.__path__:
+        if not os.path.exists(path):
+            raise InputError("no such folder", where=f"STICTION_EFFECTS, {path}")
+    found = sorted(pkgutil.iter_modules(folder.__path__), key=lambda info: info.name)
+    if package != f"{GROUP}.own":
+        return [importlib.import_module(f"{package}.{info.name}") for info in found]
+    return [_of_ones_own(package, info) for info in found]
+
+
+def _of_ones_own(package: str, info: pkgutil.ModuleInfo) -> ModuleType:
+    """Return the module of a file that others wrote, which may do anything when imported."""
+    try:
+        return importlib.import_module(f"{package}.{info.name}")
+    except Exception as error:
+        assert isinstance(info.module_finder, FileFinder)
+        name = os.path.join(info.name, "__init__.py") if info.ispkg else f"{info.name}.py"
+        file = os.path.join(info.module_finder.path, name)
+        raise InputError(
+            f"it cannot be loaded ({_told(error)})",
+            where=f"{file}{_line(error, file)}",
+            fix="mend the file, or take it out of the folder that STICTION_EFFECTS lists",
+        ) from error
+
+
+def _loaded(entry: metadata.EntryPoint) -> ModuleType:
+    try:
+        return importlib.import_module(entry.module)
+    except Exception as error:
+        raise InputError(
+            f"the effects of {entry.name!r} cannot be loaded ({_told(error)})",
+            where=f"entry point {entry.value}",
+            fix="mend or uninstall the package that brings them",
+        ) from error
+
+
+def _told(error: Exception) -> str:
+    said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+    return f"{type(error).__name__}: {said}"
+
+
+def _line(error: Exception, file: str) -> str:
+    """Return ``, line N`` of the file at fault; empty where the error does not tell it."""
+    if isinstance(error, SyntaxError) and error.filename == file:
+        return f", line {error.lineno}"
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if frame.filename == file]
+    return f", line {lines[-1]}" if lines else ""
+
+
+def _kinds_of(module: ModuleType) -> list[type[Behaviour]]:
+    """Return the behaviours that a module itself defines and names, in order."""
+    return [
+        value
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and isinstance(value, type)
+        and issubclass(value, Behaviour)
+        and value.__module__ == module.__name__
+        and hasattr(value, "effect")
+        and not inspect.isabstract(value)
+    ]
+
+
+def _refuse_twins(kinds: tuple[type[Behaviour], ...]) -> None:
+    seen: dict[tuple[str, str, str | None], type[Behaviour]] = {}
+    for kind in kinds:
+        for place in kind.places:
+            other = seen.setdefault((place, kind.effect, kind.law), kind)
+            if other is not kind:
+                raise InputError(
+                    f"{kind.title()} of {kind.__module__} is there twice: {other.__module__} "
+                    "has an effect of that name",
+                    where=f"effects of a {place}",
+                    fix="give it a law or an effect of another name",
+                )

@@ -1,0 +1,1 @@
+"""Unmeasured disturbances. One behaviour a file."""

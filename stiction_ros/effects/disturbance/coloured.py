@@ -1,0 +1,57 @@
+"""A coloured disturbance: noise with a memory."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, Memory, elapsed, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class ColouredDisturbance(Behaviour):
+    r"""Adds first-order autoregressive noise of a given spread and time constant.
+
+    .. math::
+        w_k = \alpha w_{k-1} + \sigma \sqrt{1 - \alpha^2} \, n_k, \quad
+        \alpha = e^{-T_s/\tau}, \; n_k \sim N(0, 1)
+
+    The memory is (w, time of the last sample). Who simulates it draws n; the plant does so
+    from a source of its own, so that the other noise stays what it was. :meth:`step` draws
+    nothing: it adds what is expected of w, which from rest is nothing.
+
+    Raises:
+        InputError: a negative or non-finite parameter.
+    """
+
+    effect: ClassVar[str] = "coloured"
+    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
+    signature: ClassVar[str] = "a gap that wanders without a relation to OP, set-point or time"
+    minimum_data: ClassVar[str] = "a record of many time constants"
+    confusable: ClassVar[tuple[str, ...]] = ("disturbance random_walk", "disturbance drift")
+    experiment: ClassVar[str] = "none: coloured noise is what the noise model describes"
+    not_searched: ClassVar[str] = (
+        "coloured noise is what the noise model describes; it is named where the noise is "
+        "surely larger than the loop model declares"
+    )
+
+    std: float = parameter("std", "signal", "standard deviation σ", low=0.0)
+    time_constant: float = parameter("tau", "s", "time constant τ", low=1e-9)
+
+    def rest(self, value: float) -> Memory:
+        return (0.0, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        """Return the memory (w, time) and the signal with the expected w added."""
+        return self.step_with(memory, value, time, 0.0)
+
+    def step_with(
+        self, memory: Memory, value: float, time: float, normal: float
+    ) -> tuple[Memory, float]:
+        """Advance one sample with ``normal`` drawn from N(0, 1)."""
+        assert isinstance(memory, tuple)
+        last, before = memory
+        keep = 0.0 if before == NO_SAMPLE else math.exp(-elapsed(before, time) / self.time_constant)
+        wave = keep * last + self.std * math.sqrt(1.0 - keep * keep) * normal
+        return (wave, time), value + wave

@@ -1,0 +1,31 @@
+"""An unmeasured disturbance, or a sensor, that drifts."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from stiction_ros.effects.behaviour import Behaviour, Memory, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class DriftDisturbance(Behaviour):
+    """Adds a ramp that starts with the first sample."""
+
+    effect: ClassVar[str] = "drift"
+    places: ClassVar[tuple[str, ...]] = ("load", "disturbance", "sensor")
+    signature: ClassVar[str] = "a gap that grows in proportion to time"
+    minimum_data: ClassVar[str] = "a record much longer than the noise remembers"
+    confusable: ClassVar[tuple[str, ...]] = (
+        "load drift",
+        "disturbance drift",
+        "sensor drift",
+        "process leak",
+    )
+    experiment: ClassVar[str] = "take a longer record"
+    separation: ClassVar[str] = "compare PV with a second sensor at the start and at the end"
+
+    rate: float = parameter("rate", "signal/s", "slope of the ramp")
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        return memory, value + self.rate * time

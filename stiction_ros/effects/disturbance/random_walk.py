@@ -1,0 +1,53 @@
+"""A disturbance that wanders and never comes back by itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, Memory, elapsed, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class RandomWalkDisturbance(Behaviour):
+    r"""Adds a random walk that starts at zero with the first sample.
+
+    .. math:: w_k = w_{k-1} + \sigma \sqrt{T_s} \, n_k, \quad n_k \sim N(0, 1)
+
+    The memory is (w, time of the last sample). Who simulates it draws n; :meth:`step` draws
+    nothing, so that from rest it adds nothing.
+
+    Raises:
+        InputError: a negative or non-finite parameter.
+    """
+
+    effect: ClassVar[str] = "random_walk"
+    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
+    signature: ClassVar[str] = "a gap that wanders ever farther without a relation to OP"
+    minimum_data: ClassVar[str] = "a record in which it leaves the noise far behind"
+    confusable: ClassVar[tuple[str, ...]] = ("disturbance coloured", "disturbance drift")
+    experiment: ClassVar[str] = "none: a wandering disturbance is what the noise model describes"
+    not_searched: ClassVar[str] = (
+        "a wandering disturbance is what the noise model describes; it is named where the noise is "
+        "surely larger than the loop model declares"
+    )
+
+    rate: float = parameter("rate", "signal/√s", "standard deviation after one second", low=0.0)
+
+    def rest(self, value: float) -> Memory:
+        return (0.0, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        """Return the memory (w, time) and the signal with the last w added."""
+        return self.step_with(memory, value, time, 0.0)
+
+    def step_with(
+        self, memory: Memory, value: float, time: float, normal: float
+    ) -> tuple[Memory, float]:
+        """Advance one sample with ``normal`` drawn from N(0, 1)."""
+        assert isinstance(memory, tuple)
+        last, before = memory
+        spent = 0.0 if before == NO_SAMPLE else elapsed(before, time)
+        wave = last + self.rate * math.sqrt(spent) * normal
+        return (wave, time), value + wave

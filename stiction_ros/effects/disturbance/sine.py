@@ -1,0 +1,24 @@
+"""An unmeasured disturbance that is a sine."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
+
+
+@dataclasses.dataclass(frozen=True)
+class SineDisturbance(PeriodicDisturbance):
+    """Adds a sine, by default one that starts at zero with the first sample."""
+
+    effect: ClassVar[str] = "sine"
+    signature: ClassVar[str] = "a gap with one spectral line, whose phase OP does not move"
+    confusable: ClassVar[tuple[str, ...]] = ("disturbance triangle", "disturbance coloured")
+
+    @staticmethod
+    def wave(angle: FloatArray) -> FloatArray:
+        return np.asarray(np.sin(angle))

@@ -1,0 +1,25 @@
+"""An unmeasured disturbance that is a square wave."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
+
+
+@dataclasses.dataclass(frozen=True)
+class SquareDisturbance(PeriodicDisturbance):
+    """Adds a square wave: up for half a period, then down for as long."""
+
+    effect: ClassVar[str] = "square"
+    signature: ClassVar[str] = "a gap that changes sides at equal times, whatever OP does"
+    confusable: ClassVar[tuple[str, ...]] = ("disturbance sine", "disturbance step")
+
+    @staticmethod
+    def wave(angle: FloatArray) -> FloatArray:
+        return np.where(np.mod(angle, 2.0 * math.pi) < math.pi, 1.0, -1.0)

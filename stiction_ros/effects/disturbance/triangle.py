@@ -1,0 +1,26 @@
+"""An unmeasured disturbance that is a triangle wave."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
+
+
+@dataclasses.dataclass(frozen=True)
+class TriangleDisturbance(PeriodicDisturbance):
+    """Adds a triangle wave that, as a sine, starts at zero and upwards."""
+
+    effect: ClassVar[str] = "triangle"
+    signature: ClassVar[str] = "a gap of straight ramps to and fro, whatever OP does"
+    confusable: ClassVar[tuple[str, ...]] = ("disturbance sine", "disturbance drift")
+
+    @staticmethod
+    def wave(angle: FloatArray) -> FloatArray:
+        turn = np.mod(angle / (2.0 * math.pi) + 0.25, 1.0)
+        return np.asarray(1.0 - 4.0 * np.abs(turn - 0.5))

@@ -1,0 +1,1 @@
+"""Laws of stiction. One behaviour a file."""

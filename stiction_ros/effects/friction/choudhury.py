@@ -1,0 +1,102 @@
+"""Choudhury's data-driven stiction model, S and J."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.friction.moving_rules import SlopeRules
+from stiction_ros.effects.friction.parameters import SlipJumpPair
+from stiction_ros.effects.friction.switching import MovingCells, Switching
+
+MOVING = -1.0  # a threshold that every |u − x_ss| exceeds
+
+
+@dataclasses.dataclass(frozen=True)
+class ChoudhuryStiction(SlipJumpPair):
+    r"""Stiction told from the sign of the slope of OP, v_k = sign(u_k − u_{k−1}).
+
+    1. v_k ≠ v_{k−1}: the stem stays. If it was moving it is stuck now, and
+       x_ss = u_{k−1} is kept until it moves again.
+    2. v_k = v_{k−1} = 0: the stem stays.
+    3. v_k = v_{k−1} = ±1: a moving stem moves on; a stuck one slips if |u_k − x_ss|
+       exceeds its threshold. Then
+
+    .. math:: \chi_k = u_k - v_k (S - J) / 2
+
+    The threshold is J where the stem stuck because OP rested (the paper's I = 1) and OP goes
+    on in the same direction, otherwise S. The memory is (χ, u, v, x_ss, threshold upwards,
+    threshold downwards); :meth:`rest` puts both thresholds at (S + J)/2.
+
+    By rule 1 the stem misses every sample at which OP turns or starts to move, whatever the
+    size of the move and even without friction; OP that rests at every other sample never
+    moves it. The law is for OP that is smooth from sample to sample. For noisy OP and for
+    OP in steps take :class:`~stiction_ros.effects.KanoStiction`, which was made to mend this.
+
+    The rules follow the paper's text. After a rest of OP it names J for "no change of
+    direction"; direction is read as that of the last motion of the stem, since J after a
+    reversal would move the stem against OP. A later flowchart tests
+    \|u − χ\| > (S + J)/2 at the turning sample as well (M. A. A. S. Choudhury, M. Jain,
+    S. L. Shah, Journal of Process Control 18, 2008, 232-243); that is not done here.
+
+    References:
+        M. A. A. S. Choudhury, N. F. Thornhill, S. L. Shah: Modelling valve stiction. Control
+        Engineering Practice 13, 2005, 641-658.
+    """
+
+    law: ClassVar[str | None] = "choudhury"
+    switching: ClassVar[Switching | None] = MovingCells(SlopeRules)
+
+    def rest(self, value: float) -> Memory:
+        return (value, value, 0.0, value, self.static_friction, self.static_friction)
+
+    def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
+        """Return the memory (χ, u, v, x_ss, up, down) and the stem position χ."""
+        assert isinstance(memory, tuple)
+        stem, last, last_slope, stuck_at, up, down = memory
+        slope = float((value > last) - (value < last))
+        if slope != last_slope:
+            if up == MOVING:
+                stuck_at = last
+                up = self.jump if slope == 0.0 and last_slope > 0.0 else self.stick_band
+                down = self.jump if slope == 0.0 and last_slope < 0.0 else self.stick_band
+        elif slope != 0.0 and abs(value - stuck_at) > (up if slope > 0.0 else down):
+            stem = value - slope * self.dynamic_friction
+            up = down = MOVING
+        return (stem, value, slope, stuck_at, up, down), stem
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return stem positions, shape (N, G), for all rows (S, J) of ``grid`` at once."""
+        band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
+        offset = (band - jump) / 2.0
+        stem = np.broadcast_to(np.asarray(start, dtype=float), band.shape).copy()
+        last, last_slope, stuck_at = stem.copy(), np.zeros_like(stem), stem.copy()
+        up = (band + jump) / 2.0
+        down = up.copy()
+        out = np.empty((len(values), len(band)))
+        for k, value in enumerate(values.tolist()):
+            slope = np.sign(value - last)
+            turns = slope != last_slope
+            sticks = turns & (up == MOVING)
+            np.copyto(stuck_at, last, where=sticks)
+            rests = slope == 0.0
+            np.copyto(up, np.where(rests & (last_slope > 0.0), jump, band), where=sticks)
+            np.copyto(down, np.where(rests & (last_slope < 0.0), jump, band), where=sticks)
+            threshold = np.where(slope > 0.0, up, down)
+            moves = ~turns & ~rests & (np.abs(value - stuck_at) > threshold)
+            np.copyto(stem, value - slope * offset, where=moves)
+            up[moves] = down[moves] = MOVING
+            last = np.full_like(stem, value)
+            last_slope = slope
+            out[k] = stem
+        return out

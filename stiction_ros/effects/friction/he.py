@@ -1,0 +1,104 @@
+"""He's data-driven stiction model, equations (3) and (4)."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.friction.jump_form import JumpForm
+from stiction_ros.effects.friction.parameters import FrictionPair
+from stiction_ros.effects.friction.switching import SlipCells, Switching
+
+
+@dataclasses.dataclass(frozen=True)
+class HeStiction(FrictionPair):
+    r"""Static and dynamic friction of a sliding-stem valve.
+
+    .. math::
+        \chi_k = \begin{cases}
+            u_k - f_D & u_k - \chi_{k-1} > f_S \\
+            u_k + f_D & u_k - \chi_{k-1} < -f_S \\
+            \chi_{k-1} & |u_k - \chi_{k-1}| \le f_S
+        \end{cases} \tag{4}
+
+    The memory is the stem position χ. The smallest move of the stem is the
+    :attr:`jump` J = f_S − f_D.
+
+    Raises:
+        InputError: a negative or non-finite friction, or f_D > f_S.
+
+    Examples:
+        >>> import numpy as np
+        >>> from stiction_ros import HeStiction
+        >>> valve = HeStiction(static_friction=4.0, dynamic_friction=1.5)
+        >>> valve.simulate(np.array([50.0, 53.0, 55.0, 54.0])).tolist()
+        [50.0, 50.0, 53.5, 53.5]
+    """
+
+    law: ClassVar[str | None] = "he"
+    switching: ClassVar[Switching | None] = SlipCells()
+
+    def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
+        """Return the stem position twice, as memory and as output, by (4).
+
+        Args:
+            memory: stem position χ, %.
+            value: OP, %.
+            time: s; without meaning here.
+        """
+        assert isinstance(memory, float | int)
+        error = value - memory
+        if error > self.static_friction:
+            stem = value - self.dynamic_friction
+        elif error < -self.static_friction:
+            stem = value + self.dynamic_friction
+        else:
+            stem = float(memory)
+        return stem, stem
+
+    def jump_form(self) -> JumpForm:
+        """Return the moves that the valve can make when OP rests between them."""
+        return JumpForm(self, self.static_friction, self.dynamic_friction)
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return stem positions, shape (N, G), for all rows (f_S, f_D) of ``grid`` at once.
+
+        Args:
+            grid: rows (f_S, f_D), %, shape (G, 2).
+            values: OP, %, shape (N,).
+            start: stem before the first sample, %, one for all or shape (G,).
+            sample_time: s; without meaning here.
+        """
+        # Compiled code takes half a second to import, which nodes that scan no grid save.
+        from stiction_ros.effects.grid_kernels import he_stems
+
+        static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
+        starts = np.broadcast_to(np.asarray(start, dtype=float), static.shape)
+        return he_stems(static, dynamic, np.asarray(values, dtype=float), starts.copy())
+
+    def inverse(self, memory: Memory, wanted: float) -> float:
+        """Return the OP that moves the stem to ``wanted`` if the valve can go there.
+
+        The stem moves by at least J, so for 0 < |wanted − χ| < J the nearer of staying
+        and the smallest jump is taken; staying returns the stem position itself.
+
+        Args:
+            memory: stem position χ, %.
+            wanted: where the stem should be, %.
+        """
+        assert isinstance(memory, float | int)
+        move = wanted - memory
+        if abs(move) < max(self.jump / 2.0, 1e-12):
+            return float(memory)
+        size = max(abs(move), self.jump * (1.0 + 1e-9) + 1e-9)
+        return float(memory + np.copysign(size + self.dynamic_friction, move))

@@ -1,0 +1,91 @@
+"""What a law of stiction looks like to a controller that moves OP in steps: stay, or jump."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from stiction_ros.effects.friction.parameters import Stiction
+
+LEAST_MARGIN = 1e-4  # %; an error of exactly f_S does not slip
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionSpread:
+    """Half-widths of the intervals of f_S and f_D, both in % and at least 0."""
+
+    static: float
+    dynamic: float
+
+
+@dataclasses.dataclass(frozen=True)
+class JumpForm:
+    r"""The moves that a sticky valve can make when OP rests between them.
+
+    .. math::
+        \Delta\chi = 0 \quad\text{with } |u - \chi| \le f_S, \qquad
+        |\Delta\chi| > K (f_S - f_D) \quad\text{with }
+        u = \chi + \Delta\chi / K + f_D \operatorname{sign}(\Delta\chi).
+
+    K = 1 except for the semi-physical law; below 1 a slip falls short of its end. Kano's law and
+    the reconstruction of XCH's also let a stem that moved at the last sample go on by less than
+    that; this is not used.
+
+    Attributes:
+        law: the behaviour it was taken from.
+        static_friction, dynamic_friction: f_S and f_D, %.
+        overshoot: K, above 0.
+    """
+
+    law: Stiction
+    static_friction: float
+    dynamic_friction: float
+    overshoot: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """Smallest move of the stem, %."""
+        return self.overshoot * (self.static_friction - self.dynamic_friction)
+
+    def op(self, stem: float, wanted: float) -> float:
+        """Return the OP, %, that moves the stem from ``stem`` to ``wanted`` by a slip."""
+        move = wanted - stem
+        return float(stem + move / self.overshoot + np.sign(move) * self.dynamic_friction)
+
+    def inverse(self, stem: float, wanted: float) -> float:
+        """Return the OP that brings the stem as near to ``wanted`` as one sample can.
+
+        Between staying and the smallest jump the nearer is taken; staying returns ``stem``.
+        """
+        move = wanted - stem
+        if abs(move) < max(self.least / 2.0, 1e-12):
+            return float(stem)
+        size = max(abs(move), self.least * (1.0 + 1e-9) + 1e-9)
+        return self.op(stem, float(stem + np.copysign(size, move)))
+
+    def slips(self, stem: float, op: float) -> bool:
+        """Return whether ``op`` moves a stem that rests at ``stem``."""
+        return abs(op - stem) > self.static_friction
+
+    def raised(self, static_friction: float) -> JumpForm:
+        """Return the form of the same law with a larger f_S, other parameters kept."""
+        form = self.law.with_static_friction(static_friction).jump_form()
+        assert form is not None
+        return form
+
+    def margin(self, spread: FrictionSpread | None, share: float, floor: float) -> float:
+        """Return by how much a planned jump exceeds the smallest one, %.
+
+        Args:
+            spread: half-widths of the intervals; None where there are none.
+            share: of f_S, taken when there are none.
+            floor: least share of f_S when there are.
+        """
+        if spread is None:
+            wanted = share * self.static_friction
+        else:
+            wanted = max(spread.static + spread.dynamic, floor * self.static_friction)
+        return self.overshoot * max(wanted, LEAST_MARGIN)

@@ -1,0 +1,101 @@
+"""Kano's data-driven stiction model: stopped and moving states, S and J."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.friction.jump_form import JumpForm
+from stiction_ros.effects.friction.moving_rules import FollowingRules
+from stiction_ros.effects.friction.parameters import SlipJumpPair
+from stiction_ros.effects.friction.switching import MovingCells, Switching
+
+
+@dataclasses.dataclass(frozen=True)
+class KanoStiction(SlipJumpPair):
+    r"""Stiction with a moving state: once it slips, the stem follows OP until OP stops or turns.
+
+    With d = ±1 the direction of the last motion (the friction force acts against it),
+    u_S the OP at which the valve stopped, and stp = 1 while it is stopped, each sample
+
+    1. stops a moving valve when OP rests or turns: if stp = 0 and
+       Δu_k Δu_{k−1} ≤ 0, then u_S = u_{k−1} and stp = 1;
+    2. releases a stopped one: backwards, d → −d, if −d (u_k − u_S) > S; onwards if
+       d (u_k − u_S) > J; either sets stp = 0;
+    3. moves what is released:
+
+    .. math::
+        \chi_k = \begin{cases}
+            u_k - \tfrac{d}{2} (S - J) & stp = 0 \\
+            \chi_{k-1} & stp = 1
+        \end{cases}
+
+    The memory is (χ, u, Δu, u_S, stp, d). :meth:`rest` puts the stem in the middle of its
+    band, so that it slips at f_S = (S + J)/2 in both directions; the paper leaves this
+    open. The paper also clips u to 0-100 % first; here that is the effect ``saturation``.
+
+    References:
+        M. Kano, H. Maruta, H. Kugemoto, K. Shimizu: Practical model and detection
+        algorithm for valve stiction. 7th IFAC Symposium on Dynamics and Control of Process
+        Systems, Cambridge (USA), 2004; IFAC Proceedings Volumes 37 (9), 859-864.
+    """
+
+    law: ClassVar[str | None] = "kano"
+    switching: ClassVar[Switching | None] = MovingCells(FollowingRules)
+
+    def rest(self, value: float) -> Memory:
+        return (value, value, 0.0, value + self.dynamic_friction, 1.0, 1.0)
+
+    def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
+        """Return the memory (χ, u, Δu, u_S, stp, d) and the stem position χ."""
+        assert isinstance(memory, tuple)
+        stem, last, last_move, stopped_at, stopped, direction = memory
+        move = value - last
+        if stopped == 0.0 and move * last_move <= 0.0:
+            stopped_at, stopped = last, 1.0
+        onwards = direction * (value - stopped_at)
+        if stopped == 1.0 and -onwards > self.stick_band:
+            direction, stopped = -direction, 0.0
+        elif stopped == 1.0 and onwards > self.jump:
+            stopped = 0.0
+        if stopped == 0.0:
+            stem = value - direction * self.dynamic_friction
+        return (stem, value, move, stopped_at, stopped, direction), stem
+
+    def jump_form(self) -> JumpForm:
+        """Return the moves that the valve can make when OP rests between them."""
+        return JumpForm(self, self.static_friction, self.dynamic_friction)
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return stem positions, shape (N, G), for all rows (S, J) of ``grid`` at once."""
+        band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
+        offset = (band - jump) / 2.0
+        stem = np.broadcast_to(np.asarray(start, dtype=float), band.shape).copy()
+        last, last_move = stem.copy(), np.zeros_like(stem)
+        stopped_at, direction = stem + offset, np.ones_like(stem)
+        stopped = np.ones(stem.shape, dtype=bool)
+        out = np.empty((len(values), len(band)))
+        for k, value in enumerate(values.tolist()):
+            move = value - last
+            stops = ~stopped & (move * last_move <= 0.0)
+            np.copyto(stopped_at, last, where=stops)
+            stopped |= stops
+            onwards = direction * (value - stopped_at)
+            turns = stopped & (-onwards > band)
+            np.copyto(direction, -direction, where=turns)
+            stopped &= ~turns & ~(onwards > jump)
+            np.copyto(stem, value - direction * offset, where=~stopped)
+            last = np.full_like(stem, value)
+            last_move = move
+            out[k] = stem
+        return out

@@ -1,0 +1,198 @@
+r"""Switching patterns of the laws with a moving state: Kano's, XCH and Choudhury's.
+
+While these valves move, χ_k = u_k − σ f_D; once they stop, at the OP u_s of the last moving
+sample, the stem stays at u_s − σ f_D. Whether and when they stop depends on OP alone, and what
+releases them compares :math:`u_k - u_s` with J = f_S − f_D or S = f_S + f_D. So, as for He's law
+(:mod:`stiction_ros.identification.switching.patterns`), the frictions with one and the same pattern
+fill a rectangle in the plane of (J, S), and inside it the stem is affine in f_D.
+
+- Kano and XCH: a moving valve follows OP until OP rests or turns, :math:`\sigma (u_k - u_{k-1})
+  \le 0`; a stopped one slips on when :math:`\sigma (u_k - u_s) > J` and back when
+  :math:`-\sigma (u_k - u_s) > S`.
+- Choudhury: a moving valve stops when the slope of OP changes its sign; a stopped one slips, at
+  samples whose slope has the sign of the sample before, when :math:`|u_k - u_s|` exceeds S, or J
+  where OP rested as it stopped and goes on in the same direction.
+
+Before the first slip the threshold is f_S for all of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.effects.behaviour import FloatArray
+
+FirstSlip = tuple[int, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class MovingTrace:
+    """Where one valve moves, stops and slips, and what that says of J and S.
+
+    Attributes:
+        base: OP at the last moving sample, before the first slip the stem's level, shape (N,).
+        sign: direction of the last motion, 0 before the first, shape (N,).
+        bounds: (J low, J high, S low, S high), %.
+    """
+
+    base: FloatArray
+    sign: FloatArray
+    bounds: tuple[float, float, float, float]
+
+
+class MovingRules(ABC):
+    """How a valve with a moving state follows OP u, shape (N,)."""
+
+    def __init__(self, u: FloatArray) -> None:
+        self.u = u
+        self.values: list[float] = u.tolist()
+        self.changes: list[float] = np.diff(u, prepend=u[:1]).tolist()
+
+    @abstractmethod
+    def resting_samples(self, level: float) -> NDArray[np.bool_]:
+        """Return at which samples a valve that rests at ``level`` may slip, shape (N,)."""
+
+    @abstractmethod
+    def direction(self, k: int, level: float) -> float:
+        """Return the direction of a first slip at sample k from ``level``, ±1."""
+
+    @abstractmethod
+    def follow(self, trace: Recorder, first: FirstSlip, jump: float, reverse: float) -> None:
+        """Follow OP behind the first slip with the given J and S, %."""
+
+    def first_slip(self, level: float, static: float) -> FirstSlip:
+        """Return sample and direction of the first slip; (N, 0) when there is none."""
+        beyond = np.abs(self.u - level) > static
+        slips = np.flatnonzero(beyond & self.resting_samples(level))
+        if not len(slips):
+            return len(self.u), 0.0
+        return int(slips[0]), self.direction(int(slips[0]), level)
+
+    def trace(
+        self, point: Iterable[float], level: float, first: FirstSlip | None = None
+    ) -> MovingTrace:
+        """Return the trace of a valve at rest at ``level``.
+
+        Args:
+            point: J and S, %.
+            first: sample and direction of the first slip; None lets f_S = (S + J)/2 decide.
+        """
+        jump, reverse = point
+        if first is None:
+            first = self.first_slip(level, 0.5 * (jump + reverse))
+        trace = Recorder(len(self.values), level)
+        if first[0] < len(self.values):
+            trace.move(first[0], self.values[first[0]], first[1])
+            self.follow(trace, first, jump, reverse)
+        return trace.result()
+
+
+class Recorder:
+    """Collects the moves of one valve and the bounds of its J and S."""
+
+    def __init__(self, samples: int, level: float) -> None:
+        self.samples = samples
+        self.bases, self.signs, self.begins = [level], [0.0], [0]
+        self.low, self.high = [0.0, 0.0], [np.inf, np.inf]
+
+    def move(self, k: int, value: float, sign: float) -> None:
+        """Note that the valve moves at sample k."""
+        self.begins.append(k)
+        self.bases.append(value)
+        self.signs.append(sign)
+
+    def result(self) -> MovingTrace:
+        """Return what was collected."""
+        lengths = np.diff([*self.begins, self.samples])
+        return MovingTrace(
+            np.repeat(self.bases, lengths),
+            np.repeat(self.signs, lengths),
+            (self.low[0], self.high[0], self.low[1], self.high[1]),
+        )
+
+
+class FollowingRules(MovingRules):
+    """Kano's law and XCH."""
+
+    def resting_samples(self, level: float) -> NDArray[np.bool_]:
+        return np.ones(len(self.u), dtype=bool)
+
+    def direction(self, k: int, level: float) -> float:
+        return float(np.sign(self.values[k] - level))
+
+    def follow(self, trace: Recorder, first: FirstSlip, jump: float, reverse: float) -> None:
+        (begin, sign), moving = first, True
+        base, values, changes = self.values[begin], self.values, self.changes
+        low, high = trace.low, trace.high
+        for k in range(begin + 1, len(values)):
+            value = values[k]
+            if moving and sign * changes[k] > 0.0:
+                base = value
+                trace.move(k, value, sign)
+                continue
+            lead = sign * (value - base)
+            moving = True
+            if lead > jump:
+                high[0] = min(high[0], lead)
+            elif -lead > reverse:
+                high[1] = min(high[1], -lead)
+                sign = -sign
+            else:
+                moving = False
+                if lead > low[0]:
+                    low[0] = lead
+                elif -lead > low[1]:
+                    low[1] = -lead
+                continue
+            base = value
+            trace.move(k, value, sign)
+
+
+class SlopeRules(MovingRules):
+    """Choudhury's law."""
+
+    def __init__(self, u: FloatArray) -> None:
+        super().__init__(u)
+        slope = np.sign(np.diff(u, prepend=u[:1]))
+        self.slopes: list[float] = slope.tolist()
+        self.steady = np.zeros(len(u), dtype=bool)
+        self.steady[2:] = (slope[2:] == slope[1:-1]) & (slope[2:] != 0.0)
+
+    def resting_samples(self, level: float) -> NDArray[np.bool_]:
+        """Return the samples at which OP runs on; at the first it came from ``level``."""
+        steady = self.steady.copy()
+        if len(steady) > 1:
+            steady[1] = self.slopes[1] == np.sign(self.values[0] - level) != 0.0
+        return steady
+
+    def direction(self, k: int, level: float) -> float:
+        return self.slopes[k]
+
+    def follow(self, trace: Recorder, first: FirstSlip, jump: float, reverse: float) -> None:
+        (begin, sign), moving, rested = first, True, False
+        base, values, slopes = self.values[begin], self.values, self.slopes
+        low, high = trace.low, trace.high
+        for k in range(begin + 1, len(values)):
+            value, slope = values[k], slopes[k]
+            if moving and slope == sign:
+                base = value
+                trace.move(k, value, sign)
+                continue
+            if moving:
+                moving, rested = False, slope == 0.0
+                continue
+            if slope == 0.0 or slope != slopes[k - 1]:
+                continue
+            way = 0 if rested and slope == sign else 1  # compared with J or with S
+            far = abs(value - base)
+            if far > (reverse if way else jump):
+                high[way] = min(high[way], far)
+                moving, sign, base = True, slope, value
+                trace.move(k, value, sign)
+            elif far > low[way]:
+                low[way] = far

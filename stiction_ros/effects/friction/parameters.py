@@ -1,0 +1,214 @@
+"""The two ways to write the friction of a valve: (f_S, f_D), and (S, J).
+
+They describe the same signature: S = f_S + f_D is the width of the band that OP crosses
+after a reversal before the stem moves, J = f_S − f_D the jump that the stem then makes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import (
+    Behaviour,
+    FloatArray,
+    Parameter,
+    SimulatesGrid,
+    parameter,
+)
+from stiction_ros.effects.friction.jump_form import JumpForm
+from stiction_ros.effects.friction.switching import Switching
+from stiction_ros.effects.seen import Seen
+from stiction_ros.errors import InputError
+
+
+@runtime_checkable
+class FrictionLaw(SimulatesGrid, Protocol):
+    """A stiction law that can be identified: simulated on whole grids, given by (f_S, f_D).
+
+    Attributes:
+        switching: how its switching patterns are listed; None for a search on grids alone.
+        not_identified: why it is not identified, one clause; empty when it is.
+        held: keys of further parameters that stay at their defaults.
+    """
+
+    law: ClassVar[str | None]
+    switching: ClassVar[Switching | None]
+    not_identified: ClassVar[str]
+    held: ClassVar[tuple[str, ...]]
+
+    @classmethod
+    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Behaviour:
+        """Return the law with f_S and f_D in %."""
+        ...
+
+    @classmethod
+    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
+        """Return rows of the law's own first two parameters for rows (f_S, f_D), shape (G, 2)."""
+        ...
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """Return its parameters; those behind the first two are searched as well."""
+        ...
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Behaviour:
+        """Return the law with the given values by key."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Stiction(Behaviour):
+    """What holds for every friction law that does not say otherwise.
+
+    Attributes:
+        switching: how its switching patterns are listed, so that a search can be exact; None
+            for a law that is searched on grids alone, which certifies nothing.
+        not_identified: why it is not identified, one clause; empty when it is.
+        held: keys of further parameters that stay at their defaults, which is said: constants of
+            the law. All others are identified.
+    """
+
+    effect: ClassVar[str] = "stiction"
+    places: ClassVar[tuple[str, ...]] = ("valve",)
+    signature: ClassVar[str] = "PV moves in jumps while OP ramps, and rests while OP reverses"
+    minimum_data: ClassVar[str] = "several slips, by a limit cycle or by set-point moves"
+    confusable: ClassVar[tuple[str, ...]] = ("valve backlash when J = 0",)
+    experiment: ClassVar[str] = (
+        "let OP reverse by more than the friction that matters, as a cycle does"
+    )
+    separation: ClassVar[str] = (
+        "ramp OP slowly through a reversal and back: a stem that jumps after its rest has "
+        "stiction, one that follows smoothly has backlash"
+    )
+    family: ClassVar[str] = "friction"
+    least: ClassVar[float] = 0.1  # %
+    not_searched: ClassVar[str] = "stiction is searched by the laws he and xch"
+    # For `stiction identify`.
+    switching: ClassVar[Switching | None] = None
+    not_identified: ClassVar[str] = ""
+    held: ClassVar[tuple[str, ...]] = ()
+    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "switching", "jump_form")
+
+    def jump_form(self) -> JumpForm | None:
+        """Return the moves that it can make when OP rests between them.
+
+        Returns:
+            None for a law that has no such form, and so no OP can be planned for it.
+        """
+        return None
+
+    def with_static_friction(self, static_friction: float) -> Self:
+        """Return the law with another f_S, %, f_D and all else kept."""
+        return dataclasses.replace(self, static_friction=static_friction)  # type: ignore[call-arg]
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionPair(Stiction):
+    """A stiction law with static friction f_S and dynamic friction f_D, 0 ≤ f_D ≤ f_S.
+
+    Raises:
+        InputError: a negative or non-finite friction, or f_D > f_S.
+    """
+
+    static_friction: float = parameter("f_s", "%", "static friction band f_S", low=0.0)
+    dynamic_friction: float = parameter("f_d", "%", "dynamic friction f_D", low=0.0)
+
+    @classmethod
+    def reference(cls, seen: Seen) -> tuple[float, ...]:
+        return (1.0, 0.5)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.dynamic_friction > self.static_friction:
+            raise InputError(
+                f"{self.dynamic_friction:g} is larger than f_s = {self.static_friction:g}",
+                where="f_d",
+                fix="dynamic friction cannot exceed static friction, so lower f_d or raise f_s",
+            )
+
+    @classmethod
+    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
+        """Build from f_S and f_D in %, other parameters at their defaults.
+
+        Raises:
+            InputError: another parameter has no default.
+        """
+        _all_known(cls)
+        return cls(static_friction, dynamic_friction)
+
+    @classmethod
+    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
+        """Return rows (f_S, f_D), %, as they are, shape (G, 2)."""
+        return grid
+
+    @property
+    def jump(self) -> float:
+        """Smallest move of the stem under He's law, J = f_S − f_D, in %."""
+        return self.static_friction - self.dynamic_friction
+
+    @property
+    def stick_band(self) -> float:
+        """Deadband plus stickband, S = f_S + f_D, in %."""
+        return self.static_friction + self.dynamic_friction
+
+
+@dataclasses.dataclass(frozen=True)
+class SlipJumpPair(Stiction):
+    """A stiction law with deadband plus stickband S and slip jump J.
+
+    J = 0 is a pure deadband, J < S the undershoot, J = S no offset, J > S the overshoot
+    case, whose dynamic friction f_D = (S − J)/2 is negative.
+
+    Raises:
+        InputError: a negative or non-finite S or J.
+    """
+
+    stick_band: float = parameter("s", "%", "deadband plus stickband S", low=0.0)
+    jump: float = parameter("j", "%", "slip jump J of the stem", low=0.0)
+
+    @classmethod
+    def from_frictions(cls, static_friction: float, dynamic_friction: float) -> Self:
+        """Build from f_S and f_D in %: S = f_S + f_D, J = f_S − f_D, others at their defaults.
+
+        Raises:
+            InputError: another parameter has no default.
+        """
+        _all_known(cls)
+        return cls(static_friction + dynamic_friction, static_friction - dynamic_friction)
+
+    def with_static_friction(self, static_friction: float) -> Self:
+        """Return the law with another f_S, %, f_D and all else kept."""
+        dynamic = self.dynamic_friction
+        band, jump = static_friction + dynamic, static_friction - dynamic
+        return dataclasses.replace(self, stick_band=band, jump=jump)
+
+    @classmethod
+    def rows_of_frictions(cls, grid: FloatArray) -> FloatArray:
+        """Return rows (S, J), %, of rows (f_S, f_D), shape (G, 2)."""
+        return np.column_stack([grid[:, 0] + grid[:, 1], grid[:, 0] - grid[:, 1]])
+
+    @property
+    def static_friction(self) -> float:
+        """Lead of OP over the stem at which it slips, f_S = (S + J)/2, in %."""
+        return (self.stick_band + self.jump) / 2.0
+
+    @property
+    def dynamic_friction(self) -> float:
+        """Distance that the moving stem keeps from OP, f_D = (S − J)/2, in %."""
+        return (self.stick_band - self.jump) / 2.0
+
+
+def _all_known(kind: type[Stiction]) -> None:
+    """Refuse a law that two frictions do not tell all of."""
+    fields = {field.name: field.default for field in dataclasses.fields(kind)}
+    for entry in kind.parameters()[2:]:
+        if fields[entry.attribute] is dataclasses.MISSING:
+            raise InputError(
+                f"f_S and f_D alone do not tell {entry.key!r} of {kind.title()}",
+                fix="give all its parameters, as from_mapping takes them",
+            )

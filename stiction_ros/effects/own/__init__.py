@@ -1,0 +1,9 @@
+"""Effects of one's own: files in this folder, and in those that STICTION_EFFECTS lists."""
+
+from __future__ import annotations
+
+import os
+
+__path__ += [
+    folder for folder in os.environ.get("STICTION_EFFECTS", "").split(os.pathsep) if folder
+]

@@ -1,0 +1,1 @@
+"""Effects of the process. One behaviour a file."""

@@ -1,0 +1,50 @@
+"""A process that answers more, or less, than the model says."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import Behaviour, Filter, FloatArray, Memory, parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class ProcessGain(Behaviour):
+    """y = factor · x in deviations from the operating point, without memory.
+
+    Raises:
+        InputError: a factor out of range.
+    """
+
+    effect: ClassVar[str] = "gain"
+    places: ClassVar[tuple[str, ...]] = ("process",)
+    signature: ClassVar[str] = (
+        "every move of PV is larger or smaller than the model's, by one factor"
+    )
+    minimum_data: ClassVar[str] = "set-point moves or disturbances well above the noise"
+    confusable: ClassVar[tuple[str, ...]] = ("valve characteristic",)
+    experiment: ClassVar[str] = "move the set-point in steps well above the noise"
+    separation: ClassVar[str] = "hold the set-point at three levels of OP, tens of per cent apart"
+    absorbed: ClassVar[bool] = True
+
+    factor: float = parameter("factor", "1", "gain over that of the model", low=0.01, high=100.0)
+
+    def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
+        return memory, self.factor * value
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return outputs, shape (N, G), for rows (factor,)."""
+        return values[:, None] * grid[:, 0]
+
+    def filter(self, sample_time: float) -> Filter:
+        """Return the gain; it has no state."""
+        return Filter(np.zeros((0, 0)), np.zeros(0), np.zeros(0), self.factor)

@@ -1,0 +1,100 @@
+"""What a search for an effect is told of the signal, and what it says is to be searched."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ON_BOUND = 1e-3  # of the range of a search, from its ends
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """The signal that an effect would act on, as the records show it.
+
+    Attributes:
+        values: of all records, shape (N,).
+        fastest: its largest move per second.
+        sample_time: s.
+    """
+
+    values: FloatArray
+    fastest: float
+    sample_time: float
+
+    @property
+    def duration(self) -> float:
+        """Length of all records together, s."""
+        return len(self.values) * self.sample_time
+
+    @property
+    def span(self) -> float:
+        """Width of all but the most extreme .4 % of the values."""
+        return float(np.quantile(self.values, 0.998) - np.quantile(self.values, 0.002))
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One figure that is searched: ``points`` between two ends, both included.
+
+    The axes of an effect span a box. What the effect itself refuses of it with
+    :class:`~stiction_ros.errors.InputError`, such as f_D > f_S, is left out of the search; an
+    effect that refuses all of it is not considered.
+
+    Where the best figures are a needle in a valley, as those of a law that slips, a lattice may
+    miss them: give more ``points``, or axes along and across the valley.
+
+    Attributes:
+        low, high: ends.
+        points: of the first grid.
+        logarithmic: whether the points are in proportion.
+        whole: whether only whole numbers count.
+        linear: whether the response is a straight line in it, so that its best value is the
+            vertex of a parabola.
+        natural: whether its ends are values like all others, no bounds of the search.
+    """
+
+    low: float
+    high: float
+    points: int
+    logarithmic: bool = False
+    whole: bool = False
+    linear: bool = False
+    natural: bool = False
+
+    def grid(self) -> FloatArray:
+        """Return the first grid, in coordinates of the search."""
+        low, high = self.inner(self.low), self.inner(self.high)
+        middle = [0.5 * (low + high)]
+        values = np.linspace(low, high, self.points) if self.points > 1 else np.array(middle)
+        return np.unique(np.rint(values)) if self.whole else values
+
+    def inner(self, value: float) -> float:
+        """Return the coordinate of the search that belongs to a value."""
+        return float(np.log(value)) if self.logarithmic else value
+
+    def outer(self, coordinates: FloatArray) -> FloatArray:
+        """Return the values that belong to coordinates, kept within the ends."""
+        if self.whole:
+            coordinates = np.rint(coordinates)
+        values = np.exp(coordinates) if self.logarithmic else coordinates
+        return np.clip(values, self.low, self.high)
+
+    def bounds(self, value: float) -> bool:
+        """Tell whether a value lies on the bound of the search, so that a better one may not."""
+        if self.natural or self.linear or self.points < 2:
+            return False
+        low, high = self.inner(self.low), self.inner(self.high)
+        near = ON_BOUND * (high - low)
+        at = self.inner(value)
+        return at > high - near or (not self.whole and at < low + near)
+
+    @property
+    def step(self) -> float:
+        """Distance of two points of the first grid, in coordinates of the search."""
+        if self.points < 2:
+            return 0.5 * (self.inner(self.high) - self.inner(self.low))
+        return (self.inner(self.high) - self.inner(self.low)) / (self.points - 1)

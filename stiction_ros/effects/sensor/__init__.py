@@ -1,0 +1,1 @@
+"""Effects of sensors. One behaviour a file."""

@@ -1,0 +1,18 @@
+"""A sensor whose calibration jumps."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from stiction_ros.effects.disturbance.step import StepDisturbance
+
+
+@dataclasses.dataclass(frozen=True)
+class BiasStep(StepDisturbance):
+    """Adds ``size`` to the measurement from ``time`` on."""
+
+    effect: ClassVar[str] = "bias_step"
+    places: ClassVar[tuple[str, ...]] = ("sensor",)
+    confusable: ClassVar[tuple[str, ...]] = ("disturbance step",)
+    separation: ClassVar[str] = "compare PV with a second sensor or a laboratory value"

@@ -1,0 +1,29 @@
+"""A sensor that ends before its signal does."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from stiction_ros.effects.behaviour import parameter
+from stiction_ros.effects.limits import Limits
+
+
+@dataclasses.dataclass(frozen=True)
+class Clip(Limits):
+    """A sensor that shows nothing below ``low`` and above ``high``.
+
+    Raises:
+        InputError: limits that are not finite, or low > high.
+    """
+
+    effect: ClassVar[str] = "clip"
+    places: ClassVar[tuple[str, ...]] = ("sensor",)
+    signature: ClassVar[str] = "PV rests at exactly one value, without noise, again and again"
+    minimum_data: ClassVar[str] = "PV passes a limit"
+    confusable: ClassVar[tuple[str, ...]] = ("sensor freeze",)
+    in_values: ClassVar[bool] = True
+    not_searched: ClassVar[str] = "the values of PV show it, which are looked at first"
+
+    low: float = parameter("low", "signal", "lower end of the sensor's range")
+    high: float = parameter("high", "signal", "upper end of the sensor's range")

@@ -1,0 +1,1 @@
+"""Effects of valves but for stiction. One behaviour a file."""

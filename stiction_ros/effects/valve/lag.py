@@ -1,0 +1,97 @@
+"""A first-order lag, of a valve or of a sensor."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import (
+    NO_SAMPLE,
+    Behaviour,
+    Filter,
+    FloatArray,
+    Memory,
+    elapsed,
+    parameter,
+    starts,
+)
+from stiction_ros.effects.seen import Seen
+
+
+@dataclasses.dataclass(frozen=True)
+class Lag(Behaviour):
+    r"""The signal follows with a time constant.
+
+    .. math::
+        y_k = \alpha y_{k-1} + (1 - \alpha) x_k, \quad \alpha = e^{-T_s/\tau}
+
+    The memory is (y, time of the last sample). At the first sample no time has passed, so
+    the signal is where it rested. τ = 0 leaves the signal as it is.
+
+    Raises:
+        InputError: a negative or non-finite time constant.
+    """
+
+    effect: ClassVar[str] = "lag"
+    places: ClassVar[tuple[str, ...]] = ("valve", "sensor")
+    signature: ClassVar[str] = "PV answers every move later and smoother than the model"
+    minimum_data: ClassVar[str] = "set-point moves or other fast moves of OP"
+    confusable: ClassVar[tuple[str, ...]] = (
+        "valve lag",
+        "process pole",
+        "sensor lag",
+        "process delay",
+    )
+    experiment: ClassVar[str] = "move the set-point in steps"
+    separation: ClassVar[str] = (
+        "record the stem position: a slow valve shows there; move the sensor or compare it with "
+        "a second one to tell a slow sensor from a slow process"
+    )
+    family: ClassVar[str] = "lag"
+    absorbed: ClassVar[bool] = True
+
+    time_constant: float = parameter("tau", "s", "time constant τ", low=0.0)
+
+    @classmethod
+    def reference(cls, seen: Seen) -> tuple[float, ...]:
+        return (3.0 * seen.sample_time,)
+
+    def rest(self, value: float) -> Memory:
+        return (value, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        """Return the memory (y, time) and y."""
+        assert isinstance(memory, tuple)
+        last, before = memory
+        share = -math.expm1(-_ratio(elapsed(before, time), self.time_constant))
+        out = value if share == 1.0 else last + share * (value - last)
+        return (out, time), out
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return outputs, shape (N, G), for rows (tau,)."""
+        from stiction_ros.effects.grid_kernels import lagged  # compiled: slow to import
+
+        share = np.array([-math.expm1(-_ratio(sample_time, tau)) for tau in grid[:, 0].tolist()])
+        return lagged(share, np.asarray(values, dtype=float), starts(start, len(share)))
+
+    def filter(self, sample_time: float) -> Filter:
+        """Return the lag with z_k = y_{k−1}."""
+        alpha = math.exp(-_ratio(sample_time, self.time_constant))
+        return Filter(np.array([[alpha]]), np.array([1.0 - alpha]), np.array([alpha]), 1.0 - alpha)
+
+
+def _ratio(elapsed_time: float, time_constant: float) -> float:
+    """Return T/τ; a lag without a time constant forgets whatever time has passed."""
+    if elapsed_time == 0.0:
+        return 0.0
+    return elapsed_time / time_constant if time_constant > 0.0 else math.inf

@@ -1,0 +1,72 @@
+"""Slew: an actuator whose speed is limited."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import (
+    NO_SAMPLE,
+    Behaviour,
+    FloatArray,
+    Memory,
+    elapsed,
+    parameter,
+    starts,
+)
+from stiction_ros.effects.seen import Seen
+
+
+@dataclasses.dataclass(frozen=True)
+class Slew(Behaviour):
+    r"""The stem moves by no more than its rate allows.
+
+    .. math::
+        \chi_k = \chi_{k-1} + \min(\max(u_k - \chi_{k-1}, -r T_s), r T_s)
+
+    The memory is (χ, time of the last sample). At the first sample no time has passed, so
+    the stem is where it rested.
+
+    Raises:
+        InputError: a negative or non-finite rate.
+    """
+
+    effect: ClassVar[str] = "slew"
+    places: ClassVar[tuple[str, ...]] = ("valve",)
+    signature: ClassVar[str] = "the stem ramps at one speed after large moves of OP, however large"
+    minimum_data: ClassVar[str] = "moves of OP of many times rate times sample time"
+    confusable: ClassVar[tuple[str, ...]] = ("valve lag", "process pole", "sensor lag")
+    experiment: ClassVar[str] = "move the set-point so far that OP moves fast"
+
+    rate: float = parameter("rate", "%/s", "largest speed of the stem", low=0.0)
+
+    @classmethod
+    def reference(cls, seen: Seen) -> tuple[float, ...]:
+        return (0.19 * seen.fastest,)
+
+    def rest(self, value: float) -> Memory:
+        return (value, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        """Return the memory (χ, time) and the stem position χ."""
+        assert isinstance(memory, tuple)
+        stem, before = memory
+        reach = self.rate * elapsed(before, time)
+        stem = min(max(value, stem - reach), stem + reach)
+        return (stem, time), stem
+
+    @classmethod
+    def simulate_grid(
+        cls,
+        grid: FloatArray,
+        values: FloatArray,
+        start: FloatArray | float,
+        sample_time: float = 1.0,
+    ) -> FloatArray:
+        """Return stem positions, shape (N, G), for rows (rate,)."""
+        from stiction_ros.effects.grid_kernels import slewing  # compiled: slow to import
+
+        reach = grid[:, 0] * sample_time
+        return slewing(reach, np.asarray(values, dtype=float), starts(start, len(reach)))

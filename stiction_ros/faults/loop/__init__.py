@@ -1,0 +1,1 @@
+"""The running loop that faults are put into."""

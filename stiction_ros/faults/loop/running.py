@@ -1,0 +1,198 @@
+"""A running loop that faults are put into: its processes, and the suite's own node."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.faults.fault import Fault, Pace, Phase
+from stiction_ros.faults.judgement.observation import Known, Sampled
+from stiction_ros.faults.loop.node_process import NodeProcess
+from stiction_ros.faults.loop.setting_up import NAMES, case_parameters, plant_model
+from stiction_ros.loop import LoopModel
+
+if TYPE_CHECKING:
+    from stiction_ros.nodes.probes.fault_probe import Probe
+
+STARTED = ("recorder", "estimator", "controller", "plant")
+ENDED = ("plant", "controller", "estimator", "recorder")  # who still has readers goes first
+TALKER = {"pv": "plant", "sp": "plant", "op": "controller", "op_applied": "plant"}
+LOOK = 0.02  # s between two looks at what has come
+
+
+class RunningLoop:
+    """The loop of one case, as the functions of the catalogue see it."""
+
+    def __init__(
+        self, fault: Fault, pace: Pace, phase: Phase, seed: int, speed: float, directory: Path
+    ) -> None:
+        """Prepare parameters and join the domain; :meth:`start` starts the nodes."""
+        from stiction_ros.nodes.probes.fault_probe import Probe
+
+        self.pace, self.phase, self.directory = pace, phase, directory
+        self.model: LoopModel = plant_model()
+        self.step = round(self.model.sample_time * 1e9)
+        self.period = self.model.sample_time / speed if pace is Pace.REALTIME else 0.0
+        self.remarks: list[str] = []
+        self.begun = 0.0
+        self.bag = directory / "bag"
+        self._environment = ros_environment()
+        self._parameters = case_parameters(fault, pace, seed, speed, self.bag)
+        remaps: dict[str, list[str]] = {name: [] for name in NAMES}
+        for topic in fault.relayed:
+            remaps[TALKER[topic]] += ["-r", f"{topic}:={topic}_direct"]
+        self.nodes = {
+            name: NodeProcess(name, values, directory, self._environment, remaps[name])
+            for name, values in self._parameters.items()
+        }
+        self._extra: list[NodeProcess] = []
+        self.probe: Probe = Probe(self._environment)
+        for topic in fault.relayed:
+            self.probe.relay(topic)
+
+    # ---- processes -------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start every node."""
+        for name in STARTED:
+            self.nodes[name].start()
+
+    def stop(self) -> None:
+        """End every node and leave the domain."""
+        for process in self._extra:
+            process.end()
+        for name in ENDED:
+            node = self.nodes[name]
+            if node.code is None and not node.end():
+                self.remark(f"{name} did not end when it was asked to")
+        self.probe.close()
+
+    def begins(self, earlier: float = 0.0) -> None:
+        """Say that the fault begins now, and not when it was prepared.
+
+        Args:
+            earlier: s by which the nodes may have seen it before the suite did.
+        """
+        self.begun = time.monotonic() - earlier
+
+    def beside(self, kind: str, name: str, parameters: Mapping[str, Any] | None = None) -> None:
+        """Start one more node of ``kind`` that nobody has asked for."""
+        values = {**self._parameters[kind], "wait_for": [], **(parameters or {})}
+        extra = NodeProcess(
+            kind,
+            values,
+            self._folder(f"beside_{len(self._extra)}"),
+            self._environment,
+            name="" if name == kind else name,
+        )
+        extra.start()
+        self._extra.append(extra)
+
+    def end_beside(self) -> None:
+        """End what :meth:`beside` has started."""
+        for process in self._extra:
+            process.end()
+        self._extra.clear()
+
+    def restart(self, name: str) -> None:
+        """Start a node again that was killed."""
+        self.nodes[name].start()
+
+    # ---- time ------------------------------------------------------------------------------
+
+    def wait(self, seconds: float) -> None:
+        """Let ``seconds`` of wall time pass."""
+        time.sleep(seconds)
+
+    def wait_until(self, condition: Callable[[], object], seconds: float) -> bool:
+        """Wait for ``condition``, at most ``seconds``; return whether it came true."""
+        end = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > end:
+                return False
+            time.sleep(LOOK)
+        return True
+
+    def wait_samples(self, count: int, seconds: float = 20.0) -> bool:
+        """Wait until ``count`` more measurements have come."""
+        taken = self.heard("pv")
+        have = len(taken)
+        return self.wait_until(lambda: len(taken) >= have + count, seconds)
+
+    # ---- what was heard --------------------------------------------------------------------
+
+    def heard(self, topic: str) -> list[Sampled]:
+        """Return what came so far on pv, op or op_applied; it grows."""
+        return self.probe.heard[topic]
+
+    def last(self, topic: str) -> Sampled:
+        """Return the newest message of pv, op or op_applied; nominal before the first."""
+        taken = self.heard(topic)
+        if taken:
+            return taken[-1]
+        names = self.names(topic)
+        nominal = self.model.pv_start if topic == "pv" else self.model.stem_start
+        return Sampled(time.monotonic(), 0, tuple(float(v) for v in nominal[: len(names)]))
+
+    def names(self, topic: str) -> tuple[str, ...]:
+        """Return the tags of a topic."""
+        inputs = topic in ("op", "op_applied", "stem")
+        return self.model.valve_names if inputs else self.model.outputs
+
+    @property
+    def known(self) -> Known:
+        """Mode and frictions that the controller has told last."""
+        return self.probe.known
+
+    # ---- what is said ----------------------------------------------------------------------
+
+    def say(
+        self,
+        topic: str,
+        values: object = None,
+        *,
+        offset: float = 0.0,
+        stamp: int | None = None,
+        names: tuple[str, ...] | None = None,
+        frame_id: str = "",
+    ) -> None:
+        """Publish one message that should not be there.
+
+        Args:
+            topic: pv, sp, op, op_applied, dv, stem or stiction.
+            values: one for all tags, or a list; the newest PV or OP unless given.
+            offset: s from the stamp of the newest measurement.
+            stamp: in place of that, ns.
+            names: tags; those of the topic unless given.
+            frame_id: of the header.
+        """
+        tags = self.names(topic) if names is None else names
+        if values is None:
+            row = list(self.last("op_applied" if topic in ("op", "op_applied") else "pv").values)
+        elif isinstance(values, list | tuple):
+            row = [float(value) for value in values]
+        else:
+            row = [float(str(values))] * len(tags)
+        at = self.last("pv").stamp + round(offset * 1e9) if stamp is None else stamp
+        self.probe.signal(topic, max(at, 0), tags, row, frame_id)
+
+    def offer(self, model: LoopModel, later: float = 0.0) -> None:
+        """Publish a loop model that is valid from the present sample on, or ``later`` s."""
+        valid_from = self.last("pv").stamp + round(later * 1e9)
+        self.offer_text(model.to_yaml(valid_from=max(valid_from, 0)))
+
+    def offer_text(self, text: str) -> None:
+        """Publish any text as a loop model."""
+        self.probe.text("loop_model", text)
+
+    def remark(self, text: str) -> None:
+        """Note something that is wrong: the case fails."""
+        self.remarks.append(text)
+
+    def _folder(self, name: str) -> Path:
+        folder = self.directory / name
+        folder.mkdir(exist_ok=True)
+        return folder

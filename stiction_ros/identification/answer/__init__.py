@@ -1,0 +1,1 @@
+"""What is told beside the figures: how steady they are, what would decide, a loop to simulate."""

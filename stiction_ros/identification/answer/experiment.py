@@ -1,0 +1,135 @@
+"""What would decide on a valve where its record does not: an experiment with figures from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.closed_loop.explanation import LINE, MATERIAL, RIVAL
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.result.identification import Identification, ValveEstimate
+from stiction_ros.records.record import Record
+
+STEPS = (4, 2, 1)
+"""Steps into which the largest band that is not rejected is divided, the first whose answers PV's
+noise does not hide: the band is then known to a quarter, which tells a valve to service from one to
+leave, or to a half, or it shows as a first step back that PV does not answer."""
+
+AVERAGED = 60
+"""Samples of a hold that are averaged at most: beyond that loads move PV, so it is repeated."""
+
+HELD = 3.0
+"""Lags for which a step is held: by then PV shows 95 % of it."""
+
+INTEGRATED = 20
+"""Samples for which a step is held where PV does not settle."""
+
+CLEAR = 4.0
+"""Standard deviations of PV's noise that the answer to a step must make."""
+
+MOST = 10.0
+"""Times the record beyond which more of the same is no advice."""
+
+
+def experiment_for(
+    record: Record, found: Identification, valve: int, options: IdentificationOptions
+) -> str:
+    """Return why a valve is undecided and what would decide, in sentences.
+
+    Args:
+        record: what was measured.
+        found: what identification made of it.
+        valve: index of one that is undecided.
+        options: of the identification.
+    """
+    estimate = found.valves[valve]
+    short = (options.bic_margin if found.method == "exact" else 0.0) - estimate.evidence.get(
+        "delta_bic", 0.0
+    )
+    said = (
+        _reason(estimate, short, options.min_moves, float(np.ptp(record.op[:, valve]))),
+        _travel_test(record, found, valve),
+        _more(estimate, short, len(record) * record.sample_time),
+    )
+    return " ".join(filter(None, said))
+
+
+def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float) -> str:
+    """Return why nothing was decided; ``short`` is what the evidence for friction lacks."""
+    told = estimate.evidence
+    if "delta_bic" not in told:
+        return "This method does not weigh friction against none."
+    size = f"f_S {estimate.static_friction:.2g} %"
+    if short < 0.0:
+        if told["moves"] < least_moves:
+            return f"By {size} the stem moves {told['moves']:.0f} times only."
+        if told.get("line_rivalry", 0.0) > RIVAL and told.get("outside_line", 0.0) > LINE:
+            return (
+                f"A wave from outside explains the record nearly as well as {size}: in manual it "
+                "would go on while OP rests."
+            )
+        if not told.get("alike", 1.0):
+            return (
+                f"The record speaks for friction, here {size}, but no two rates that see all of "
+                "the process's response agree on its size."
+            )
+        if min(told["half_1"], told["half_2"]) <= 0.0:
+            return f"One half of the record only speaks for {size}."
+        if told.get("loop_gone", 1.0) < MATERIAL:
+            return f"The loop would move nearly as much without {size}."
+        return f"The record speaks for {size}, which hardly matters."
+    if estimate.static_friction > 0.0 and min(told["half_1"], told["half_2"]) > 0.0:
+        return f"The record speaks for {size}, but not clearly."
+    high = estimate.static_interval[1]
+    share = 100.0 * high / span
+    return f"The record does not reject f_S up to {high:.2g} %, {share:.0f} % of OP's range."
+
+
+def _travel_test(record: Record, found: Identification, valve: int) -> str:
+    """Return the test in manual, sized by the band and the process; nothing without a process."""
+    name, samples = record.valves[valve], len(record)
+    answers = [
+        StepAnswer.of(model, name, samples, record.sample_time)
+        for model in found.outputs
+        if any(model.b.get(name, ()))
+    ]
+    answers = [one for one in answers if np.isfinite(one.values).all() and one.clearness > 0.0]
+    if not answers:
+        return ""
+    answer = max(answers, key=lambda one: one.clearness)
+    if answer.lag is None:
+        hold = answer.dead_time + INTEGRATED * record.sample_time
+        shows = f"{answer.output} changes its slope"
+    else:
+        hold = answer.dead_time + HELD * max(answer.lag, record.sample_time)
+        shows = f"{answer.output} moves"
+    estimate = found.valves[valve]
+    op = record.op[:, valve]
+    high = estimate.static_interval[1] + estimate.dynamic_interval[1]
+    band = min(high, float(np.ptp(op)))
+    alone = (CLEAR * answer.noise / max(band * answer.after(hold), 1e-300)) ** 2
+    parts = next((each for each in STEPS if alone * each**2 <= AVERAGED), STEPS[-1])
+    averaged = min(math.ceil(max(alone * parts**2, 1.0)), AVERAGED)
+    hold += (averaged - 1) * record.sample_time
+    times = math.ceil(alone * parts**2 / AVERAGED)
+    again = f", {times} times over" if times > 1 else ""
+    return (
+        f"In manual, move OP of {name} by {band:.2g} % up from {float(op.mean()):.3g} %, back "
+        f"down and up again{again}, in steps of {band / parts:.2g} % held for {hold:.3g} s each: "
+        f"without friction {shows} at every step, with friction only after OP has gone back by "
+        "the band."
+    )
+
+
+def _more(estimate: ValveEstimate, short: float, seconds: float) -> str:
+    """Return how much more of the same record would do: evidence grows with its length."""
+    told = estimate.evidence
+    gained = told.get("half_1", 0.0) + told.get("half_2", 0.0)
+    if short <= 0.0 or short > (MOST - 1.0) * gained:
+        return ""
+    factor = 1.0 + short / gained
+    return (
+        f"Or record {factor:.1f} times as long, {factor * seconds:.0f} s, with the loop as it is."
+    )

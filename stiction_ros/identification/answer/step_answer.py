@@ -1,0 +1,72 @@
+"""How an output answers a step of one stem, by the identified process."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.result.identification import OutputModel
+
+RISEN = 0.632
+"""Share of the whole answer that a first-order process has given after one lag."""
+
+GROWS = 1.5
+"""Times by which an answer that does not settle grows from a quarter of the record to its half:
+2 for an integrator, 1.4 for a lag of a quarter of the record, 1.6 for one of a half."""
+
+
+@dataclasses.dataclass(frozen=True)
+class StepAnswer:
+    """The answer to 1 % of stem.
+
+    Attributes:
+        output: tag.
+        dead_time: s, until PV begins to answer: the delay and the sample that shows it.
+        lag: s from then on until 63 % of the answer; None where it does not settle within half the
+            record, which cannot be told from an integrator.
+        values: PV after each sample, engineering units per %, shape (H,).
+        noise: standard deviation of what one sample of PV brings that is new, same units.
+        sample_time: s.
+    """
+
+    output: str
+    dead_time: float
+    lag: float | None
+    values: FloatArray
+    noise: float
+    sample_time: float
+
+    @classmethod
+    def of(cls, model: OutputModel, valve: str, samples: int, sample_time: float) -> StepAnswer:
+        """Return the answer within half a record.
+
+        Args:
+            model: of the output.
+            valve: tag.
+            samples: of the record.
+            sample_time: s.
+        """
+        from scipy.signal import lfilter
+
+        wait = model.delay[valve] + 1
+        drive = np.zeros(max(samples // 2, wait + 2))
+        drive[wait:] = 1.0
+        values = np.asarray(lfilter(model.b[valve], [1.0, *model.a], drive))
+        reached, before = (np.abs(part).max() for part in (values, values[: len(values) // 2 + 1]))
+        lag = None
+        if reached <= GROWS * before:
+            risen = np.flatnonzero(np.abs(values[wait:]) >= RISEN * reached)
+            lag = float(risen[0] * sample_time)
+        return cls(model.name, wait * sample_time, lag, values, model.noise_std, sample_time)
+
+    def after(self, seconds: float) -> float:
+        """Return |PV| a time after the step, engineering units per %."""
+        row = min(round(seconds / self.sample_time), len(self.values) - 1)
+        return float(abs(self.values[row]))
+
+    @property
+    def clearness(self) -> float:
+        """Largest answer over the noise, per %."""
+        return float(np.abs(self.values).max()) / max(self.noise, 1e-300)

@@ -1,0 +1,90 @@
+"""A law's further parameters under the evidence for friction."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.stats import chi2
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.evidence.accepted import FREEDOM, MISFIT
+from stiction_ros.identification.evidence.candidate import Candidate, ideal, losses
+from stiction_ros.identification.evidence.output_fit import white
+from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.search import DRIFT, Found, search
+from stiction_ros.identification.exact.further_fit import EQUAL, widened
+from stiction_ros.identification.friction.further import (
+    FurtherSearch,
+    Settled,
+    first_values,
+    searched,
+)
+from stiction_ros.identification.result.identification import ValveEstimate
+
+ROUNDS = 2
+
+
+def settled(problem: Problem) -> tuple[tuple[float, ...], ...]:
+    """Return the values at which the law's further parameters are held, per valve.
+
+    Args:
+        problem: a record at its own rate.
+    """
+    first = first_values(problem.law)
+    if not searched(problem.law):
+        return (first,) * len(problem.op) if first else ()
+    problem = dataclasses.replace(problem, further=(first,) * len(problem.op))
+    beside = ideal(problem)
+    for valve in range(len(problem.op)):
+        for memory in (0.0, DRIFT):
+            fits = [white(problem, i, beside.stems, memory) for i in range(len(problem.pv))]
+            seen = _search(problem, dataclasses.replace(beside, fits=tuple(fits)), valve)
+            found = seen.everywhere()
+            known = np.all(found.rows[:, 2:-1] == np.array(first), axis=1)
+            if found.loss[0] < found.loss[known].min() - EQUAL:
+                problem = _with_further(problem, valve, found.rows[0])
+    for _ in range(ROUNDS):
+        before, best = problem, search(problem).best
+        for valve in np.flatnonzero(best.friction[:, 0]).tolist():
+            problem = _with_further(problem, valve, _nearby(problem, best, valve).rows[0])
+        if problem.further == before.further:
+            break
+    return problem.further
+
+
+def with_further(
+    valve: ValveEstimate, problem: Problem, found: Found, j: int, confidence: float
+) -> ValveEstimate:
+    """Return the estimate of valve j with its further parameters and intervals over all."""
+    best = found.best
+    if not problem.further or best.friction[j, 0] == 0.0 or valve.static_friction == 0.0:
+        return valve
+    keys = [entry.key for entry in problem.law.parameters()[2:]]
+    values = dict(zip(keys, problem.further[j], strict=True))
+    if not searched(problem.law):
+        return dataclasses.replace(valve, further=values)
+    gain = max(found.without[j].loss - best.loss, 0.0)
+    slack = float(chi2.ppf(confidence, FREEDOM + len(keys))) + MISFIT * gain
+    span = float(problem.span[j])
+    rows = _nearby(problem, best, j).accepted(slack)
+    rows = np.column_stack([span * rows[:, :2], rows[:, 2:-1], span * rows[:, -1]])
+    return widened(valve, values, rows)
+
+
+def _nearby(problem: Problem, best: Candidate, valve: int) -> Settled:
+    row = [*best.friction[valve], *problem.further[valve], best.starts[valve]]
+    return _search(problem, best, valve).round_about(np.array(row))
+
+
+def _search(problem: Problem, beside: Candidate, valve: int) -> FurtherSearch:
+    def loss(rows: FloatArray) -> FloatArray:
+        return losses(problem, beside, valve, rows, beside.fits)
+
+    return FurtherSearch(problem.law, float(problem.limit[valve]), loss)
+
+
+def _with_further(problem: Problem, valve: int, row: FloatArray) -> Problem:
+    held = list(problem.further)
+    held[valve] = tuple(row[2:-1].tolist())
+    return dataclasses.replace(problem, further=tuple(held))

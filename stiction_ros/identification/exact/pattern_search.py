@@ -1,0 +1,265 @@
+"""Evaluates switching patterns of one valve, each at its best f_D.
+
+Patterns are listed exactly (:mod:`stiction_ros.identification.switching.patterns`) in rectangles of
+the (J, S) plane. Which rectangle is worth it is for :mod:`.neighbourhood` and
+:mod:`.growing_patterns` to say; the remaining frictions are searched on grids (:mod:`.search`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.kernels.level import best_levels
+from stiction_ros.identification.problem.models import (
+    WORTHWHILE,
+    Criterion,
+    Data,
+    DelayRanges,
+    Model,
+    ValveScan,
+    output_scans,
+    scan_stems,
+)
+from stiction_ros.identification.problem.output_error import Orders
+from stiction_ros.identification.side_by_side import together
+from stiction_ros.identification.switching.patterns import (
+    Beginning,
+    Cells,
+    cells_at,
+    first_slip_range,
+    levels_of,
+    levels_with,
+    resting_cells,
+)
+from stiction_ros.identification.switching.rectangles import (
+    area,
+    points_inside,
+    remainders,
+)
+from stiction_ros.identification.switching.scan import PatternScan
+from stiction_ros.identification.switching.step_signals import StepSignals
+
+FEW = 60  # cells too few to tell how many there will be
+MOST_LEVELS = 30
+INSIDE = 1e-9  # of a range; how far from its edge
+
+
+class PatternSearch:
+    """Evaluates patterns of one valve under one criterion, everything else fixed."""
+
+    def __init__(
+        self,
+        data: Data,
+        model: Model,
+        orders: Orders,
+        valve: int,
+        ranges: DelayRanges,
+        begin: Beginning | None = None,
+        criterion: Criterion = Criterion.INNOVATIONS,
+    ) -> None:
+        """Build the criterion; with ``begin`` the stem before its first slip is left free."""
+        self.data, self.valve = data, valve
+        self.u, self.law = data.u[valve], data.law
+        free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
+        self.limit = float(data.limit[valve])
+        self.ranges, self.begin, self.criterion = ranges, begin, criterion
+        self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
+
+    def scan(self, grid: FloatArray, starts: FloatArray | float) -> ValveScan:
+        """Scan rows (f_S, f_D), shape (G, 2), by the same criterion, see :func:`scan_valve`."""
+        by = [(self.criterion, self.scans)]
+        return scan_stems(self.data, self.valve, grid, starts, by, self.ranges)[0]
+
+    def evaluate(self, cells: Cells) -> PatternScan:
+        """Return the loss of every cell at its best f_D.
+
+        At the very edge of a cell there is no f_S, so f_D stays a little inside.
+        """
+        dynamic = cells.dynamic
+        most = np.maximum(self.limit - cells.bounds[:, 0], 1e-12)  # f_S = J + f_D is limited
+        dynamic[:, 1] = np.clip(dynamic[:, 1], dynamic[:, 0], np.maximum(most, dynamic[:, 0]))
+        edges = INSIDE * (dynamic[:, 1:] - dynamic[:, :1]) * np.array([1.0, -1.0])
+        level, curvature, loss, delays = self._minimised(cells.steps, dynamic + edges)
+        moves = cells.steps.moves.astype(float)
+        return PatternScan(cells.bounds, dynamic, level, curvature, loss, delays, moves)
+
+    def best_level(self, friction: FloatArray, begin: Beginning | None = None) -> float:
+        """Return the stem before the first sample that suits (f_S, f_D) best, %.
+
+        Args:
+            friction: f_S and f_D, shape (2,).
+            begin: where the first slip has to be, if it can be there.
+        """
+        f_s, f_d = (float(value) for value in friction)
+        ranges = np.empty((0, 2))
+        if begin is not None:
+            ranges = levels_with(self.u, f_s, begin, self.law)
+        if not len(ranges):
+            ranges = levels_of(self.u, f_s, MOST_LEVELS, self.law)
+        point = np.array([[f_s - f_d, f_s + f_d]])
+        points = np.repeat(point, len(ranges), axis=0)
+        cells = resting_cells(self.u, ranges.mean(axis=1), points, self.law)
+        level, loss = self._levels_before(cells, f_d, ranges)
+        best = int(loss.argmin())
+        inside = INSIDE * (ranges[best, 1] - ranges[best, 0])
+        return float(np.clip(level[best], ranges[best, 0] + inside, ranges[best, 1] - inside))
+
+    def realised(self, scan: PatternScan, index: int, begin: Beginning) -> tuple[FloatArray, float]:
+        """Return (f_S, f_D) of a cell and the stem before the first sample minus u_0, %.
+
+        The best level under the given first slip is taken, and of the cell's f_S the middle
+        of those with which a valve at that level first slips there; if there is none, the
+        middle of all with the best level from which it slips there.
+        """
+        f_d = float(scan.level[index])
+        low, high = scan.static_range(index, (f_d, f_d))
+        high = min(high, self.limit)
+        point = points_of(np.array([[0.5 * (low + high), f_d]]))
+        cells = cells_at(self.u, begin, point, self.law)
+        around = begin.level + 0.1 * self.limit * np.array([[-1.0, 1.0]])
+        level = float(self._levels_before(cells, f_d, around)[0][0])
+        least, most = first_slip_range(self.u, level, begin, self.law)
+        if max(low, least) < min(high, most):
+            static = 0.5 * (max(low, least) + min(high, most))
+        else:
+            static = min(0.5 * (low + high), self.limit)
+            level = self.best_level(np.array([static, f_d]), begin)
+        return np.array([static, f_d]), level - float(self.u[0])
+
+    def _levels_before(
+        self, cells: Cells, dynamic: float, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the best stem before the first slip at f_D, and its loss, per cell."""
+        base, sign = cells.steps.values.T
+        before = sign == 0.0
+        stem = np.where(before, 0.0, base - dynamic * sign)
+        values = np.column_stack([stem, -before.astype(float)])
+        level, _, loss, _ = self._minimised(dataclasses.replace(cells.steps, values=values), ranges)
+        return level, loss
+
+    def minimised(
+        self, bases: FloatArray, signs: FloatArray, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Minimise over the level x in base − x · sign, per pattern inside its range.
+
+        Returns:
+            Best level (G,), second derivative (G,), loss (G,), delays (G, p).
+        """
+        return self._minimised(StepSignals.of(bases, signs), ranges)
+
+    def _minimised(
+        self, patterns: StepSignals, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Minimise as :meth:`minimised` does, of base and sign as two channels."""
+        middle = patterns.size // 2
+        if patterns.size * patterns.count < WORTHWHILE:
+            return self._minimised_part(patterns, ranges)
+        one, two = together(
+            partial(self._minimised_part, patterns.part(0, middle), ranges[:middle]),
+            partial(self._minimised_part, patterns.part(middle, patterns.size), ranges[middle:]),
+        )
+        levels, second, loss, delays = map(np.concatenate, zip(one, two, strict=True))
+        return levels, second, loss, delays
+
+    def _minimised_part(
+        self, patterns: StepSignals, ranges: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        energies = [scan.patterns(patterns) for scan in self.scans]
+        widest = max(energies, key=lambda energy: energy.delays)
+        products = np.zeros((patterns.size, len(energies), *widest.products.shape[1:]))
+        rights = np.zeros((patterns.size, len(energies), *widest.rights.shape[1:]))
+        scales = np.zeros((len(energies), 3))
+        for i, (scan, energy) in enumerate(zip(self.scans, energies, strict=True)):
+            lags = energy.rights.shape[2]
+            products[:, i, :, :, :lags], rights[:, i, :, :lags] = energy.products, energy.rights
+            counted = 0 if self.criterion is Criterion.SQUARED_ERROR else scan.count
+            scales[i] = scan.rest_energy, counted, energy.delays
+        levels, second, loss, delays = best_levels(products, rights, scales, ranges)
+        return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
+
+    def enumerate(self, begin: Beginning, rectangles: FloatArray, most: int) -> Cells | None:
+        """Return all cells that meet the rectangles, shape (R, 4), each once.
+
+        Args:
+            most: largest number of cells; None comes back when there are more, or would be
+                twice as many if the rest were covered by cells as large as those met so far.
+        """
+        todo = self._admissible(rectangles)
+        if len(todo) > most:
+            return None
+        met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
+        count, whole = 0, area(todo)
+        for cells, left in self._layers(begin, todo):
+            met.append(cells)
+            count += len(cells.bounds)
+            covered = whole - area(left)
+            too_many = count + len(left) > most
+            if len(left) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
+                return None
+        return Cells.joined(met).distinct()
+
+    def some_cells(self, begin: Beginning, rectangles: FloatArray, most: int) -> PatternScan:
+        """Return cells that meet the rectangles, shape (R, 4), each once; all if they are few.
+
+        Args:
+            most: number of cells met, some of them repeatedly, from which on no more are listed.
+        """
+        inside = np.clip(rectangles, 0.0, 2.0 * self.limit)
+        met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
+        for cells, _ in self._layers(begin, self._admissible(inside)):
+            met.append(cells)
+            if sum(len(part.bounds) for part in met) >= most:
+                break
+        return self.evaluate(Cells.joined(met).distinct())
+
+    def _layers(
+        self, begin: Beginning, rectangles: FloatArray
+    ) -> Iterator[tuple[Cells, FloatArray]]:
+        """Yield one cell of every rectangle and what they leave, until nothing is left."""
+        while len(rectangles):
+            cells = cells_at(self.u, begin, points_inside(rectangles), self.law)
+            rectangles = self._admissible(remainders(rectangles, cells.bounds))
+            yield cells, rectangles
+
+    def _admissible(self, rectangles: FloatArray) -> FloatArray:
+        """Return the rectangles that hold frictions 0 ≤ f_D ≤ f_S ≤ limit."""
+        smallest = 1e-12 * self.limit
+        jl, jh, sl, sh = rectangles.T
+        fits = (jh - jl > smallest) & (sh - sl > smallest) & (sh > jl)
+        fits &= jl + sl < 2.0 * self.limit
+        return np.asarray(rectangles[fits])
+
+
+def points_of(friction: FloatArray) -> FloatArray:
+    """Return rows (J, S) of rows (f_S, f_D)."""
+    static, dynamic = friction[:, 0], friction[:, 1]
+    return np.column_stack([static - dynamic, static + dynamic])
+
+
+def nearby_delays(data: Data, model: Model, valve: int, wander: int = 1) -> DelayRanges:
+    """Return, per output, the delays of a valve within ``wander`` samples of the model's."""
+    low, high = data.delay
+    now = [row[valve] for row in model.delays]
+    return tuple((max(low, d - wander), min(high, d + wander)) for d in now)
+
+
+def best_in_cells(
+    search: PatternSearch, friction: FloatArray, start: float
+) -> tuple[FloatArray, PatternScan]:
+    """Return rows (f_S, f_D) moved to the best of their cells, and the cells.
+
+    Where a valve slips seldom a cell is wide and f_D at a grid point far from the best.
+
+    Args:
+        friction: rows (f_S, f_D), shape (G, 2).
+        start: stem before the first sample minus u_0, %.
+    """
+    levels = np.full(len(friction), float(search.u[0]) + start)
+    scan = search.evaluate(resting_cells(search.u, levels, points_of(friction), search.law))
+    rows = [scan.middle(index, search.limit) for index in range(len(friction))]
+    return np.array(rows), scan

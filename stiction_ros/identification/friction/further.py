@@ -1,0 +1,207 @@
+"""A law's parameters behind f_S and f_D: where they begin, and the search for them.
+
+f_S and f_D are searched with the others held. Before that, and again from what was found, points
+are scattered in ever smaller boxes over all parameters of one valve together, as an optimum may
+be a needle in a valley of several of them. One function judges them all.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.stats import qmc
+
+from stiction_ros.effects import FloatArray, FrictionLaw, Parameter
+from stiction_ros.identification.friction.grid import coarse_grid
+
+Judge = Callable[[FloatArray], FloatArray]
+"""The loss of rows (f_S, f_D, further parameters …, start), shape (G, 3 + n), as shape (G,)."""
+
+POINTS = 9  # per further parameter in the first grid
+MOST_POINTS = 60  # combinations of them
+PROPORTION = 20.0  # ratio of the ends from which on a range is searched in proportion
+UNBOUNDED = 100.0  # factor either way round its default where a parameter has no end
+THROWS = 14
+THROWN = 3000
+CENTRES = 30  # of the first boxes; with every throw the better half stays
+LEAST_CENTRES = 4
+RANKED = 3000  # best points of which they are taken
+SHRINK = 0.65
+BOX = 0.12  # of the first box: half its width, as a share of a range
+
+
+@dataclasses.dataclass(frozen=True)
+class Range:
+    """Where one further parameter is searched.
+
+    Attributes:
+        key: its name in YAML.
+        low, high: ends.
+        first: value it begins at.
+        logarithmic: whether in proportion.
+    """
+
+    key: str
+    low: float
+    high: float
+    first: float
+    logarithmic: bool
+
+    @classmethod
+    def of(cls, entry: Parameter, default: float | None) -> Range:
+        """Return the range of a parameter: its bounds, or some way round its default."""
+        low, high = entry.low, entry.high
+        centre = default if default is not None else 1.0
+        if not math.isfinite(low):
+            low = -UNBOUNDED * max(abs(centre), 1.0)
+        if not math.isfinite(high):
+            high = max(UNBOUNDED * abs(centre), low + UNBOUNDED)
+        logarithmic = low > 0.0 and high / low > PROPORTION
+        if default is None:
+            centre = math.sqrt(low * high) if logarithmic else 0.5 * (low + high)
+        return cls(entry.key, low, high, min(max(centre, low), high), logarithmic)
+
+    def outer(self, shares: FloatArray) -> FloatArray:
+        """Return the values at shares 0 … 1 of the range; what lies beyond ends there."""
+        shares = np.clip(shares, 0.0, 1.0)
+        if self.logarithmic:
+            return np.asarray(self.low * (self.high / self.low) ** shares)
+        return np.asarray(self.low + shares * (self.high - self.low))
+
+    def inner(self, values: FloatArray) -> FloatArray:
+        """Return the shares that belong to values."""
+        if self.high == self.low:
+            return np.zeros_like(values)
+        if self.logarithmic:
+            return np.asarray(np.log(values / self.low) / math.log(self.high / self.low))
+        return np.asarray((values - self.low) / (self.high - self.low))
+
+
+def ranges_of(law: type[FrictionLaw]) -> tuple[Range, ...]:
+    """Return where the parameters of a law behind its first two are searched."""
+    fields = {f.name: f.default for f in dataclasses.fields(law)}  # type: ignore[arg-type]
+    found = []
+    for entry in law.parameters()[2:]:
+        default = fields[entry.attribute]
+        given = None if default is dataclasses.MISSING else float(default)
+        if entry.key in law.held and given is not None:
+            found.append(Range(entry.key, given, given, given, False))
+            continue
+        found.append(Range.of(entry, given))
+    return tuple(found)
+
+
+def first_values(law: type[FrictionLaw]) -> tuple[float, ...]:
+    """Return the values that the further parameters of a law begin at."""
+    return tuple(each.first for each in ranges_of(law))
+
+
+def searched(law: type[FrictionLaw]) -> tuple[str, ...]:
+    """Return the keys of the further parameters of a law that are not held."""
+    return tuple(each.key for each in ranges_of(law) if each.high > each.low)
+
+
+@dataclasses.dataclass(frozen=True)
+class Settled:
+    """Every point that was judged, best first.
+
+    Attributes:
+        rows: (f_S, f_D, further …, start), %, shape (G, 3 + n).
+        loss: shape (G,).
+    """
+
+    rows: FloatArray
+    loss: FloatArray
+
+    def accepted(self, slack: float) -> FloatArray:
+        """Return the rows that are worse than the best by no more than ``slack``."""
+        return np.asarray(self.rows[self.loss <= self.loss[0] + slack])
+
+
+class FurtherSearch:
+    """Points over all parameters of one valve, in coordinates of one size."""
+
+    def __init__(self, law: type[FrictionLaw], limit: float, judge: Judge) -> None:
+        """Take the law, the largest f_S in %, and what judges."""
+        self.ranges, self.limit, self.judge = ranges_of(law), limit, judge
+        self._rows: list[FloatArray] = []
+        self._loss: list[FloatArray] = []
+
+    def everywhere(self) -> Settled:
+        """Judge the whole triangle of frictions with every combination of the others."""
+        each = min(POINTS, max(int(MOST_POINTS ** (1.0 / len(self.ranges))), 2))
+        axes = [np.unique([*r.outer(np.linspace(0.0, 1.0, each)), r.first]) for r in self.ranges]
+        mesh = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+        grid = coarse_grid(self.limit)
+        rows = np.hstack(
+            [
+                np.repeat(grid, len(mesh), axis=0),
+                np.tile(mesh, (len(grid), 1)),
+                np.zeros((len(grid) * len(mesh), 1)),
+            ]
+        )
+        self._take(rows)
+        return self._scattered(BOX)
+
+    def round_about(self, row: FloatArray, size: float = 0.1) -> Settled:
+        """Judge points round a row, closer and closer.
+
+        Args:
+            row: (f_S, f_D, further …, start), shape (3 + n,).
+            size: half the width of the first box, as a share of the ranges.
+        """
+        self._take(row[None, :])
+        return self._scattered(size)
+
+    def _scattered(self, size: float) -> Settled:
+        halton = qmc.Halton(3 + len(self.ranges), seed=0)
+        count = CENTRES
+        for _ in range(THROWS):
+            found = self._found()
+            centres = self._apart(found, count, 0.5 * size)
+            cubes = 2.0 * halton.random(THROWN) - 1.0
+            at = centres[np.arange(THROWN) % len(centres)] + size * cubes
+            self._take(self._outer(at))
+            size, count = size * SHRINK, max(count // 2, LEAST_CENTRES)
+        return self._found()
+
+    def _apart(self, found: Settled, count: int, distance: float) -> FloatArray:
+        """Return coordinates of the best points that are apart in one coordinate at least."""
+        at = self._inner(found.rows[:RANKED])
+        chosen: list[FloatArray] = []
+        for place in at:
+            if all(np.abs(place - other).max() > distance for other in chosen):
+                chosen.append(place)
+            if len(chosen) == count:
+                break
+        return np.array(chosen)
+
+    def _take(self, rows: FloatArray) -> None:
+        self._rows.append(rows)
+        self._loss.append(self.judge(rows))
+
+    def _found(self) -> Settled:
+        rows, loss = np.vstack(self._rows), np.concatenate(self._loss)
+        order = np.argsort(loss, kind="stable")
+        return Settled(rows[order], loss[order])
+
+    def _inner(self, rows: FloatArray) -> FloatArray:
+        """Return coordinates: S and J over the limit, shares of ranges, start over f_S."""
+        static, dynamic = rows[:, 0], rows[:, 1]
+        columns = [(static + dynamic) / self.limit, (static - dynamic) / self.limit]
+        columns += [r.inner(rows[:, 2 + k]) for k, r in enumerate(self.ranges)]
+        columns.append(rows[:, -1] / np.maximum(static, 1e-9 * self.limit))
+        return np.column_stack(columns)
+
+    def _outer(self, at: FloatArray) -> FloatArray:
+        band = np.clip(at[:, 0], 0.0, 2.0) * self.limit
+        jump = np.clip(at[:, 1] * self.limit, 0.0, band)
+        static = np.clip(0.5 * (band + jump), 1e-6 * self.limit, self.limit)
+        dynamic = np.clip(0.5 * (band - jump), 0.0, static)
+        columns = [static, dynamic]
+        columns += [r.outer(at[:, 2 + k]) for k, r in enumerate(self.ranges)]
+        columns.append(np.clip(at[:, -1], -1.0, 1.0) * static)
+        return np.column_stack(columns)

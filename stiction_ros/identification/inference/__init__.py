@@ -1,0 +1,1 @@
+"""From the best model to a verdict: intervals, units, what is exact."""

@@ -1,0 +1,1 @@
+"""Compiled sums over samples that the searches share."""

@@ -1,0 +1,1 @@
+"""Linear models of whole records: ARX, ARMAX, state space."""

@@ -1,0 +1,209 @@
+"""One face for the linear models of a whole record: ARX, ARMAX and state space."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.identification.linear.data import (
+    LinearData,
+    LinearKind,
+    LinearStatus,
+    OrderCriterion,
+    prepare_linear,
+)
+from stiction_ros.identification.linear.orders import (
+    OrderChoice,
+    OrderOptions,
+    choose_orders,
+)
+from stiction_ros.identification.linear.result import (
+    LinearIdentification,
+    arx_result,
+    state_space_result,
+)
+from stiction_ros.identification.linear.subspace import (
+    StateSpaceFit,
+    SubspaceOptions,
+    fit_state_space,
+)
+from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
+from stiction_ros.records.record import Record
+
+DEFAULT_ORDERS = (1, 2, 3)
+CONTROLLER_SHARE = 0.98
+CLOSED_LOOP = (
+    "the record has set-points, so a controller was at work; the method predictor allows for it",
+)
+Progress = Callable[[float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class LinearOptions:
+    """Options of :func:`fit_linear`.
+
+    Attributes:
+        kind: structure of the model.
+        order: n of a state-space model; None chooses.
+        output_order, input_order, noise_order: n_a, n_b and n_c of ARX and ARMAX; None
+            chooses n_a among 1, 2 and 3 and takes n_b = n_a, n_c = n_a.
+        delay: inclusive range of t_d, samples.
+        criterion: AIC or BIC, for every order that is not given.
+        method: projection of the state-space model.
+
+    Raises:
+        InputError: orders that do not belong to the structure.
+
+    Examples:
+        >>> from stiction_ros import LinearOptions
+        >>> LinearOptions(order=2).kind.value
+        'state_space'
+    """
+
+    kind: LinearKind = LinearKind.STATE_SPACE
+    order: int | None = None
+    output_order: int | None = None
+    input_order: int | None = None
+    noise_order: int | None = None
+    delay: tuple[int, int] = (0, 0)
+    criterion: OrderCriterion = OrderCriterion.BIC
+    method: SubspaceMethod = SubspaceMethod.CVA
+
+    def __post_init__(self) -> None:
+        space = self.kind is LinearKind.STATE_SPACE
+        polynomial = (self.output_order, self.input_order, self.noise_order)
+        if space and any(value is not None for value in polynomial):
+            raise InputError("n_a, n_b and n_c belong to arx and armax", fix="give the order n")
+        if not space and self.order is not None:
+            raise InputError(f"{self.kind} has no order n", where="order", fix="give na and nb")
+        if self.kind is LinearKind.ARX and self.noise_order:
+            raise InputError("arx has no n_c", where="nc", fix="use armax")
+
+    def polynomial(self) -> OrderOptions:
+        """Return what the orders of ARX and ARMAX are chosen from."""
+        return OrderOptions(
+            kind=self.kind,
+            output=DEFAULT_ORDERS if self.output_order is None else (self.output_order,),
+            input=() if self.input_order is None else (self.input_order,),
+            noise=self.noise_order,
+            delay=self.delay,
+            criterion=self.criterion,
+        )
+
+
+def fit_linear(
+    record: Record,
+    options: LinearOptions | None = None,
+    stem: FloatArray | None = None,
+    progress: Progress | None = None,
+) -> LinearIdentification:
+    """Fit a linear model of a record, without friction unless ``stem`` brings it.
+
+    Args:
+        record: what was measured.
+        options: None for the defaults.
+        stem: stem positions, shape (N, m), %, such as those of an identified friction; None
+            takes OP.
+        progress: called with the share done, 0 to 1.
+
+    Raises:
+        InputError: a record that no model can be fitted to.
+
+    Returns:
+        Fits, gains and poles with a status, and by ``loop_model`` the loop made of them.
+
+    Examples:
+        >>> from stiction_ros import LinearOptions, LoopModel, find_config
+        >>> from stiction_ros import fit_linear, prbs_experiment
+        >>> ideal = LoopModel.load(find_config("flow.loop.yaml")).with_ideal_valves()
+        >>> record = prbs_experiment(ideal, samples=400, seed=1)
+        >>> found = fit_linear(record, LinearOptions(order=1, delay=(0, 4)))
+        >>> found.gain.round(2).tolist(), found.delay.tolist()  # 0.8 per %, 2 samples
+        ([[0.8]], [[2]])
+    """
+    begun = time.perf_counter()
+    options = options or LinearOptions()
+    report = progress or (lambda share: None)
+    data = prepare_linear(record, stem)
+    if options.kind is LinearKind.STATE_SPACE:
+        found = state_space_result(data, _state_space(data, options))
+    else:
+        choices: list[OrderChoice] = []
+        for i in range(len(data.outputs)):
+            choices.append(choose_orders(data, i, options.polynomial()))
+            report((i + 1) / len(data.outputs))
+        found = arx_result(data, options.kind, tuple(choices))
+    report(1.0)
+    low, high = options.delay
+    notes = tuple(
+        f"delay of {valve} to {output} is the longest tried, try a wider range"
+        for i, output in enumerate(found.outputs)
+        for j, valve in enumerate(found.valves)
+        if found.delay[i, j] == high > low
+    )
+    if options.kind is LinearKind.STATE_SPACE and options.method is not SubspaceMethod.PREDICTOR:
+        notes += CLOSED_LOOP if record.sp is not None else ()
+    shares = controller_share(record.op, record.pv)
+    notes += tuple(
+        f"a PI law of PV explains the moves of {valve} (R² {share:.3f}): the record tells no "
+        "process from its controller, take one with set-point moves"
+        for valve, share in zip(record.valves, shares, strict=True)
+        if share > CONTROLLER_SHARE
+    )
+    seconds = time.perf_counter() - begun
+    return dataclasses.replace(found, seconds=seconds, notes=(*record.notes, *notes))
+
+
+def controller_share(op: FloatArray, pv: FloatArray) -> FloatArray:
+    """Return how much of the moves of each OP a PI law of the PVs alone explains.
+
+    Args:
+        op: shape (N, m).
+        pv: shape (N, p).
+
+    Returns:
+        R² of Δu_k on PV at k and k − 1, shape (m,). Near 1 the record lacks set-point moves,
+        and a model of it may be the controller turned upside down.
+    """
+    moves = np.diff(op, axis=0)
+    columns = np.hstack([pv[1:], pv[:-1], np.ones((len(moves), 1))])
+    left = moves - columns @ np.linalg.lstsq(columns, moves, rcond=None)[0]
+    spread = np.sum((moves - moves.mean(axis=0)) ** 2, axis=0)
+    return np.asarray(1.0 - np.sum(left**2, axis=0) / np.maximum(spread, 1e-300))
+
+
+def _state_space(data: LinearData, options: LinearOptions) -> StateSpaceFit:
+    """Return the better of the least delays and of those that ARX equations show."""
+    low, high = options.delay
+    wanted = SubspaceOptions(
+        order=options.order, method=options.method, criterion=options.criterion
+    )
+    tried = [(low,) * len(data.valves)]
+    if high > low:
+        rows = [
+            choose_orders(data, i, OrderOptions(output=(2,), delay=options.delay)).fit.delays
+            for i in range(len(data.outputs))
+        ]
+        # A delay belongs to the valve, so the output that answers first decides.
+        tried.append(tuple(int(d) for d in np.min(rows, axis=0)))
+    fits = [_on_one_window(data, wanted, delay, max(map(max, tried))) for delay in tried]
+    return min(fits, key=lambda fit: (fit.status is not LinearStatus.OK, _criterion(fit, wanted)))
+
+
+def _on_one_window(
+    data: LinearData, options: SubspaceOptions, delay: tuple[int, ...], longest: int
+) -> StateSpaceFit:
+    """Return the fit with these delays on the outputs from sample ``longest`` on."""
+    late = longest - max(delay)
+    part = dataclasses.replace(data, u=data.u[:, late:], y=data.y[:, late:])
+    return fit_state_space(part, dataclasses.replace(options, delay=delay))
+
+
+def _criterion(fit: StateSpaceFit, options: SubspaceOptions) -> float:
+    rows = [row for row in fit.rivals if row.order == fit.order]
+    return rows[0].value(options.criterion) if rows else float("inf")

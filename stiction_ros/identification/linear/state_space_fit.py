@@ -1,0 +1,243 @@
+r"""Matrices of an innovation model from its states, and the errors of such a model.
+
+.. math::
+    \xi_{k+1} &= A \xi_k + B \chi_k + K e_k \\
+    y_k &= C \xi_k + y_0 + e_k
+
+With A, C and K given, the error is linear in B, ξ_0 and y_0: driven by χ alone it is the
+free-run error, driven by χ and y through A − K C the one-step error.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.linear.subspace_projection import StateSequence
+
+TINY = 1e-24
+"""Variance, in that of the outputs, below which an error counts as none."""
+
+
+class Refinement(enum.StrEnum):
+    """Error that B, the initial state and the offset are refined on, by least squares.
+
+    The free-run error is right in open loop; where a controller feeds noise back, only the
+    one-step error is.
+    """
+
+    NONE = "none"
+    FREE_RUN = "free_run"
+    ONE_STEP = "one_step"
+
+
+@dataclasses.dataclass(frozen=True)
+class Realisation:
+    """An innovation model of centred, scaled data.
+
+    Attributes:
+        a, b, c, k: shapes (n, n), (n, m), (p, n), (n, p).
+        x0: ξ of the first sample, shape (n,).
+        y0: offset, shape (p,).
+    """
+
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    k: FloatArray
+    x0: FloatArray
+    y0: FloatArray
+
+    @property
+    def radius(self) -> float:
+        """Largest pole, |λ|."""
+        return spectral_radius(self.a)
+
+    @property
+    def predictor_radius(self) -> float:
+        """Largest pole of the one-step predictor A − K C."""
+        return spectral_radius(self.a - self.k @ self.c)
+
+
+def spectral_radius(matrix: FloatArray) -> float:
+    """Return the largest absolute eigenvalue; 0 for an empty matrix."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
+
+
+def realise(sequence: StateSequence, order: int, u: FloatArray, y: FloatArray) -> Realisation:
+    """Return the matrices of the first ``order`` states by two regressions.
+
+    C and the innovations from y on ξ, then A, B and K from ξ one sample later on ξ, χ and the
+    innovations; a constant stands in both. :func:`with_best_gain` may change K afterwards.
+    """
+    s, n = sequence.horizon, order
+    states = sequence.states[:n]
+    now, later = states[:, :-1], states[:, 1:]
+    ones = np.ones((1, now.shape[1]))
+    output, residual = _regress(y[:, s:], np.vstack([now, ones]))
+    dynamics, _ = _regress(later, np.vstack([now, ones, u[:, s:], residual]))
+    a, b, k = dynamics[:, :n], dynamics[:, n + 1 : n + 1 + len(u)], dynamics[:, n + 1 + len(u) :]
+    return _with_constant(a, b, output[:, :n], k, dynamics[:, n], output[:, n])
+
+
+def realise_by_shift(
+    sequence: StateSequence, order: int, u: FloatArray, y: FloatArray
+) -> Realisation:
+    """Return the matrices of the first ``order`` states, A from the observability matrix.
+
+    The rows of Γ one block down are Γ Ã, with Ã = A or A − K C. B and K then follow from ξ one
+    sample later on χ and on the innovations, or on y. A record in which OP is as good as a
+    function of PV leaves the regression of :func:`realise` without a unique A; this one has it.
+    """
+    s, n, p, m = sequence.horizon, order, len(y), len(u)
+    observability = sequence.observability[:, :n]
+    transition: FloatArray = np.asarray(
+        np.linalg.lstsq(observability[:-p], observability[p:], rcond=1e-10)[0], dtype=float
+    )
+    c = observability[:p]
+    states = sequence.states[:n]
+    now, later = states[:, :-1], states[:, 1:]
+    ones = np.ones((1, now.shape[1]))
+    offset = (y[:, s:] - c @ now).mean(axis=1)
+    drive = y[:, s:] if sequence.predicting else y[:, s:] - c @ now - offset[:, None]
+    dynamics, _ = _regress(later - transition @ now, np.vstack([ones, u[:, s:], drive]))
+    b, k, shift = dynamics[:, 1 : 1 + m], dynamics[:, 1 + m :], dynamics[:, 0]
+    if sequence.predicting:
+        transition, shift = transition + k @ c, shift + k @ offset
+    return _with_constant(transition, b, c, k, shift, offset)
+
+
+def _with_constant(
+    a: FloatArray, b: FloatArray, c: FloatArray, k: FloatArray, shift: FloatArray, y0: FloatArray
+) -> Realisation:
+    """Move the constant ``shift`` of the state equation into the offset."""
+    rest = np.linalg.lstsq(np.eye(len(a)) - a, shift, rcond=None)[0]
+    return Realisation(a, b, c, k, np.zeros(len(a)), y0 + c @ rest)
+
+
+def with_best_gain(
+    model: Realisation, sequence: StateSequence, u: FloatArray, y: FloatArray
+) -> Realisation:
+    """Return ``model`` with the K of the smallest one-step error.
+
+    Tried are its own K, the stationary Kalman gain of the covariances that the states leave in
+    both equations, and K = 0, for which the one-step error is the free-run error.
+    """
+    s, n = sequence.horizon, len(model.a)
+    states = sequence.states[:n]
+    v = y[:, s:] - model.c @ states[:, :-1]
+    w = states[:, 1:] - model.a @ states[:, :-1] - model.b @ u[:, s:]
+    v, w = v - v.mean(axis=1, keepdims=True), w - w.mean(axis=1, keepdims=True)
+    gains = [model.k, _kalman_gain(model.a, model.c, w, v), np.zeros_like(model.k)]
+    rivals = [dataclasses.replace(model, k=k) for k in gains]
+
+    def loss(rival: Realisation) -> float:
+        if rival.predictor_radius >= 1.0:
+            return float("inf")
+        error = (y - predict(rival, u, y, one_step=True))[:, s:]
+        return float(np.linalg.slogdet(error @ error.T / error.shape[1] + TINY * np.eye(len(y)))[1])
+
+    return min(rivals, key=loss)
+
+
+def _regress(target: FloatArray, regressors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients and residual of ``target`` on the rows of ``regressors``."""
+    coefficients = np.asarray(np.linalg.lstsq(regressors.T, target.T, rcond=1e-9)[0].T, float)
+    return coefficients, target - coefficients @ regressors
+
+
+def _kalman_gain(a: FloatArray, c: FloatArray, w: FloatArray, v: FloatArray) -> FloatArray:
+    """Return K from the residuals of state and output equation; zero where none exists."""
+    count = w.shape[1]
+    q, r, s = w @ w.T / count, v @ v.T / count, w @ v.T / count
+    try:
+        p = solve_discrete_are(a.T, c.T, q, r, s=s)
+        return np.asarray(np.linalg.solve(c @ p @ c.T + r, (a @ p @ c.T + s).T).T)
+    except ValueError:  # LinAlgError is one
+        return np.zeros((len(a), len(c)))
+
+
+def _responses(transition: FloatArray, c: FloatArray, drives: FloatArray) -> FloatArray:
+    """Return C Z_k for Z_{k+1} = transition Z_k + drives_k, Z_0 = 0.
+
+    Args:
+        drives: shape (N, n, q).
+
+    Returns:
+        Shape (N, p, q).
+    """
+    state = np.zeros(drives.shape[1:])
+    out = np.empty((len(drives), len(c), drives.shape[2]))
+    for k, drive in enumerate(drives):
+        out[k] = c @ state
+        state = transition @ state + drive
+    return out
+
+
+def _free_decay(transition: FloatArray, c: FloatArray, samples: int) -> FloatArray:
+    """Return C transition^k, shape (N, p, n)."""
+    out = np.empty((samples, *c.shape))
+    row = c
+    for k in range(samples):
+        out[k] = row
+        row = row @ transition
+    return out
+
+
+def refine(model: Realisation, u: FloatArray, y: FloatArray, error: Refinement) -> Realisation:
+    """Return ``model`` with B, ξ_0 and y_0 that minimise the sum of squares of one error.
+
+    The model comes back unchanged for ``Refinement.NONE`` and where the error diverges.
+    """
+    k = model.k if error is Refinement.ONE_STEP else np.zeros_like(model.k)
+    transition = model.a - k @ model.c
+    if error is Refinement.NONE or spectral_radius(transition) >= 1.0:
+        return model
+    (n, m), (p, samples) = model.b.shape, y.shape
+    drives = np.zeros((samples, n, m * n + p + 1))
+    for j in range(m):
+        drives[:, :, j * n : (j + 1) * n] = u[j][:, None, None] * np.eye(n)
+    drives[:, :, m * n : m * n + p] = -k
+    drives[:, :, -1] = (k @ y).T
+    forced = _responses(transition, model.c, drives)
+    forced[:, :, m * n : m * n + p] += np.eye(p)
+    target = y.T - forced[:, :, -1]
+    decay = _free_decay(transition, model.c, samples)
+    columns = np.concatenate([forced[:, :, :-1], decay], axis=2).reshape(samples * p, -1)
+    solution = np.linalg.lstsq(columns, target.ravel(), rcond=1e-10)[0]
+    return dataclasses.replace(
+        model,
+        b=solution[: m * n].reshape(m, n).T,
+        y0=solution[m * n : m * n + p],
+        x0=solution[m * n + p :],
+    )
+
+
+def with_initial_state(model: Realisation, u: FloatArray, y: FloatArray) -> Realisation:
+    """Return ``model`` with the ξ_0 that fits its free run best; unchanged when unstable."""
+    if model.radius >= 1.0:
+        return model
+    forced = _responses(model.a, model.c, (model.b @ u).T[:, :, None])[:, :, 0]
+    target = y.T - model.y0 - forced
+    decay = _free_decay(model.a, model.c, y.shape[1])
+    x0 = np.linalg.lstsq(decay.reshape(-1, len(model.a)), target.ravel(), rcond=1e-10)[0]
+    return dataclasses.replace(model, x0=np.asarray(x0, dtype=float))
+
+
+def predict(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> FloatArray:
+    """Return ŷ, shape (p, N): in free run, or one step ahead with the gain K."""
+    transition = model.a - model.k @ model.c if one_step else model.a
+    drive = model.b @ u
+    if one_step:
+        drive = drive + model.k @ (y - model.y0[:, None])
+    state = model.x0
+    out = np.empty_like(y)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(y.shape[1]):
+            out[:, k] = model.c @ state
+            state = transition @ state + drive[:, k]
+    return out + model.y0[:, None]

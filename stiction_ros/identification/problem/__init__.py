@@ -1,0 +1,1 @@
+"""A record made ready, and the models that are fitted to it."""

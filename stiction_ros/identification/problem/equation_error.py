@@ -1,0 +1,320 @@
+r"""The one-step criterion of the paper, shared by all methods.
+
+.. math:: y_k = \phi_k^T \theta + c + v_k \quad (9), (13), \qquad
+          \mathrm{SE} = \sum_{k \ge \varepsilon} (y_k - \phi_k^T \theta - c)^2 \quad (14)
+
+The constant c is always fitted. The criterion of a record is the mean of SE over its outputs,
+(12a), in squared engineering units of PV. Rivals with different delays are compared over the
+same rows: ε is computed with the longest delay that is tried.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import lstsq
+from scipy.signal import lfilter, lfiltic
+
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.identification.kernels.polynomials import stabilised
+from stiction_ros.records.record import Record
+
+RANK_TOLERANCE = 1e-12
+BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
+Delays = tuple[tuple[int, ...], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class ArxOrders:
+    """Orders of the ARX equations and the first row of the criterion.
+
+    Attributes:
+        output: n_a ≥ 1.
+        input: n_b ≥ 1, for every valve.
+        first: ε, first sample of the criterion, at least n_a and n_b plus the longest delay.
+        channels: for each output its n_a^(i) and the n_bj^(i) of every valve, (8a) to (8c), none
+            above ``output`` and ``input``; None where all are alike.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    output: int
+    input: int
+    first: int
+    channels: tuple[tuple[int, tuple[int, ...]], ...] | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("output", "input"):
+            if getattr(self, key) < 1:
+                raise InputError(f"order {getattr(self, key)} is below 1", where=key)
+        for output, inputs in self.channels or ():
+            if not 1 <= output <= self.output or not all(1 <= n <= self.input for n in inputs):
+                raise InputError(
+                    f"orders {output}, {inputs} do not lie between 1 and the largest", where="na"
+                )
+        if self.first < max(self.output, self.input):
+            raise InputError(f"row {self.first} has no complete past", where="first")
+
+    @classmethod
+    def over(cls, output: int, input: int, longest_delays: Sequence[int]) -> ArxOrders:
+        """Return orders with ε = max(n_a, Σ_j (n_b + t_d,j)) as printed under (12).
+
+        Args:
+            output: n_a.
+            input: n_b.
+            longest_delays: for each valve the longest delay of the tried range, samples.
+        """
+        return cls(output, input, max(output, sum(input + delay for delay in longest_delays)))
+
+    def of_output(self, output: int, valves: int) -> tuple[int, tuple[int, ...]]:
+        """Return n_a^(i) and the n_bj^(i) of all valves, for the output at this place."""
+        if self.channels is None:
+            return self.output, (self.input,) * valves
+        return self.channels[output]
+
+    def kept(self, output: int, valves: int) -> BoolArray:
+        """Return which entries of θ^(i) are unknowns, shape (n_a + m n_b,); others are 0."""
+        past, inputs = self.of_output(output, valves)
+        rows = [np.arange(self.input) < count for count in inputs]
+        return np.concatenate([np.arange(self.output) < past, *rows])
+
+
+@dataclasses.dataclass(frozen=True)
+class ArxFit:
+    """Least-squares ARX model of one output.
+
+    Attributes:
+        delays: t_d per valve, samples.
+        a: a_1 … a_na, shape (n_a,), sign as in (8a).
+        b: shape (m, n_b), engineering units of PV per % of travel.
+        constant: c, engineering units.
+        squared_error: SE of (14), squared engineering units.
+        residuals: y − ŷ from sample ε on, shape (N − ε,).
+    """
+
+    delays: tuple[int, ...]
+    a: FloatArray
+    b: FloatArray
+    constant: float
+    squared_error: float
+    residuals: FloatArray
+
+    @property
+    def largest_root(self) -> float:
+        """Modulus of the largest root of A(q); the model is stable below 1."""
+        return largest_root(self.a)
+
+    def judged(self, y: FloatArray, stems: FloatArray, orders: ArxOrders) -> ArxFit:
+        """Return the same model with SE and residuals over output y, (N,), and stems, (m, N)."""
+        theta = np.concatenate([self.a, self.b.ravel()])
+        predicted = regressors(y, stems, self.delays, orders) @ theta + self.constant
+        residuals = y[orders.first :] - predicted
+        error = float(residuals @ residuals)
+        return dataclasses.replace(self, squared_error=error, residuals=residuals)
+
+    def free_run(self, y: FloatArray, stems: FloatArray, first: int) -> FloatArray:
+        """Return the free run from sample ``first`` on, started from the measured past.
+
+        Args:
+            y: measured output, shape (N,).
+            stems: shape (m, N), %.
+            first: ε.
+
+        Returns:
+            Shape (N − first,); not finite where an unstable model overflows.
+        """
+        count = len(y)
+        driven = np.full(count - first, self.constant)
+        for stem, delay, row in zip(stems, self.delays, self.b, strict=True):
+            for lag, gain in enumerate(row, start=1):
+                driven += gain * stem[first - delay - lag : count - delay - lag]
+        polynomial = np.concatenate([[1.0], self.a])
+        past = lfiltic([1.0], polynomial, y[first - len(self.a) : first][::-1])
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(lfilter([1.0], polynomial, driven, zi=past)[0])
+
+
+@dataclasses.dataclass(frozen=True)
+class EquationError:
+    """The criterion of one record at one friction.
+
+    Attributes:
+        fits: one ARX model per output.
+        stems: simulated stem positions, shape (m, N), %.
+    """
+
+    fits: tuple[ArxFit, ...]
+    stems: FloatArray
+
+    @property
+    def squared_error(self) -> float:
+        """Mean of SE over the outputs, (12a), squared engineering units."""
+        return float(np.mean([fit.squared_error for fit in self.fits]))
+
+
+def largest_root(a: FloatArray) -> float:
+    """Return the modulus of the largest root of 1 + a_1 q⁻¹ + … + a_na q⁻ⁿᵃ."""
+    return float(np.abs(np.roots(np.concatenate([[1.0], a]))).max(initial=0.0))
+
+
+def regressors(
+    y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: ArxOrders
+) -> FloatArray:
+    """Return Φ of (13) without the constant, shape (N − ε, n_a + m n_b)."""
+    first, count = orders.first, len(y)
+    columns = [-y[first - lag : count - lag] for lag in range(1, orders.output + 1)]
+    for stem, delay in zip(stems, delays, strict=True):
+        columns += [
+            stem[first - delay - lag : count - delay - lag] for lag in range(1, orders.input + 1)
+        ]
+    return np.stack(columns, axis=1)
+
+
+def fit_arx(
+    y: FloatArray,
+    stems: FloatArray,
+    delays: tuple[int, ...],
+    orders: ArxOrders,
+    kept: BoolArray | None = None,
+) -> ArxFit:
+    """Fit one output by least squares, (9) and (13) with a constant.
+
+    Columns are centred and scaled and then solved by a rank-revealing QR decomposition, so
+    that SE is good to about 1e-12 of itself. A stem that never moves has no effect.
+
+    Args:
+        y: output, shape (N,), engineering units.
+        stems: shape (m, N), %.
+        delays: t_d per valve, samples.
+        orders: n_a, n_b, ε.
+        kept: entries of θ that are unknowns; None for all.
+
+    Raises:
+        InputError: a delay that reaches back before the first sample, or too few rows.
+    """
+    if max(delays, default=0) + orders.input > orders.first:
+        raise InputError(
+            f"delay {max(delays)} reaches back before the first sample",
+            where="delay",
+            fix=f"compute the first row with it; it is {orders.first}",
+        )
+    if len(y) - orders.first <= orders.output + len(stems) * orders.input + 1:
+        raise InputError(f"{len(y)} samples are too few for an ARX model", fix="use more samples")
+    phi, target = regressors(y, stems, delays, orders), y[orders.first :]
+    middle, level = phi.mean(axis=0), float(target.mean())
+    phi = phi - middle
+    scale = np.sqrt(np.einsum("ij,ij->j", phi, phi))
+    moving = scale > 1e-13 * np.maximum(1.0, np.abs(middle)) * np.sqrt(len(phi))
+    if kept is not None:
+        moving &= kept
+    phi = phi[:, moving] / scale[moving]
+    centred = target - level
+    solution = lstsq(phi, centred, cond=RANK_TOLERANCE, lapack_driver="gelsy")[0]
+    residuals = centred - phi @ solution
+    theta = np.zeros(len(scale))
+    theta[moving] = solution / scale[moving]
+    return ArxFit(
+        delays=delays,
+        a=theta[: orders.output],
+        b=theta[orders.output :].reshape(len(stems), orders.input),
+        constant=level - float(middle @ theta),
+        squared_error=float(residuals @ residuals),
+        residuals=residuals,
+    )
+
+
+def stable_arx(
+    y: FloatArray,
+    stems: FloatArray,
+    delays: tuple[int, ...],
+    orders: ArxOrders,
+    kept: BoolArray | None = None,
+) -> ArxFit:
+    """Return :func:`fit_arx`, or where that is unstable a stable model near it.
+
+    Roots outside 0.99 are pulled onto that circle; then b and c are fitted again.
+    """
+    fit = fit_arx(y, stems, delays, orders, kept)
+    if fit.largest_root < 1.0:
+        return fit
+    free = np.ones(len(stems) * orders.input, bool) if kept is None else kept[orders.output :]
+    a = stabilised(np.concatenate([[1.0], fit.a]))[1:]
+    phi = regressors(y, stems, delays, orders)
+    rest = y[orders.first :] - phi[:, : orders.output] @ a
+    columns = np.column_stack([phi[:, orders.output :][:, free], np.ones(len(rest))])
+    solution = lstsq(columns, rest, cond=RANK_TOLERANCE, lapack_driver="gelsy")[0]
+    residuals = rest - columns @ solution
+    flat = np.zeros(len(free))
+    flat[free] = solution[:-1]
+    b = flat.reshape(len(stems), orders.input)
+    error = float(residuals @ residuals)
+    return ArxFit(delays, a, b, float(solution[-1]), error, residuals)
+
+
+def fit_outputs(
+    pv: FloatArray, stems: FloatArray, delays: Delays, orders: ArxOrders
+) -> EquationError:
+    """Fit every output.
+
+    Args:
+        pv: shape (N, p), engineering units.
+        stems: shape (m, N), %.
+        delays: for each output the t_d of each valve, samples.
+        orders: n_a, n_b, ε.
+    """
+    fits = tuple(
+        fit_arx(y, stems, row, orders, orders.kept(i, len(stems)))
+        for i, (y, row) in enumerate(zip(pv.T, delays, strict=True))
+    )
+    return EquationError(fits, stems)
+
+
+def simulate_stems(op: FloatArray, friction: FloatArray) -> FloatArray:
+    """Return stem positions under He's law (4), shape (m, N), %.
+
+    The stem before the first sample is the first OP.
+
+    Args:
+        op: shape (N, m), %.
+        friction: rows (f_S, f_D), shape (m, 2), %; f_D above f_S is taken as f_S.
+    """
+    rows = np.column_stack([friction[:, 0], np.minimum(friction[:, 0], friction[:, 1])])
+    stems = [
+        HeStiction.simulate_grid(row[None, :], u, float(u[0]))[:, 0]
+        for u, row in zip(op.T, rows, strict=True)
+    ]
+    return np.array(stems)
+
+
+def evaluate(
+    record: Record, friction: FloatArray, delays: Delays, orders: ArxOrders
+) -> EquationError:
+    """Simulate He's valve (4) and fit every output: any method's answer on equal terms.
+
+    Args:
+        record: what was measured.
+        friction: rows (f_S, f_D) per valve, shape (m, 2), %.
+        delays: for each output the t_d of each valve, samples.
+        orders: n_a, n_b, ε.
+
+    Raises:
+        InputError: shapes that do not fit the record, or a friction that is no number ≥ 0.
+    """
+    friction = np.asarray(friction, dtype=float)
+    if friction.shape != (len(record.valves), 2):
+        raise InputError(f"friction has shape {friction.shape}", where=record.name)
+    if not (np.isfinite(friction).all() and (friction >= 0.0).all()):
+        raise InputError("friction is negative or not finite", where=record.name)
+    if [len(row) for row in delays] != [len(record.valves)] * len(record.outputs):
+        raise InputError("delays need one row per output, one entry per valve", where="delay")
+    return fit_outputs(record.pv, simulate_stems(record.op, friction), delays, orders)
+
+
+def squared_error(record: Record, friction: FloatArray, delays: Delays, orders: ArxOrders) -> float:
+    """Return (12a) of :func:`evaluate`: SE under He's hard law, squared engineering units."""
+    return evaluate(record, friction, delays, orders).squared_error

@@ -1,0 +1,326 @@
+r"""Can a record be worked on, and were OP and PV swapped in it?
+
+Of a swap there are two signs; only clear ones count.
+
+*Set-point.* PV tracks SP, OP does not. Where the column called OP lies at least ten times
+closer to SP than the column called PV and has no lasting offset from it, they are swapped.
+
+*Controller.* A linear controller acts at once and without noise,
+
+.. math:: \sum_{i=0}^{n} a_i u_{k-i} = \sum_{i=0}^{n} b_i y_{k-i} + c, \quad a_0, b_0 \neq 0.
+
+With integral action :math:`\sum a_i = 0` and :math:`\sum b_i \neq 0`. A process has noise, so
+this is the only exact relation in a record, and the side on which the coefficients add up to
+zero belongs to OP. Where OP carries noise or is rounded or compressed, there is no exact
+relation and no evidence; nor where a column follows exactly from the past, as then there is no
+noise and the process may obey an exact relation of its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Record
+
+TOO_SHORT = "take a longer record, lower orders or a narrower delay range"
+CLOSER = 0.1  # distance of OP from SP over that of PV from which they are swapped
+OFFSET = 0.3  # lasting offset, as a share of the standard deviation of the error
+TRACKED = 0.7  # error, as a share of the standard deviation of a moving SP
+MAX_ORDER = 8
+MAX_SAMPLES = 4000
+WINDOWS = 60  # stretches of a record in which an exact relation is looked for
+FEW = 6  # of them that are solved together
+EXACT = 1e-7  # largest error of an exact relation within its stretch, in standard deviations
+CLOSE = 1e-6  # the same over the whole record, where it must hold in SHARE of the samples
+SHARE = 0.7
+SINGULAR = 1e-10  # smallest ratio of singular values; below it the relation is not unique
+AT_ONCE = 1e-3  # least share of the lag-0 coefficient in the largest one
+SIDES = 100.0  # how much closer to zero the coefficients of one side must add up
+
+
+def require_signals(record: Record) -> None:
+    """Refuse a record with gaps, without valves or outputs, or with a signal that never moves.
+
+    Raises:
+        InputError: gaps or bad samples, no valve, no output, or a constant OP or PV.
+    """
+    require_tags(record)
+    require_motion(record, "op", record.op, record.valves)
+    require_motion(record, "pv", record.pv, record.outputs)
+
+
+def require_whole(record: Record) -> None:
+    """Refuse a record with gaps or bad samples."""
+    if record.gaps or (record.quality == Quality.BAD).any():
+        raise InputError(
+            "has gaps or bad samples", where=record.name, fix="take one of its good parts"
+        )
+
+
+def require_tags(record: Record) -> None:
+    """Refuse a record with gaps, or without valves or outputs."""
+    require_whole(record)
+    if not record.valves or not record.outputs:
+        raise InputError("needs at least one valve and one output", where=record.name)
+
+
+def require_motion(record: Record, what: str, values: FloatArray, tags: tuple[str, ...]) -> None:
+    """Refuse columns, shape (N, number of tags), of which one never moves."""
+    for tag, column in zip(tags, values.T, strict=True):
+        if len(column) and np.ptp(column) <= 1e-9 * max(1.0, float(np.abs(column).max())):
+            raise InputError(
+                f"{what} of {tag} is constant",
+                where=record.name,
+                fix="choose a window in which the loop moves",
+            )
+
+
+def require_samples(record: Record, needed: int, fix: str) -> None:
+    """Refuse a record of fewer than ``needed`` samples."""
+    if len(record) < needed:
+        raise InputError(
+            f"{len(record)} samples are too few, {needed} are needed", where=record.name, fix=fix
+        )
+
+
+class SwapRule(enum.StrEnum):
+    """Which sign showed the swap."""
+
+    SET_POINT = "set_point"
+    CONTROLLER = "controller"
+
+
+@dataclasses.dataclass(frozen=True)
+class Evidence:
+    """Clear evidence that OP and PV are swapped.
+
+    Attributes:
+        rule: the sign.
+        reason: one sentence for people.
+        ratio: distance of the column OP from SP over that of the column PV, of the output
+            where it is largest; or the sum of the coefficients on the side of PV over that
+            on the side of OP.
+    """
+
+    rule: SwapRule
+    reason: str
+    ratio: float
+
+
+class _Past(enum.Enum):
+    """What a column is computed from; the value is the least lag of the other columns."""
+
+    AND_PRESENT = 0
+    ALONE = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class _Relation:
+    """Exact relation of one column to others, by the :func:`_share` of either side."""
+
+    own: float
+    others: float
+
+
+def swapped_columns(record: Record) -> Evidence | None:
+    """Return the evidence that OP and PV are swapped in ``record``, or None.
+
+    Args:
+        record: m valves, p outputs; the set-point sign needs m = p, in the same order.
+    """
+    if any(not np.ptp(part) > 0.0 for part in (*record.op.T, *record.pv.T) if len(part)):
+        return None
+    by_set_point = _set_point_ratio(record)
+    by_controller = _controller_ratio(record)
+    if by_set_point is not None and by_set_point >= 1.0 / CLOSER:
+        return None
+    if by_controller is not None and by_controller >= SIDES:
+        return None
+    if by_set_point is not None:
+        reason = (
+            f"the column taken for OP lies {1.0 / max(by_set_point, 1e-9):.0f} times closer to "
+            "the set-point than the one taken for PV"
+        )
+        return Evidence(SwapRule.SET_POINT, reason, by_set_point)
+    if by_controller is not None:
+        reason = (
+            "the columns obey an exact controller equation whose integral action lies on the "
+            "side of the column taken for PV"
+        )
+        return Evidence(SwapRule.CONTROLLER, reason, by_controller)
+    return None
+
+
+def refuse_swapped(record: Record, evidence: Evidence | None) -> None:
+    """Raise InputError where there is evidence that OP and PV of ``record`` are swapped."""
+    if evidence is not None:
+        raise InputError(
+            f"OP and PV look swapped: {evidence.reason}",
+            where=record.name,
+            fix="exchange the columns, as with --op V1=COLUMN --pv PV1=COLUMN",
+        )
+
+
+def _set_point_ratio(record: Record) -> float | None:
+    """Return the ratio of distances from SP: ≤ CLOSER swapped, ≥ 1 / CLOSER not; else None."""
+    if record.sp is None or len(record.valves) != len(record.outputs):
+        return None
+    ratios = []
+    for i in range(len(record.outputs)):
+        sp = record.sp[:, i]
+        op_error, pv_error = record.op[:, i] - sp, record.pv[:, i] - sp
+        far, near = _size(pv_error), _size(op_error)
+        if near <= CLOSER * far and _tracks(op_error, sp):
+            ratios.append(near / far)
+        elif far <= CLOSER * near and _tracks(pv_error, sp):
+            ratios.append(_over(near, far))
+        else:
+            return None
+    swapped = [ratio < 1.0 for ratio in ratios]
+    if all(swapped):
+        return max(ratios)
+    return None if any(swapped) else min(ratios)
+
+
+def _tracks(error: FloatArray, sp: FloatArray) -> bool:
+    return bool(
+        abs(error.mean()) <= OFFSET * error.std() or _size(error) <= TRACKED * float(sp.std())
+    )
+
+
+def _size(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _controller_ratio(record: Record) -> float | None:
+    """Return Σ|b| on PV's side over Σ|a| on OP's: ≤ 1 / SIDES swapped, ≥ SIDES not; else None.
+
+    Both sums are :func:`_share`; several relations must agree, the least clear is returned.
+    """
+    part = record.part(0, min(len(record), MAX_SAMPLES))
+    op, pv = _scaled_changes(part.op), _scaled_changes(part.pv)
+    of_op = [_exact_relation(column, pv) for column in op]
+    of_pv = [_exact_relation(column, op) for column in pv]
+    ratios = [_over(found.others, found.own) for found in of_op if found is not None]
+    ratios += [_over(found.own, found.others) for found in of_pv if found is not None]
+    if ratios and _follows_from_the_past(op, pv):
+        return None
+    if ratios and max(ratios) <= 1.0 / SIDES:
+        return max(ratios)
+    return min(ratios) if ratios and min(ratios) >= SIDES else None
+
+
+def _scaled_changes(columns: FloatArray) -> FloatArray:
+    """Return differences over their standard deviation, shape (columns, N); 0 without one.
+
+    Differences know no set-point but its moves.
+    """
+    changes = np.diff(columns, axis=0)
+    size = changes.std(axis=0)
+    scaled = np.where(size > 0.0, changes / np.where(size > 0.0, size, 1.0), 0.0)
+    return np.ascontiguousarray(scaled.T)
+
+
+def _follows_from_the_past(op: FloatArray, pv: FloatArray) -> bool:
+    """Tell whether a column is an exact function of earlier samples alone."""
+    directions = [(column, pv) for column in op] + [(column, op) for column in pv]
+    return any(
+        _fit(own, others, order, _Past.ALONE) is not None
+        for own, others in directions
+        for order in range(1, MAX_ORDER + 1)
+    )
+
+
+def _over(numerator: float, denominator: float) -> float:
+    return numerator / max(denominator, 1e-30)
+
+
+def _exact_relation(own: FloatArray, others: FloatArray) -> _Relation | None:
+    """Return the exact relation of lowest order with an integrator on one side, or None.
+
+    Args:
+        own: scaled changes of one column, shape (N,).
+        others: those of the columns that it is computed from, shape (q, N).
+    """
+    if not own.any() or not others.any(axis=1).all():
+        return None
+    for order in range(1, MAX_ORDER + 1):
+        theta = _fit(own, others, order)
+        if theta is None:
+            continue
+        a, b = np.concatenate([[1.0], -theta[:order]]), theta[order:].reshape(-1, order + 1)
+        if np.abs(b[:, 0]).max() < AT_ONCE * max(float(np.abs(b).max()), 1e-3):
+            continue
+        found = _Relation(_share(a), max(_share(row) for row in b))
+        low, high = sorted((found.own, found.others))
+        if high > SIDES * low:
+            return found
+    return None
+
+
+def _share(coefficients: FloatArray) -> float:
+    """Return |Σ c| / Σ |c|: 0 for the side that integrates."""
+    return float(abs(coefficients.sum()) / max(float(np.abs(coefficients).sum()), 1e-300))
+
+
+def _fit(
+    own: FloatArray, others: FloatArray, order: int, past: _Past = _Past.AND_PRESENT
+) -> FloatArray | None:
+    """Return the coefficients of an exact relation of ``order``, or None.
+
+    They are a₁ … a_n with the sign turned, then b₀ … b_n of each other column. With the past
+    alone b₀ is left out, and the relation need not be unique.
+    """
+    # Compiled code takes half a second to import, which those who identify nothing save.
+    from stiction_ros.identification.problem.exact_relation import explained_stretches
+
+    count = len(own) - order
+    width = max(3 * (order + len(others) * (order + 1 - past.value)), 30)
+    if count < 2 * width:
+        return None
+    starts = np.unique(np.linspace(0, count - width, WINDOWS).astype(int))
+    may = explained_stretches(own, others, (order, past.value), starts, width, EXACT)
+    if not may.any():
+        return None
+    columns = [own[order - i : order - i + count] for i in range(1, order + 1)]
+    columns += [
+        other[order - i : order - i + count]
+        for other in others
+        for i in range(past.value, order + 1)
+    ]
+    regressors, target = np.column_stack(columns), own[order:]
+    moving, starts = target != 0.0, starts[may]
+    if not moving.any():
+        return None
+    for begin in range(0, len(starts), FEW):  # mostly the first few will do
+        rows = starts[begin : begin + FEW, None] + np.arange(width)
+        for theta in _solutions(regressors[rows], target[rows], past):
+            error = np.abs(regressors[moving] @ theta - target[moving])
+            if np.mean(error < CLOSE) >= SHARE:
+                return np.asarray(theta)
+    return None
+
+
+def _solutions(regressors: FloatArray, target: FloatArray, past: _Past) -> FloatArray:
+    """Return coefficients, shape (…, q), of the stretches that they explain.
+
+    Args:
+        regressors: shape (stretches, width, q).
+        target: shape (stretches, width).
+    """
+    left, singular, right = np.linalg.svd(regressors, full_matrices=False)
+    kept = singular > np.finfo(float).eps * regressors.shape[1] * singular[:, :1]
+    along = np.einsum("wij,wi->wj", left, target)
+    along = np.where(kept, along / np.where(kept, singular, 1.0), 0.0)
+    solutions = np.einsum("wji,wj->wi", right, along)
+    residual = np.einsum("wij,wj->wi", regressors, solutions) - target
+    explained = np.abs(residual).max(axis=1) <= EXACT
+    if past is _Past.AND_PRESENT:
+        explained &= singular[:, -1] > SINGULAR * singular[:, 0]
+    return np.asarray(solutions[explained])

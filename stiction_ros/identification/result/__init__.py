@@ -1,0 +1,1 @@
+"""What identification returns, as values."""

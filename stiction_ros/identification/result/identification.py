@@ -1,0 +1,263 @@
+"""What identification returns: frozen values that can judge and print themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+
+from stiction_ros.effects import Stiction
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.result.cause import Cause
+from stiction_ros.identification.result.search_log import SearchLog
+from stiction_ros.identification.result.stability import Stability
+
+
+class VerdictKind(enum.StrEnum):
+    """What the record says about one valve.
+
+    Examples:
+        >>> from stiction_ros import VerdictKind
+        >>> VerdictKind("sticky") is VerdictKind.STICKY
+        True
+        >>> [kind.value for kind in VerdictKind if kind.has_friction]
+        ['sticky', 'backlash']
+    """
+
+    STICKY = "sticky"
+    BACKLASH = "backlash"
+    HEALTHY = "healthy"
+    UNDECIDED = "undecided"
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether friction is shown: with a jump (sticky), or without one (backlash)."""
+        return self in (VerdictKind.STICKY, VerdictKind.BACKLASH)
+
+
+class FitStatus(enum.StrEnum):
+    """How the identification ended; everything but ``OK`` is a failure as a value."""
+
+    OK = "ok"
+    NOT_CONVERGED = "not_converged"
+    NO_MODEL = "no_model"
+
+
+@dataclasses.dataclass(frozen=True)
+class ValveEstimate:
+    """Friction of one valve and the verdict on it.
+
+    Attributes:
+        name: tag of the valve.
+        verdict: sticky, backlash, healthy or undecided.
+        law: friction law that the figures belong to.
+        static_friction: f_S, %, the middle of its interval.
+        static_interval: values of f_S whose switching pattern the record does not reject, %.
+        dynamic_friction: f_D, %, the best fit.
+        dynamic_interval: values of f_D that the record does not reject, %.
+        jump: the smallest move of the stem, %, as the jump form of the law tells it; J = f_S − f_D
+            for a law that has none; 0 where the record does not distinguish the friction from a
+            pure deadband (J = 0).
+        stem_start: stem position before the first sample, %.
+        moves: number of samples at which the estimated stem moved.
+        evidence: named figures behind the verdict, see
+            :mod:`stiction_ros.identification.inference.verdict`.
+        profile: rows (f_S, least −2 log likelihood above the best) over the patterns that were
+            tried, f_S in %.
+        band_share: f_S + f_D over the width of OP's movement about its slow mean.
+        stability: how the answer holds at other rates and in halves; None where a method does
+            not look.
+        experiment: what would decide, with figures; empty where it is decided.
+        further: the law's parameters behind the first two, by their keys in YAML; empty where
+            it has no others or the valve no friction.
+        further_intervals: values of each that the record does not reject.
+    """
+
+    name: str
+    verdict: VerdictKind
+    law: str
+    static_friction: float
+    static_interval: tuple[float, float]
+    dynamic_friction: float
+    dynamic_interval: tuple[float, float]
+    jump: float
+    stem_start: float
+    moves: int
+    evidence: Mapping[str, float]
+    profile: tuple[tuple[float, float], ...] = ()
+    band_share: float = 0.0
+    stability: Stability | None = None
+    experiment: str = ""
+    further: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    further_intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+
+    def behaviour(self) -> Behaviour | None:
+        """Return the friction as an effect of a loop model; None for a valve without any."""
+        if self.static_friction <= 0.0:
+            return None
+        frictions = self.static_friction, min(self.dynamic_friction, self.static_friction)
+        law = find_law(self.law)
+        own = law.rows_of_frictions(np.array([frictions]))[0].tolist()
+        keys = [entry.key for entry in law.parameters()]
+        return law.from_mapping(dict(zip(keys, own, strict=False)) | dict(self.further))
+
+    def with_own_jump(self) -> Self:
+        """Return the estimate with the least move of its law, which need not be f_S − f_D."""
+        law = self.behaviour() if self.jump > 0.0 else None
+        form = law.jump_form() if isinstance(law, Stiction) else None
+        return self if form is None else dataclasses.replace(self, jump=form.least)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json``."""
+        return {
+            "name": self.name,
+            "verdict": self.verdict.value,
+            "band_share": self.band_share,
+            "stability": None if self.stability is None else self.stability.to_json(),
+            "law": self.law,
+            "f_s": self.static_friction,
+            "f_s_interval": list(self.static_interval),
+            "f_d": self.dynamic_friction,
+            "f_d_interval": list(self.dynamic_interval),
+            **self.further,
+            **{f"{key}_interval": list(ends) for key, ends in self.further_intervals.items()},
+            "jump": self.jump,
+            "evidence": dict(self.evidence),
+            "experiment": self.experiment or None,
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputModel:
+    r"""Linear part of one output, equations (7)-(9) with a constant.
+
+    .. math:: y_k = -\sum_i a_i y_{k-i} + \sum_j \sum_i b_{j,i} \chi^{(j)}_{k-i-t_{d,j}} + bias
+
+    driven by the stems in free run; what remains is autoregressive noise.
+
+    Attributes:
+        name: tag of the output.
+        a: a_1 … a_na, sign as in (8a).
+        b: per valve b_1 … b_nb, engineering units per %.
+        delay: per valve t_d, samples.
+        bias: constant of the equation, engineering units.
+        noise_std: standard deviation of the innovations, engineering units.
+        fit_one_step: NRMSE fit of the one-step prediction with the noise model, %.
+        fit_free_run: NRMSE fit of the free run, 100 (1 − ‖y − ŷ‖ / ‖y − mean y‖), %.
+        cause: of its oscillation; None where the loop was not closed again.
+    """
+
+    name: str
+    a: tuple[float, ...]
+    b: Mapping[str, tuple[float, ...]]
+    delay: Mapping[str, int]
+    bias: float
+    noise_std: float
+    fit_one_step: float
+    fit_free_run: float
+    cause: Cause | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json``."""
+        return {
+            "name": self.name,
+            "a": list(self.a),
+            "b": {valve: list(values) for valve, values in self.b.items()},
+            "delay": dict(self.delay),
+            "bias": self.bias,
+            "noise_std": self.noise_std,
+            "fit_one_step": self.fit_one_step,
+            "fit_free_run": self.fit_free_run,
+            "cause": None if self.cause is None else self.cause.to_json(),
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class OrderRow:
+    """One choice of orders, friction as the search found it.
+
+    Attributes:
+        output_order, input_order: n_a and n_b.
+        aic, bic: information criteria of the linear parts under the noise model; only
+            differences count.
+    """
+
+    output_order: int
+    input_order: int
+    aic: float
+    bic: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Identification:
+    """Everything one record says about its valves.
+
+    Attributes:
+        status: ok, or why there is no trustworthy model.
+        reason: one sentence; empty when ok.
+        method: name of the search.
+        samples, sample_time: of the record, seconds.
+        seconds: wall time spent.
+        valves, outputs: estimates in the order of the record.
+        stem: estimated stem positions, shape (N, m), %, read-only.
+        notes: remarks for people.
+        search: what the search tried and its squared error; None where a method keeps none.
+            The default search puts the friction and delays of least one-step SE here.
+        orders: all orders that were compared.
+        row_samples: samples that are one row where the friction was judged.
+
+    Examples:
+        >>> from stiction_ros import IdentificationOptions, LoopModel
+        >>> from stiction_ros import find_config, identify, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=400)
+        >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
+        >>> found.status.value, found.samples, found.stem.shape
+        ('ok', 400, (400, 1))
+    """
+
+    status: FitStatus
+    reason: str
+    method: str
+    samples: int
+    sample_time: float
+    seconds: float
+    valves: tuple[ValveEstimate, ...]
+    outputs: tuple[OutputModel, ...]
+    stem: FloatArray
+    notes: tuple[str, ...] = ()
+    search: SearchLog | None = None
+    orders: tuple[OrderRow, ...] = ()
+    row_samples: int = 1
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json`` but for ``record``."""
+        model: dict[str, Any] = {
+            "kind": "arx",
+            "status": self.status.value,
+            "reason": self.reason,
+            "method": self.method,
+            "notes": list(self.notes),
+        }
+        if self.search is not None:
+            model["search"] = self.search.to_json()
+        if self.orders:
+            model["orders"] = [dataclasses.asdict(row) for row in self.orders]
+        profiles = {v.name: [list(row) for row in v.profile] for v in self.valves if v.profile}
+        if profiles:
+            model["profiles"] = profiles
+        return {
+            "samples": self.samples,
+            "sample_time": self.sample_time,
+            "seconds": self.seconds,
+            "model": model,
+            "rate": {
+                "sample_time": self.sample_time,
+                "used": self.row_samples * self.sample_time,
+            },
+            "valves": [valve.to_json() for valve in self.valves],
+            "outputs": [output.to_json() for output in self.outputs],
+        }

@@ -1,0 +1,88 @@
+"""What a search tried and what its answer is worth, for reports and benchmarks."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from stiction_ros.identification.problem.equation_error import Delays
+
+CAPPED = "Maximum_Iterations_Exceeded"
+
+
+@dataclasses.dataclass(frozen=True)
+class SolvedStart:
+    """One run of IPOPT from one start with one choice of delays.
+
+    Attributes:
+        kind: ``border``, ``ellipse``, ``inside``, ``restart`` or ``delay``.
+        delays: for each output the t_d of each valve, samples.
+        start: (f_S, f_D) per valve where it began, %.
+        end: (f_S, f_D) per valve where it ended, %.
+        objective: (12a) of the programme, squared engineering units.
+        status: IPOPT's own word.
+        iterations: of IPOPT.
+        feasible, stable: whether constraints hold and every A(q) is stable.
+    """
+
+    kind: str
+    delays: Delays
+    start: tuple[tuple[float, float], ...]
+    end: tuple[tuple[float, float], ...]
+    objective: float
+    status: str
+    iterations: int
+    feasible: bool
+    stable: bool
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it may win."""
+        return self.feasible and self.stable
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values."""
+        return dataclasses.asdict(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class SearchLog:
+    """The answer of a method on the scale that all methods share, and the way to it.
+
+    Attributes:
+        squared_error: (12a) of the answer's (f_S, f_D, delays) under He's hard law with
+            least-squares coefficients, squared engineering units;
+            see :func:`stiction_ros.identification.problem.equation_error.squared_error`.
+        objective: what the method itself minimised, same units.
+        output_order, input_order, first: n_a, n_b and ε of both.
+        points: grid points, or frictions at which the programme evaluated (12a).
+        delays_tried: number of choices of delays.
+        starts: every start of the nonlinear programme, in order; empty for the others.
+        friction, delays: what ``squared_error`` belongs to where that is not the answer of the
+            method: (f_S, f_D) per valve, %, and the t_d of each valve per output.
+    """
+
+    squared_error: float
+    objective: float
+    output_order: int
+    input_order: int
+    first: int
+    points: int
+    delays_tried: int
+    starts: tuple[SolvedStart, ...] = ()
+    friction: tuple[tuple[float, float], ...] = ()
+    delays: Delays = ()
+
+    @property
+    def solves(self) -> int:
+        """Number of runs of IPOPT."""
+        return len(self.starts)
+
+    @property
+    def capped(self) -> int:
+        """Runs of IPOPT that ended at their limit of iterations."""
+        return sum(start.status == CAPPED for start in self.starts)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values."""
+        return dataclasses.asdict(self)

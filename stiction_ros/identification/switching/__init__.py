@@ -1,0 +1,1 @@
+"""Switching patterns: when a valve slips, and which frictions do that alike."""

@@ -1,0 +1,1 @@
+"""Loop models as YAML: checked reading, each error with its key."""

@@ -1,0 +1,59 @@
+"""Where an effect acts, and how the YAML of a loop model says so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from stiction_ros.effects import Behaviour
+from stiction_ros.errors import InputError
+from stiction_ros.processes import Process
+
+KINDS = ("valve", "load", "process", "sensor", "disturbance")
+
+
+def append_effect(
+    document: dict[str, Any], place: str, effect: Behaviour, process: Process
+) -> None:
+    """Add ``effect`` at ``place`` to the YAML mapping ``document``, in place.
+
+    Args:
+        document: of a loop model.
+        place: ``valve:TAG``, ``load:TAG``, ``process:TAG``, ``sensor:TAG`` or
+            ``disturbance:TAG``.
+        effect: what acts there.
+        process: of the same loop, for its tags.
+
+    Raises:
+        InputError: no such place.
+    """
+    kind, _, tag = place.partition(":")
+    if kind not in KINDS:
+        raise InputError(
+            f"no place {place!r}", fix=f"write {' | '.join(f'{kind}:TAG' for kind in KINDS)}"
+        )
+    inputs = process.upsets if kind == "disturbance" else ()
+    known = process.valves if kind in ("valve", "load") else (*process.outputs, *inputs)
+    if tag not in known:
+        raise InputError(f"no {kind} {tag!r}", fix=f"use {', '.join(known)}")
+    if kind in ("load", "disturbance"):
+        end = "load" if kind == "load" else "output" if tag in process.outputs else "input"
+        document.setdefault("disturbances", []).append({end: tag} | effect.to_mapping())
+        return
+    if kind == "valve":
+        entries = document["valves"]
+    elif kind == "sensor":
+        entries = document.setdefault("sensors", [])
+    else:
+        entries = document["process"].setdefault(
+            "outputs", [{"name": name} for name in process.outputs]
+        )
+    _entry(entries, tag).setdefault("effects", []).append(effect.to_mapping())
+
+
+def _entry(entries: list[dict[str, Any]], tag: str) -> dict[str, Any]:
+    """Return the entry of that name, a new one where a sensor has none yet."""
+    for entry in entries:
+        if entry["name"] == tag:
+            return entry
+    entries.append({"name": tag})
+    return entries[-1]

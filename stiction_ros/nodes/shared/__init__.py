@@ -1,0 +1,1 @@
+"""What all nodes have: lifecycle, parameters, peers, messages, the process."""

@@ -1,0 +1,363 @@
+"""What all nodes share: lifecycle, counted publishers, peers, diagnostics, configuration."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.timer import Timer
+from std_msgs.msg import String
+
+from stiction_ros import __version__
+from stiction_ros.errors import InputError
+from stiction_ros.nodes.shared import parameters
+from stiction_ros.nodes.shared.messages import status, to_stamp
+from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers
+from stiction_ros.nodes.shared.typed import Log, log_of, quality
+from stiction_ros.online.health import LEVELS, Noticed
+
+SIGNAL_QOS = quality(100, ReliabilityPolicy.RELIABLE)
+# What waits for a process that is busy for a moment; writers keep SIGNAL_QOS.
+READER_QOS = quality(5000, ReliabilityPolicy.RELIABLE)
+LATCHED_QOS = quality(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED_READER_QOS = quality(100, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+ACK_PATIENCE = 3.0  # s for all topics together: a reader that was killed never answers
+LINK_PATIENCE = 5.0  # s until a node says what it waits for
+LINK_REMINDER = 30.0  # s until it says so again
+LINK_PERIOD = 0.02  # s between two looks at the graph until all peers are there
+LOOK_PERIOD = 0.1  # s between two looks at what has become of the loop
+LOOKS = 10  # of them until the next status
+PEER_LOOKS = 5  # of them until the next look at the partners
+
+
+class ManagedNode(LifecycleNode):
+    """A lifecycle node that starts by itself unless ``autostart`` is false.
+
+    Subclasses write :meth:`configure`, :meth:`activate` and :meth:`deactivate`. An
+    :class:`InputError` in any of them is logged in one line, kept in :attr:`failure`, and
+    leaves the node where it was.
+    """
+
+    def __init__(self, name: str, settings: type[Any], **kwargs: Any) -> None:
+        """Declare the parameters of ``settings``; ``kwargs`` go to the ROS node."""
+        super().__init__(name, **kwargs)
+        self.settings_class = settings
+        self.failure = ""
+        self.finished = False
+        self.running = False
+        self.stamp = 0
+        self.outlets: dict[str, Outlet] = {}
+        self._patience = Patience()
+        self.inlets: dict[str, Inlet] = {}
+        self.noticed = Noticed(time.monotonic)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._ready = self._linked = self._tunable = False
+        self._link_timer: Timer | None = None
+        parameters.declare(self, settings)
+        self.settings: Any = settings()  # of the class that the subclass declares
+
+    @property
+    def log(self) -> Log:
+        """The logger of the node."""
+        return log_of(self)
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[[], None],
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
+        autostart: bool = True,
+    ) -> Timer:
+        """Create a timer on a steady clock: simulated time that stands still stops no node."""
+        clock = clock or self._steady
+        return super().create_timer(timer_period_sec, callback, callback_group, clock, autostart)
+
+    # ---- lifecycle -------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Configure and activate, as ``autostart`` does."""
+        transitions: Any = self  # rclpy gives them no types
+        transitions.trigger_configure()
+        if not self.failure:
+            transitions.trigger_activate()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return self._guarded(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        result = super().on_activate(state)
+        if result is not TransitionCallbackReturn.SUCCESS:
+            return result
+        return self._guarded(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._stop()
+        self.deactivate()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._tear_down()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._stop()
+        self.finished = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def configure(self) -> None:
+        """Build what the node runs; may raise InputError."""
+
+    def activate(self) -> None:
+        """Begin; may raise InputError."""
+
+    def deactivate(self) -> None:
+        """Stop for a while."""
+
+    def finish(self) -> None:
+        """Publish the last diagnostics and wait until all readers have everything."""
+        if not self.outlets:
+            return
+        self.running = False
+        self.deactivate()
+        self.report()
+        end = time.monotonic() + ACK_PATIENCE
+        for outlet in self.outlets.values():
+            left = max(end - time.monotonic(), 0.0)
+            outlet.publisher.wait_for_all_acked(Duration(seconds=left))
+
+    def _configure(self) -> None:
+        parameters.refuse_unknown(self)
+        self.settings = parameters.read(self, self.settings_class)
+        self._diagnostics = self.outlet(DiagnosticArray, "/diagnostics", quality(100))
+        self._looks, self._told_level = 0, "ok"
+        self._beat = self.create_timer(LOOK_PERIOD, self._look_around)
+        self.configure()
+        self.add_on_set_parameters_callback(self._on_set)
+        self._tunable = True
+
+    def _activate(self) -> None:
+        self._ready = self._linked = False
+        self._peers, self._busy = Peers(self, self.settings.wait_for), ""
+        self._remind_at = time.monotonic() + LINK_PATIENCE
+        self.activate()
+        self._link_timer = self.create_timer(LINK_PERIOD, self._look_for_peers)
+
+    def _stop(self) -> None:
+        self.running = False
+        if self._link_timer is not None:
+            self.destroy_timer(self._link_timer)
+            self._link_timer = None
+
+    def _tear_down(self) -> None:
+        self._stop()
+        self._linked = False
+        if self._tunable:
+            self.remove_on_set_parameters_callback(self._on_set)
+            self._tunable = False
+        self.destroy_timer(self._beat)
+        for subscription in list(self.subscriptions):
+            if subscription is not self._time_source._clock_sub:  # that of use_sim_time
+                self.destroy_subscription(subscription)
+        for outlet in self.outlets.values():
+            self.destroy_publisher(outlet.publisher)
+        self.outlets, self.inlets = {}, {}
+
+    def _guarded(self, action: Callable[[], None]) -> TransitionCallbackReturn:
+        self.failure = ""
+        try:
+            action()
+        except InputError as error:
+            self.failure = str(error)
+            self.log.error(self.failure)
+            if self.outlets:
+                self._tear_down()
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it without a word
+            self.failure = f"internal error: {error!r}"
+            self.log.error(traceback.format_exc())
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    # ---- topics ----------------------------------------------------------------------------
+
+    def outlet(
+        self, kind: Any, topic: str, qos: QoSProfile, readers: tuple[str, ...] = ()
+    ) -> Outlet:
+        """Create a counted publisher; ``recorder`` is among the readers of every topic."""
+        # Readers warn of incompatible QoS; what a publisher hears of it costs time at every spin.
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        publisher = self.create_publisher(kind, topic, qos, event_callbacks=quiet)
+        waits = qos is SIGNAL_QOS and getattr(self.settings, "pace", "") == "lockstep"
+        patience = self._patience if waits else None
+        self.outlets[topic] = Outlet(publisher, (*readers, "recorder"), qos, patience)
+        return self.outlets[topic]
+
+    def inlet(
+        self, kind: Any, topic: str, take: Any, qos: QoSProfile, writers: tuple[str, ...] = ()
+    ) -> None:
+        """Subscribe; ``writers`` are the nodes whose first message must not be missed."""
+        subscription = self.create_subscription(kind, topic, take, qos)
+        self.inlets[topic] = Inlet(subscription, writers, qos)
+
+    def drain(self, topic: str) -> int:
+        """Hand all that is queued on an inlet to its callback now, and count it."""
+        return self.inlets[topic].drain()
+
+    def linked(self) -> None:
+        """Called once when everything in ``wait_for`` has matched, in both directions."""
+
+    def preparing(self) -> str:
+        """Return what is done before the node is ready, such as compilation; empty: nothing."""
+        return ""
+
+    def _look_for_peers(self) -> None:
+        """Become ready when all writers have matched; begin when all peers are ready.
+
+        A reader of a volatile topic misses what is sent before it has matched the writer,
+        also when the writer has matched it already. So each node looks at its own readers
+        first and then says that it is ready by announcing ``~/config``.
+        """
+        busy = "" if self._ready else self.preparing()
+        if busy != self._busy:
+            self._busy, self._remind_at = busy, time.monotonic() + LINK_PATIENCE
+            self.log.info(f"not ready yet: {busy}" if busy else "prepared")
+        if busy:
+            return
+        missing = [] if self._ready else self._peers.unheard(self.inlets)
+        if not missing and not self._ready:
+            if "~/config" not in self.outlets:  # it is there already after a pause
+                self._announce_configuration()
+            self._ready = True
+        missing = missing or self._peers.unlinked(self.outlets)
+        if not missing:
+            self._begin()
+        elif time.monotonic() > self._remind_at:
+            self._remind_at = time.monotonic() + LINK_REMINDER
+            said = f"still waiting for {', '.join(missing)}; see the parameter wait_for"
+            self.log.warning(said)
+
+    def _begin(self) -> None:
+        self._stop()
+        self._peers.pin()
+        others = (*self._peers.names, *self._peers.topics)
+        self.log.info(f"{self.get_name()} is ready: {', '.join(others) or 'alone'}")
+        self._linked = self.running = True
+        self.report()
+        self.linked()
+
+    def partner_lost(self, name: str, what: str) -> None:
+        """React to a partner in lockstep that has gone or was replaced: end with the plant."""
+        if name == "plant":
+            self.log.info(f"{name} {what}: the run is over")
+            self.running, self.finished = False, True
+
+    def end(self, reason: str) -> None:
+        """End the node as failed, with one sentence."""
+        self.failure = reason
+        self.log.error(reason)
+        self.running, self.finished = False, True
+
+    def _announce_configuration(self) -> None:
+        document = {
+            "node": self.get_fully_qualified_name(),
+            "version": __version__,
+            "parameters": parameters.as_mapping(self.settings),
+        }
+        text = yaml.safe_dump(document | self.configuration(), sort_keys=False)
+        self.outlet(String, "~/config", LATCHED_QOS).publish(String(data=text))
+
+    # ---- parameters ------------------------------------------------------------------------
+
+    def configuration(self) -> dict[str, Any]:
+        """Return what ``~/config`` tells besides the parameters."""
+        return {}
+
+    def retune(self, settings: Any) -> None:
+        """React to changed settings; InputError refuses them."""
+
+    def _on_set(self, changed: list[Any]) -> Any:
+        known = {p.name: p.value for p in changed if hasattr(self.settings, p.name)}
+        if not known:
+            return parameters.accepted()
+        try:
+            settings = parameters.read(self, self.settings_class, known)
+            self.retune(settings)
+        except InputError as error:
+            return parameters.refusal(error)
+        self.settings = settings
+        return parameters.accepted()
+
+    # ---- diagnostics -----------------------------------------------------------------------
+
+    def health(self) -> tuple[str, str, list[tuple[str, object]]]:
+        """Return level (ok, warn, error), message and key-values of the 1 Hz status."""
+        return "ok", "running", []
+
+    def tasks(self) -> list[tuple[str, str, str, list[tuple[str, object]]]]:
+        """Return further 1 Hz statuses: level, task, message and key-values of each."""
+        return []
+
+    def look(self) -> None:
+        """Notice what has become of the loop; called every LOOK_PERIOD while it runs."""
+
+    def notice(self, name: str, level: str, text: str) -> None:
+        """Show a condition (warn or error) long enough to be seen; log it when it is new."""
+        if self.noticed.notice(name, level, text):
+            self.log.warning(text)
+        if LEVELS.index(level) > LEVELS.index(self._told_level):
+            self.report()
+
+    def report(self, extra: Iterable[tuple[str, str, list[tuple[str, object]]]] = ()) -> None:
+        """Publish the health now, and ``extra`` as further statuses (task, text, values)."""
+        if not self._linked:
+            return
+        level, text, values = self.health()
+        level = max(level, self.noticed.level, key=LEVELS.index)
+        text = "; ".join(said for said in (text, self.noticed.text) if said)
+        if self.failure:
+            level, text = "error", self.failure
+        self._told_level = level
+        self._diagnostics.count += 1  # this message counts as well
+        counts = [
+            (f"published:{self.resolve_topic_name(topic)}", outlet.count)
+            for topic, outlet in self.outlets.items()
+        ]
+        name, hardware = self.get_fully_qualified_name()[1:], self.hardware()
+        message = DiagnosticArray()
+        message.header.stamp = to_stamp(self.stamp)
+        message.status = [status(f"{name}: status", hardware, level, text, [*values, *counts])]
+        further = [*self.tasks(), *(("ok", *one) for one in extra)]
+        message.status += [
+            status(f"{name}: {task}", hardware, level, said, keys)
+            for level, task, said, keys in further
+        ]
+        self._diagnostics.publisher.publish(message)
+
+    def hardware(self) -> str:
+        """Return the identifier of the loop for ``hardware_id``."""
+        return str(self.get_name())
+
+    def _look_around(self) -> None:
+        """Look at the loop, now and then at the partners, and tell once a second or at once."""
+        if not self.running:
+            return
+        self._looks += 1
+        self.look()
+        if self._looks % PEER_LOOKS == 0 and getattr(self.settings, "pace", "") == "lockstep":
+            for name, what in self._peers.gone().items():
+                if self.running:
+                    self.partner_lost(name, what)
+        if self.running and self._looks % LOOKS == 0:
+            self.report()

@@ -1,0 +1,122 @@
+"""ROS parameters from settings dataclasses: declared, described, checked."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from stiction_ros.errors import InputError
+from stiction_ros.nodes.shared.typed import parameter_value
+from stiction_ros.settings import Setting, check, settings_of
+
+_TYPES = {
+    "float": Parameter.Type.DOUBLE,
+    "int": Parameter.Type.INTEGER,
+    "bool": Parameter.Type.BOOL,
+    "str": Parameter.Type.STRING,
+    "floats": Parameter.Type.DOUBLE_ARRAY,
+    "strings": Parameter.Type.STRING_ARRAY,
+}
+
+
+def declare(node: Node, cls: type[Any]) -> None:
+    """Declare every setting of ``cls`` on ``node`` with its description and range."""
+    for entry in settings_of(cls):
+        node.declare_parameter(entry.name, _default(entry), _descriptor(entry))
+
+
+def read(node: Node, cls: type[Any], changed: dict[str, Any] | None = None) -> Any:
+    """Build ``cls`` from the node's parameters, with ``changed`` values in their place.
+
+    Raises:
+        InputError: a value out of range, which an array's range cannot refuse by itself.
+    """
+    values = {}
+    for entry in settings_of(cls):
+        value = node.get_parameter_or(entry.name).value
+        if value is None:  # an empty list in a parameter file has no type
+            value = entry.default
+        if changed is not None and entry.name in changed:
+            value = changed[entry.name]
+        values[entry.name] = check(entry, value, node.get_name())
+    return cls(**values)
+
+
+def refuse_unknown(node: Node) -> None:
+    """Raise InputError for a given parameter that the node does not have.
+
+    rclpy itself passes over it without a word.
+    """
+    for name in node._parameter_overrides:  # there is no public way to these names
+        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
+            known = ", ".join(sorted(node.get_parameters_by_prefix("")))
+            raise InputError(
+                f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
+            )
+
+
+def refusal(error: InputError) -> SetParametersResult:
+    """Return the answer that leaves the old value in force."""
+    return SetParametersResult(successful=False, reason=str(error))
+
+
+def accepted() -> SetParametersResult:
+    """Return the answer that takes the new values."""
+    return SetParametersResult(successful=True)
+
+
+def as_mapping(settings: Any) -> dict[str, Any]:
+    """Return settings as plain YAML values."""
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in dataclasses.asdict(settings).items()
+    }
+
+
+def _default(entry: Setting) -> Any:
+    value = list(entry.default) if isinstance(entry.default, tuple) else entry.default
+    return parameter_value(entry.name, _TYPES[entry.kind], value) if value != [] else [""]
+
+
+def _descriptor(entry: Setting) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        name=entry.name,
+        type=_TYPES[entry.kind].value,
+        description=entry.description,
+        read_only=entry.fixed,
+        additional_constraints=_constraint(entry),
+    )
+    bounded = math.isfinite(entry.low) or math.isfinite(entry.high)
+    if entry.kind == "float" and bounded:
+        descriptor.floating_point_range = [
+            FloatingPointRange(
+                from_value=max(entry.low, -1e300), to_value=min(entry.high, 1e300), step=0.0
+            )
+        ]
+    elif entry.kind == "int" and bounded:
+        descriptor.integer_range = [
+            IntegerRange(
+                from_value=int(max(entry.low, -(2**62))),
+                to_value=int(min(entry.high, 2**62)),
+                step=1,
+            )
+        ]
+    return descriptor
+
+
+def _constraint(entry: Setting) -> str:
+    if entry.choices:
+        return "one of " + ", ".join(entry.choices)
+    if entry.kind == "floats" and (math.isfinite(entry.low) or math.isfinite(entry.high)):
+        return f"each in [{entry.low:g}, {entry.high:g}]"
+    return ""

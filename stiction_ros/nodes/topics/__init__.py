@@ -1,0 +1,1 @@
+"""Topics of a loop between the graph and what decides on them."""

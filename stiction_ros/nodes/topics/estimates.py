@@ -1,0 +1,55 @@
+"""How a fit is told: the message on ``stiction`` and the status in the diagnostics."""
+
+from __future__ import annotations
+
+from sensor_msgs.msg import JointState
+
+from stiction_ros.identification import Identification
+from stiction_ros.json_values import json_text
+from stiction_ros.nodes.shared.messages import joint_state
+from stiction_ros.online.estimator.live import FitUpdate
+
+Keys = list[tuple[str, object]]
+
+
+def friction_message(stamp: int, token: str, found: Identification | None) -> JointState:
+    """Return value, lower and upper end of every friction; empty for an unusable window.
+
+    Args:
+        stamp: end of the window, ns.
+        token: ``valid_from`` of the loop model in force, as text.
+        found: the fit, or None when the window was not usable.
+    """
+    rows = []
+    for valve in () if found is None else found.valves:
+        rows.append((f"{valve.name}.f_s", valve.static_friction, valve.static_interval))
+        rows.append((f"{valve.name}.f_d", valve.dynamic_friction, valve.dynamic_interval))
+    message = joint_state(stamp, [name for name, _, _ in rows], [value for _, value, _ in rows])
+    message.velocity = [interval[0] for _, _, interval in rows]
+    message.effort = [interval[1] for _, _, interval in rows]
+    message.header.frame_id = token
+    return message
+
+
+def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:
+    """Return task, message and key-values of one fit, which is told once."""
+    keys: Keys = [("window_end", stamp)]
+    for name, friction in update.trusted.items():
+        keys.append((f"{name}.trusted_f_s", friction.static_friction))
+        keys.append((f"{name}.trusted_f_d", friction.dynamic_friction))
+    keys.append(("identification", json_text(update.identification.to_json(), indent=None)))
+    return "fit", verdicts_of(update), keys
+
+
+def verdicts_of(update: FitUpdate) -> str:
+    """Return the verdicts of one fit in one line."""
+    return ", ".join(f"{v.name} {v.verdict}" for v in update.identification.valves)
+
+
+def figures_of(update: FitUpdate) -> str:
+    """Return verdicts and frictions of one fit in one line, % of travel."""
+    frictions = [
+        f"{v.name}.f_s {v.static_friction:.3g}, {v.name}.f_d {v.dynamic_friction:.3g}"
+        for v in update.identification.valves
+    ]
+    return f"{verdicts_of(update)}; {', '.join(frictions)}"

@@ -1,0 +1,126 @@
+"""The topics and the status of one bridged loop."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from std_msgs.msg import String
+
+from stiction_ros.nodes.shared.messages import joint_state
+from stiction_ros.nodes.shared.peers import Outlet
+from stiction_ros.online.input.op_port import Reception
+from stiction_ros.opcua.grant import Grant
+from stiction_ros.opcua.loop_bridge import LoopBridge
+from stiction_ros.opcua.reading import TagQuality
+from stiction_ros.opcua.sampling import PlantSample
+from stiction_ros.opcua.tag_map import LoopTags
+
+COUNTED = ("past", "ahead", "late", "bad", "skipped", "new_runs")
+SHOWN = 3  # refused tags that a status names
+
+
+class LoopTopics:
+    """Publishes samples of one loop and tells how it fares."""
+
+    def __init__(
+        self,
+        tags: LoopTags,
+        *,
+        pv: Outlet,
+        applied: Outlet,
+        sp: Outlet | None,
+        dv: Outlet | None,
+        grant: Outlet | None,
+    ) -> None:
+        """Take the outlets; None for what the loop does not have."""
+        self.tags, self.pv = tags, pv
+        self._applied, self._sp, self._dv, self._grant = applied, sp, dv, grant
+        self._told: Grant | None = None
+        self._last: PlantSample | None = None
+        self._outputs = [output.name for output in tags.outputs]
+        self._valves = [valve.name for valve in tags.valves]
+        self._measured = [one.name for one in tags.disturbances]
+
+    def publish(self, sample: PlantSample, by: str) -> None:
+        """Publish a sample; pv, which the partners act on, comes last.
+
+        ``velocity`` of ``pv`` is the age of each value in s, ``effort`` its quality; ``frame_id``
+        of ``op_applied`` is ``by``, the full name of the node whose OP is in force.
+        """
+        self._last, stamp = sample, sample.stamp
+        if np.isfinite(sample.op_before).all():
+            before = stamp - self.tags.step
+            applied = joint_state(before, self._valves, sample.op_before)
+            applied.header.frame_id = by
+            self._applied.publish(applied)
+        if self._dv is not None:
+            self._dv.publish(joint_state(stamp, self._measured, sample.dv))
+        if self._sp is not None and np.isfinite(sample.sp).all():
+            self._sp.publish(joint_state(stamp, self._outputs, sample.sp))
+        message = joint_state(stamp, self._outputs, sample.pv)
+        message.velocity = array("d", sample.pv_age)
+        message.effort = array("d", [float(one) for one in sample.pv_quality])
+        self.pv.publish(message)
+
+    def changed_grant(self, bridge: LoopBridge) -> Grant | None:
+        """Publish the grant when its state or reason is new, and return it then."""
+        grant, before = bridge.grant, self._told
+        if before is not None and (grant.state, grant.reason) == (before.state, before.reason):
+            return None
+        self._told = grant
+        if self._grant is not None and (before is None or grant.state is not before.state):
+            self._grant.publish(String(data=grant.state.value))
+        return grant
+
+    def health(self, bridge: LoopBridge, now: float) -> tuple[str, str, list[tuple[str, object]]]:
+        """Return level, message and values of the loop's status."""
+        sampler, grant = bridge.sampler, bridge.grant
+        present = sampler.now(now)
+        values = grant_keys(grant)
+        if present is not None:
+            values.append(("plant_time", f"{present / 1e9:.3f}"))
+        modes = [
+            (f"mode:{v.name}", sampler.latest(v.mode).value) for v in self.tags.valves if v.mode
+        ]
+        values += [*modes, *((key, sampler.counts[key]) for key in COUNTED)]
+        values += sorted(bridge.counts.items())
+        values += [
+            (f"refused_op:{one.value}", bridge.op_port.counts[one])
+            for one in Reception
+            if bridge.op_port.counts[one] and one is not Reception.TAKEN
+        ]
+        values.append(("refused_tags", len(bridge.refused)))
+        bad = told_of(bridge.refused) or self._bad_values()
+        if bad:
+            return "error", bad, values
+        if bridge.rules.writes:
+            values += bridge.rate_watch.keys()
+        cut = bridge.rate_watch.text() if grant.may_write else ""
+        if cut:
+            return "warn", cut, values
+        waits = grant.wanted and not grant.requesting
+        return "warn" if waits else "ok", f"{grant.state.value}: {grant.reason}", values
+
+    def _bad_values(self) -> str:
+        if self._last is None:
+            return "no sample yet"
+        pairs = zip(self._outputs, self._last.pv_quality, self._last.pv, strict=True)
+        found = [
+            f"{name} {quality.name.lower() if quality is not TagQuality.GOOD else 'no number'}"
+            for name, quality, value in pairs
+            if not np.isfinite(value)
+        ]
+        return "PV not usable: " + ", ".join(found) if found else ""
+
+
+def told_of(refused: Sequence[str]) -> str:
+    """Return the first refused tags in one line; empty for none."""
+    more = len(refused) - SHOWN
+    return "; ".join((*refused[:SHOWN], *([f"and {more} more"] if more > 0 else [])))
+
+
+def grant_keys(grant: Grant) -> list[tuple[str, object]]:
+    """Return a grant as keys and values of a status."""
+    return [("grant", grant.state.value), ("reason", grant.reason), ("wanted", grant.wanted)]

@@ -1,0 +1,1 @@
+"""The estimator of a running loop, and when it is trusted."""

@@ -1,0 +1,393 @@
+"""Whether a valve that is known to stick has been serviced, or sticks more than before."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import itertools
+
+import numpy as np
+
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.online.estimator.change_evidence import START_ROWS, Evidence, Share
+from stiction_ros.online.estimator.trust import Interval, TrustedFriction
+from stiction_ros.settings import setting
+
+SUSPICION = 20.0  # log likelihood against the trusted friction from which no window revises it
+CERTAINTY = 30.0  # log likelihood that a larger friction needs over every one near the trusted
+RIVAL = 20.0  # log likelihood by which one explanation beats another
+CREDIBLE = 12.0  # log likelihood below the best that an interval still holds,
+MISFIT = 0.1  # and share of that of the best: no process is linear
+INFORMATION = 15.0  # least squared length of a signature, in σ
+LIKELY = 8.0  # log likelihood that little friction needs over the trusted one, gains left open
+EPISODES = 3  # least number of separate groups of moves that show a serviced valve
+NEAR = 0.1  # share of f_S within which a friction is the same as before
+NEAR_DYNAMIC = 0.06  # the same for f_D, as a share of f_S
+LOW = 0.1  # share of f_S below which a valve counts as serviced
+BURST = 20  # samples in which a valve that stays behind shows,
+LOUD = 80.0  # and what they add to the squared innovations, beside twice the usual
+ONSETS = 4  # bursts whose beginning is looked at,
+FINELY = 3  # of the moves are looked at on a fine grid
+BEFORE = 10  # and moves before each that may be the first of the new friction
+DYNAMIC_ERROR = 0.008  # standard error of f_D, in f_S, that no number of moves takes away
+EXPLAINED = 3.0  # mean square of the innovations up to which the trusted friction is not replaced
+WORST = 2.0  # mean square of the innovations that a new friction may leave
+
+STATIC_SHARES = np.geomspace(0.2, 3.0, 92)  # steps of 3 %
+DYNAMIC_SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5])
+FINE_SHARES = np.geomspace(0.4, 2.5, 185)  # steps of 1 %
+LOW_STATIC = np.linspace(0.0, LOW, 6)
+LOW_DYNAMIC = np.array([0.0, 0.5, 1.0])  # of f_S
+
+
+class ChangeStatus(enum.StrEnum):
+    """What the moves of a valve say of its friction."""
+
+    UNCHANGED = "unchanged"
+    SERVICED = "serviced"
+    CHANGED = "changed"
+
+
+@dataclasses.dataclass(frozen=True)
+class ChangeRule:
+    r"""When a valve's friction is taken to have changed.
+
+    A valve whose friction is compensated is moved by kicks: OP goes past the stem by f_D for a
+    sample. A valve without friction follows the kick, and its process shows so after a while:
+    the *share* of that signature in PV is 0 while nothing has changed and 1 after a service.
+    The errors of the model, of its gain foremost, move the share a little, and by how much the
+    episodes of moves disagree tells how far. The valve is taken to be serviced when the share
+    lies ``change_margin`` of its standard errors above one half, over ``change_moves`` moves at
+    least. A valve that sticks more stays where it should have moved, which shows at once and
+    by far; the same margin holds.
+    """
+
+    change_moves: int = setting(
+        10, "stem moves that must agree before a valve counts as serviced; 0: never looked", low=0
+    )
+    change_margin: float = setting(
+        1.5, "standard errors by which a change must be nearer than none", low=0.5, high=20.0
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class LeadIn:
+    """Samples before a change, and where the stems were.
+
+    Attributes:
+        op, stem: shape (n, m), %.
+        pv: shape (n, p).
+    """
+
+    op: FloatArray
+    stem: FloatArray
+    pv: FloatArray
+
+    @classmethod
+    def last_of(cls, op: FloatArray, stem: FloatArray, pv: FloatArray) -> LeadIn:
+        """Return the last samples of longer signals, as many as are of use."""
+        return cls(*(signal[-2 * START_ROWS :].copy() for signal in (op, stem, pv)))
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionChange:
+    """The verdict on one valve.
+
+    Attributes:
+        status: unchanged, serviced or changed.
+        valve: tag.
+        samples: samples of the window that follow the change; 0 when unchanged.
+        friction: the new one, with intervals; None when unchanged or serviced.
+        doubted: whether the window speaks against the trusted friction, if not enough.
+        explained: whether process and trusted friction explain the window as they should.
+        share: of the new friction's signature, None where nothing was measured.
+        before: the window up to the change, None when unchanged.
+    """
+
+    status: ChangeStatus
+    valve: str
+    samples: int = 0
+    friction: TrustedFriction | None = None
+    doubted: bool = False
+    explained: bool = False
+    share: Share | None = None
+    before: LeadIn | None = dataclasses.field(default=None, compare=False, repr=False)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Found:
+    """A friction from sample ``first`` of the window on, with its log likelihood."""
+
+    first: int
+    static: float
+    dynamic: float
+    gain: float
+
+
+def look_for_change(
+    rule: ChangeRule, evidence: Evidence, valve: int, trusted: TrustedFriction
+) -> FrictionChange:
+    """Return what the window says of the friction of ``valve``, an index."""
+    name = evidence.reference.valves[valve]
+    if not rule.change_moves or not len(evidence.moves[valve]):
+        explained = evidence.mean_square <= EXPLAINED
+        return FrictionChange(ChangeStatus.UNCHANGED, name, explained=explained)
+    serviced, share = _serviced(rule, evidence, valve)
+    grown, near = _grown(evidence, valve, trusted)
+    doubted = max(serviced.gain, grown.gain - near) > SUSPICION
+    rival = max(near, serviced.gain + RIVAL, 0.0)
+    if grown.gain - rival > CERTAINTY + MISFIT * grown.gain:
+        change = _changed(rule, evidence, valve, grown, trusted)
+        if change is not None:
+            return change
+    if share is not None and _agrees(rule, share) and serviced.gain > SUSPICION:
+        low, rest = _rivals(evidence, valve, trusted, serviced.first)
+        if low >= LIKELY and rest - max(low, serviced.gain) <= RIVAL:
+            return _from(evidence, serviced.first, ChangeStatus.SERVICED, name, None, share)
+    explained = evidence.mean_square <= EXPLAINED
+    return FrictionChange(
+        ChangeStatus.UNCHANGED, name, doubted=doubted, explained=explained, share=share
+    )
+
+
+def static_interval(
+    evidence: Evidence, valve: int, first: int, friction: tuple[float, float]
+) -> Interval:
+    """Return the values of f_S, %, that the samples from ``first`` on do not reject.
+
+    Args:
+        evidence: of the window.
+        valve: index.
+        first: sample before which the stems are as trusted.
+        friction: f_S in whose neighbourhood is looked, and f_D.
+    """
+    static, dynamic = friction
+    grid = np.column_stack([static * FINE_SHARES, np.full(len(FINE_SHARES), dynamic)])
+    grid[:, 1] = np.minimum(grid[:, 1], grid[:, 0])
+    gains, left = _gains(evidence, valve, first, grid)
+    credible = gains >= gains.max() - _slack(float(gains.max())) * max(
+        1.0, float(left[int(np.argmax(gains))])
+    )
+    low = high = int(np.argmax(gains))
+    while low > 0 and credible[low]:
+        low -= 1
+    while high < len(grid) - 1 and credible[high]:
+        high += 1
+    # Beyond the grid anything goes, for all that these samples say.
+    ends = (0.0 if credible[low] else grid[low, 0]), (np.inf if credible[high] else grid[high, 0])
+    return float(ends[0]), min(float(ends[1]), float(STATIC_SHARES[-1]) * static)
+
+
+def _slack(gain: float) -> float:
+    return CREDIBLE + MISFIT * max(gain, 0.0)
+
+
+def _agrees(rule: ChangeRule, share: Share) -> bool:
+    many = share.episodes >= EPISODES and share.moves >= rule.change_moves
+    return many and share.information >= INFORMATION and share.margin >= rule.change_margin
+
+
+def _serviced(rule: ChangeRule, evidence: Evidence, valve: int) -> tuple[_Found, Share | None]:
+    """Return from when on the valve follows OP most likely, and the share of that."""
+    moves = evidence.moves[valve]
+    starts = moves[: max(len(moves) - rule.change_moves + 1, 0)]
+    if not len(starts):
+        return _Found(0, 0.0, 0.0, 0.0), None
+    signature = evidence.signature(valve, evidence.op[:, valve])
+    gains = np.cumsum(evidence.gain(signature)[::-1])[::-1]
+    first = int(starts[np.argmax(gains[starts])])
+    found = _Found(first, 0.0, 0.0, float(gains[first]))
+    return found, evidence.share(valve, signature, first)
+
+
+def _grown(evidence: Evidence, valve: int, trusted: TrustedFriction) -> tuple[_Found, float]:
+    """Return the friction that explains bursts of innovations best, and how well near ones do.
+
+    All beginnings are held against the same samples, those from the earliest of them on.
+    """
+    starts = _starts(evidence, valve)
+    known = (trusted.static_friction, trusted.dynamic_friction)
+    low, high = ((1 - NEAR) * trusted.static_interval[0], (1 + NEAR) * trusted.static_interval[1])
+
+    def search(first: int, shares: FloatArray) -> tuple[float, float, _Found]:
+        grid = _grid(*known, shares)
+        gains, left = _gains(evidence, valve, first, grid, starts[0])
+        near = (grid[:, 0] >= low) & (grid[:, 0] <= high)
+        near &= np.abs(grid[:, 1] - known[1]) <= NEAR_DYNAMIC * known[0]
+        best_near, i = float(gains[near].max(initial=0.0)), int(np.argmax(gains))
+        found = _Found(first, float(grid[i, 0]), float(grid[i, 1]), float(gains[i]))
+        margin = found.gain - max(best_near, 0.0)
+        return (margin if left[i] <= WORST else min(margin, 0.0)), best_near, found
+
+    roughly = [search(first, STATIC_SHARES) for first in starts]
+    roughly.sort(key=lambda one: one[2].gain - one[1])
+    finely = [search(one[2].first, FINE_SHARES) for one in roughly[-FINELY:]]
+    nothing = (0.0, 0.0, _Found(0, *known, 0.0))
+    _, near, best = max([nothing, *roughly, *finely], key=lambda one: one[0])
+    return best, near
+
+
+def _starts(evidence: Evidence, valve: int) -> list[int]:
+    """Return the moves that may be the first of a new friction: those before a burst."""
+    squares = np.sum([seen**2 for seen in evidence.innovations], axis=0)
+    usual = 2.0 * len(evidence.innovations)
+    sums = np.convolve(squares - usual, np.ones(BURST))[: len(squares)]
+    loud = np.flatnonzero(sums > LOUD)
+    if not len(loud):
+        return []
+    onsets = loud[np.diff(loud, prepend=-BURST) >= BURST][-ONSETS:]
+    moves = evidence.moves[valve]
+    found: set[int] = set()
+    for onset in onsets:
+        found.update(moves[moves <= onset][-BEFORE:].tolist())
+    return sorted(found)
+
+
+def _gains(
+    evidence: Evidence, valve: int, first: int, grid: FloatArray, begin: int | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return log likelihoods of frictions from ``first`` on, and the mean squares they leave.
+
+    Both over the samples from ``begin`` on, None for ``first``.
+    """
+    op = np.ascontiguousarray(evidence.op[first:, valve])
+    start = float(evidence.stem[max(first - 1, 0), valve])
+    stems = HeStiction.simulate_grid(grid, op, start)
+    keys = np.random.default_rng(0).standard_normal(len(op)) @ stems
+    _, chosen, back = np.unique(keys, return_index=True, return_inverse=True)
+    gains, left = evidence.gains(valve, first, stems[:, chosen], begin)
+    return gains[back], left[back]
+
+
+def narrowed(
+    evidence: Evidence, valve: int, friction: TrustedFriction, *, whole: bool
+) -> TrustedFriction:
+    """Return ``friction`` as the moves of the window tell it.
+
+    Args:
+        evidence: of the window, all of it behind the change.
+        valve: index.
+        friction: trusted so far.
+        whole: whether the window holds every move since the change.
+    """
+    first = evidence.first or min(START_ROWS, len(evidence.op) // 2)
+    known = (friction.static_friction, friction.dynamic_friction)
+    best, error = _best(evidence, valve, first, known)
+    static = static_interval(evidence, valve, first, best)
+    return friction.narrowed(static, best[1], _around(best[1], error), anew=whole)
+
+
+def _best(
+    evidence: Evidence, valve: int, first: int, near: tuple[float, float]
+) -> tuple[tuple[float, float], float]:
+    """Return f_S and f_D, looked for about ``near``, and the standard error of f_D, %.
+
+    What is there already is kept where nothing else is clearly better.
+    """
+    grid = np.vstack([near, _grid(*near, FINE_SHARES)])
+    gains, _ = _gains(evidence, valve, first, grid)
+    better = gains.max() > gains[0] + _slack(float(gains.max() - gains[0]))
+    static, dynamic = grid[int(np.argmax(gains)) if better else 0].tolist()
+    dynamic, error = _refined_dynamic(evidence, valve, first, static, dynamic)
+    return (static, dynamic), error
+
+
+def _grid(static: float, dynamic: float, shares: FloatArray) -> FloatArray:
+    """Return pairs (f_S, f_D), shape (G, 2), about known ones, %."""
+    pairs = np.array([(s, d) for s in shares for d in DYNAMIC_SHARES])
+    grid = pairs * [static, max(dynamic, 0.1 * static)]
+    return np.asarray(grid[grid[:, 1] <= grid[:, 0]])
+
+
+def _changed(
+    rule: ChangeRule,
+    evidence: Evidence,
+    valve: int,
+    found: _Found,
+    trusted: TrustedFriction,
+) -> FrictionChange | None:
+    """Return the change to ``found``, its f_D refined; None where it does not stand up."""
+    first = found.first
+    best, error = _best(evidence, valve, first, (found.static, found.dynamic))
+    _, left = _gains(evidence, valve, first, np.array([best]))
+    stems = evidence.stem[:, valve].copy()
+    stems[first:] = _stems(evidence, valve, first, *best)
+    share = evidence.share(valve, evidence.signature(valve, stems), first)
+    plain = share.margin >= rule.change_margin and share.information >= INFORMATION
+    low, high = static_interval(evidence, valve, first, best)
+    if not plain or left[0] > WORST or low <= LOW * trusted.static_friction:
+        return None  # the last: perhaps it is serviced, which more moves must show
+    new = trusted.narrowed((low, high), best[1], _around(best[1], error), anew=True)
+    name = evidence.reference.valves[valve]
+    return _from(evidence, found.first, ChangeStatus.CHANGED, name, new, share)
+
+
+def _from(
+    evidence: Evidence,
+    first: int,
+    status: ChangeStatus,
+    name: str,
+    friction: TrustedFriction | None,
+    share: Share,
+) -> FrictionChange:
+    before = LeadIn.last_of(evidence.op[:first], evidence.stem[:first], evidence.pv[:first])
+    samples = len(evidence.op) - first
+    return FrictionChange(status, name, samples, friction, share=share, before=before)
+
+
+def _refined_dynamic(
+    evidence: Evidence, valve: int, first: int, static: float, dynamic: float
+) -> tuple[float, float]:
+    """Return f_D by least squares from ``first`` on, and its standard error, %."""
+    error = static
+    for _ in range(2):
+        step, error = _dynamic_step(evidence, valve, first, static, dynamic)
+        stepped = min(max(dynamic + step, 0.0), static)
+        pair = np.array([(static, dynamic), (static, stepped)])
+        before, after = _gains(evidence, valve, first, pair)[0]
+        if after < before:  # other moves than those that the step reckoned with
+            break
+        dynamic = stepped
+    return dynamic, error + DYNAMIC_ERROR * static
+
+
+def _around(dynamic: float, error: float) -> Interval:
+    return max(dynamic - 3.0 * error, 0.0), dynamic + 3.0 * error
+
+
+def _stems(evidence: Evidence, valve: int, first: int, static: float, dynamic: float) -> FloatArray:
+    law = HeStiction(static, min(dynamic, static))
+    return law.simulate(evidence.op[first:, valve], float(evidence.stem[max(first - 1, 0), valve]))
+
+
+def _dynamic_step(
+    evidence: Evidence, valve: int, first: int, static: float, dynamic: float
+) -> tuple[float, float]:
+    """Return by how much f_D should change with the moves as they are, and its error, %."""
+    stems = _stems(evidence, valve, first, static, dynamic)
+    before = np.concatenate([[evidence.stem[max(first - 1, 0), valve]], stems[:-1]])
+    slips = np.flatnonzero(stems != before)
+    held = np.zeros(len(stems))
+    for a, b in itertools.pairwise([*slips, len(stems)]):
+        held[a:b] = -np.sign(evidence.op[first + a, valve] - before[a])
+    whole = evidence.stem[:, valve].copy()
+    whole[first:] = stems
+    changed = evidence.signature(valve, whole)
+    moved = evidence.stem[:, valve].copy()
+    moved[first:] += held
+    direction = evidence.signature(valve, moved)
+    return evidence.slope(changed, direction, first) or (0.0, static)
+
+
+def _rivals(
+    evidence: Evidence, valve: int, trusted: TrustedFriction, first: int
+) -> tuple[float, float]:
+    """Return the best log likelihoods from ``first`` on of little friction, and of more."""
+    little = np.array([(s, s * d) for s in LOW_STATIC for d in LOW_DYNAMIC])
+    more = np.array([(s, d * s) for s in STATIC_SHARES for d in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)])
+    gains = [
+        float(_gains(evidence, valve, first, grid * trusted.static_friction)[0].max())
+        for grid in (little, more)
+    ]
+    return gains[0], gains[1]

@@ -1,0 +1,342 @@
+"""The estimator of a running loop: window in, trusted friction and loop model out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification import (
+    Identification,
+    IdentificationOptions,
+    OutputModel,
+    identify,
+)
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.estimator.change_evidence import LEAST_ROWS, Evidence, Reference
+from stiction_ros.online.estimator.friction_change import (
+    ChangeRule,
+    ChangeStatus,
+    FrictionChange,
+    LeadIn,
+    look_for_change,
+    narrowed,
+)
+from stiction_ros.online.estimator.trust import Trust, TrustedFriction, TrustRule, alike
+from stiction_ros.online.schedule import FitSchedule
+from stiction_ros.records import Record
+from stiction_ros.settings import setting
+
+METHOD = "exact"
+"""Search of the windows: a sliding window is fitted again and again, beside a loop that runs."""
+
+
+@dataclasses.dataclass(frozen=True)
+class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
+    """What the estimator looks at, when, and what it needs to be sure."""
+
+    window: int = setting(2500, "samples in the sliding window", low=20)
+    output_order: int = setting(0, "n_a of the ARX model; 0 chooses by BIC", low=0, high=20)
+    input_order: int = setting(0, "n_b of the ARX model; 0 chooses by BIC", low=0, high=20)
+    delay_low: int = setting(0, "smallest delay tried, samples", low=0)
+    delay_high: int = setting(10, "largest delay tried, samples", low=0)
+
+    def options(self) -> IdentificationOptions:
+        """Return what :func:`stiction_ros.identification.identify` is asked."""
+        return IdentificationOptions(
+            output_order=self.output_order or None,
+            input_order=self.input_order or None,
+            delay=(self.delay_low, self.delay_high),
+            method=METHOD,
+            one_step_best=False,
+            check_columns=False,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class FitUpdate:
+    """What one fit says and changes.
+
+    Attributes:
+        end: last sample of the window.
+        identification: the fit itself.
+        trusted: trusted friction by valve after this fit.
+        loop_model: the loop with the trusted friction, only when it differs from before.
+        changes: what the window says of changes of the friction trusted before, by valve.
+    """
+
+    end: int
+    identification: Identification
+    trusted: Mapping[str, TrustedFriction]
+    loop_model: LoopModel | None
+    changes: tuple[FrictionChange, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Change:
+    """The last change of one valve: what it was, and the first sample behind it."""
+
+    status: ChangeStatus
+    first: int
+
+
+def fit(record: Record, options: IdentificationOptions) -> Identification:
+    """Run one fit; a plain function, so that a worker process can run it."""
+    return identify(record, options)
+
+
+class LiveEstimator:
+    """Keeps the window and the trust; the fit itself runs wherever its user wants.
+
+    Per sample: :meth:`add`; when it returns a record, run :func:`fit` on it and hand the
+    result to :meth:`conclude`.
+
+    Attributes:
+        settings: in force.
+        loop, valves, outputs, sample_time: of the loop; seconds.
+        published_model: the loop model of the last fit that had a new one.
+    """
+
+    def __init__(
+        self,
+        settings: EstimatorSettings,
+        loop: str,
+        valves: Sequence[str],
+        outputs: Sequence[str],
+        sample_time: float,
+    ) -> None:
+        """Start with an empty window.
+
+        Raises:
+            InputError: settings that no fit can use.
+        """
+        settings.options()
+        self.settings = settings
+        self.loop, self.sample_time = loop, sample_time
+        self.valves, self.outputs = tuple(valves), tuple(outputs)
+        self.published_model: LoopModel | None = None
+        self._trust = Trust(self.valves, settings)
+        self._op: deque[FloatArray] = deque(maxlen=settings.window)
+        self._pv: deque[FloatArray] = deque(maxlen=settings.window)
+        self._published: Mapping[str, TrustedFriction] = {}
+        self._waiting: dict[int, Record] = {}  # windows that are being fitted, by their end
+        self._last = -1
+        self._reference: Reference | None = None
+        self._anchor: tuple[int, LeadIn] | None = None  # where the window began anew
+        self._seen: tuple[int, Evidence] | None = None  # that of the last window, and its begin
+        self._changed: dict[str, _Change] = {}
+
+    def retune(self, settings: EstimatorSettings) -> None:
+        """Change settings from the next sample on; window and trust are kept.
+
+        Raises:
+            InputError: settings that no fit can use; the old ones stay in force.
+        """
+        settings.options()
+        self.settings = settings
+        self._trust.retune(settings)
+        self._op = deque(self._op, maxlen=settings.window)
+        self._pv = deque(self._pv, maxlen=settings.window)
+
+    def add(self, sample: int, op: FloatArray, pv: FloatArray) -> Record | None:
+        """Take in one sample, OP (m,) and PV (p,); return the window when a fit is due.
+
+        No window holds a sample that is not finite: it begins anew behind it.
+        """
+        self._last = sample
+        if np.isfinite(op).all() and np.isfinite(pv).all():
+            self._op.append(np.array(op, dtype=float))
+            self._pv.append(np.array(pv, dtype=float))
+        else:
+            self.restart()
+        if not self.settings.due(sample):
+            return None
+        record = Record(
+            self.loop,
+            self.sample_time,
+            self.valves,
+            self.outputs,
+            np.array(self._op).reshape(-1, len(self.valves)),
+            np.array(self._pv).reshape(-1, len(self.outputs)),
+            start=(sample + 1 - len(self._op)) * self.sample_time,
+        )
+        self._waiting[sample] = record
+        return record
+
+    def restart(self) -> None:
+        """Empty the window, as after samples that were missed; trust is kept."""
+        self._op.clear()
+        self._pv.clear()
+        self._anchor = self._seen = None
+
+    def drop(self, end: int) -> None:
+        """Forget the window that ends at sample ``end``, whose fit has failed."""
+        self._waiting.pop(end, None)
+
+    def conclude(self, end: int, found: Identification) -> FitUpdate:
+        """Apply the rule of trust to the fit of the window that ends at sample ``end``.
+
+        First the window is asked whether a trusted friction has changed. If so, the new one is
+        trusted, and the window begins anew at the change, so that no fit mixes the two.
+        """
+        record = self._waiting.pop(end, None)
+        self._waiting = {k: r for k, r in self._waiting.items() if k > end}
+        before = set(self._trust.trusted)
+        changes = () if record is None else self._look(end, record)
+        happened = [c for c in changes if c.status is not ChangeStatus.UNCHANGED]
+        if happened:
+            self._begin_anew(end, max(happened, key=lambda c: c.samples))
+        elif not self._young(end):
+            kept = {n for n, f in self._trust.trusted.items() if not f.settled}
+            kept |= {change.valve for change in changes if change.doubted}
+            self._trust.update(found.valves, kept, {c.valve for c in changes if c.explained})
+        trusted = dict(self._trust.trusted)
+        if record is not None and not before and trusted and self._reference is None:
+            self._reference = Reference.of(found, record)
+            if self._reference is not None:
+                self._anchor = end + 1, LeadIn.last_of(record.op, found.stem, record.pv)
+        model = None
+        if not alike(trusted, self._published):
+            outputs = found.outputs
+            if self._young(end) and self._reference is not None:
+                outputs = tuple(output.model for output in self._reference.outputs)
+            model = self._describe(FitUpdate(end, found, trusted, None), outputs)
+            self._published, self.published_model = trusted, model
+        return FitUpdate(end, found, trusted, model, changes)
+
+    def _young(self, end: int) -> bool:
+        """Return whether too few samples follow the last change for a fit to count."""
+        first = max((change.first for change in self._changed.values()), default=None)
+        return first is not None and end + 1 - first < self.settings.fit_first
+
+    def _look(self, end: int, record: Record) -> tuple[FrictionChange, ...]:
+        """Return what the window says of changes; narrow what is not settled."""
+        trusted = self._trust.trusted
+        if self._reference is None or not trusted or not self.settings.change_moves:
+            return ()
+        evidence = self._evidence(self._reference, end, record)
+        if evidence is None:
+            return ()
+        self._seen = end + 1 - len(evidence.op), evidence
+        changes = []
+        for name, friction in trusted.items():
+            j = self.valves.index(name)
+            if friction.settled:
+                changes.append(look_for_change(self.settings, evidence, j, friction))
+            else:
+                change = self._changed.get(name)
+                since = change is not None and change.first >= end + 1 - len(record)
+                whole = since and evidence.first > 0
+                self._trust.renew(name, narrowed(evidence, j, friction, whole=whole))
+        return tuple(changes)
+
+    def _evidence(self, reference: Reference, end: int, record: Record) -> Evidence | None:
+        """Return the evidence of a window, from where its stems are known; None if nowhere."""
+        begin, laws = end + 1 - len(record), self._trust.trusted
+        before = None
+        seen, since = self._seen, 0 if self._seen is None else begin - self._seen[0]
+        if self._anchor is not None and self._anchor[0] < begin and seen is not None and since > 0:
+            rows = (seen[1].op, seen[1].stem, seen[1].pv)  # the window has slid over its anchor
+            self._anchor = begin, LeadIn.last_of(*(signal[:since] for signal in rows))
+        if self._anchor is not None and begin <= self._anchor[0] <= end:
+            record, before = record.part(self._anchor[0] - begin, len(record)), self._anchor[1]
+        if not len(record):
+            return None
+        stem, sure = record.op.copy(), 0
+        for name, friction in laws.items():
+            j, law = self.valves.index(name), friction.behaviour()
+            u = record.op[:, j]
+            if before is not None:
+                stem[:, j] = law.simulate(u, float(before.stem[-1, j]))
+                continue
+            reach = law.static_friction
+            tried = [law.simulate(u, float(u[0]) + s * reach) for s in (-1.0, 0.0, 1.0)]
+            apart = np.flatnonzero(np.ptp(tried, axis=0))
+            stem[:, j] = tried[1]
+            sure = max(sure, int(apart[-1]) + 1 if len(apart) else 0)
+        if len(stem) - sure < LEAST_ROWS:
+            return None
+        op, pv = record.op[sure:], record.pv[sure:]
+        if before is None:
+            return Evidence(reference, op, stem[sure:], pv)
+        return Evidence(
+            reference,
+            np.vstack([before.op, op]),
+            np.vstack([before.stem, stem]),
+            np.vstack([before.pv, pv]),
+            len(before.op),
+        )
+
+    def _begin_anew(self, end: int, change: FrictionChange) -> None:
+        """Trust what a change has left, and let the window begin with it."""
+        first = end + 1 - change.samples
+        self._trust.renew(change.valve, change.friction)
+        self._changed[change.valve] = _Change(change.status, first)
+        self._anchor = self._seen = None
+        if change.before is not None and len(change.before.op):
+            self._anchor = first, change.before
+        for signal in (self._op, self._pv):
+            kept = list(signal)[max(len(signal) - (self._last + 1 - first), 0) :]
+            signal.clear()
+            signal.extend(kept)
+
+    def describe(self, update: FitUpdate) -> LoopModel:
+        """Return the loop as a fit found it, with the friction that is trusted after it."""
+        return self._describe(update, update.identification.outputs)
+
+    def _describe(self, update: FitUpdate, models: Sequence[OutputModel]) -> LoopModel:
+        found, trusted = update.identification, update.trusted
+        valves = []
+        for name in self.valves:
+            friction = trusted.get(name)
+            effects = [] if friction is None else [friction.behaviour().to_mapping()]
+            valves.append({"name": name, "effects": effects})
+        outputs = [
+            {
+                "name": output.name,
+                "a": [float(v) for v in output.a],
+                "b": {valve: [float(v) for v in b] for valve, b in output.b.items()},
+                "delay": {valve: int(d) for valve, d in output.delay.items()},
+                "bias": float(output.bias),
+                "noise": {"std": float(output.noise_std), "enters": "equation"},
+            }
+            for output in models
+        ]
+        provenance = [
+            self._provenance(name, update, found.samples)
+            for name in self.valves
+            if name in trusted or name in self._changed
+        ]
+        return LoopModel.from_mapping(
+            {
+                "loop": self.loop,
+                "sample_time": self.sample_time,
+                "valves": valves,
+                "process": {"kind": "arx", "outputs": outputs},
+                "provenance": provenance,
+            },
+            f"model identified for {self.loop}",
+        )
+
+    def _provenance(self, name: str, update: FitUpdate, samples: int) -> dict[str, Any]:
+        """Return where the friction of one valve comes from."""
+        entry: dict[str, Any] = {
+            "valve": name,
+            "effect": "stiction",
+            "from": f"window of {samples} samples ending at sample {update.end}",
+        }
+        change, friction = self._changed.get(name), update.trusted.get(name)
+        if change is not None:
+            entry["change"] = change.status.value
+            entry["last_samples"] = update.end + 1 - change.first
+        if friction is None:
+            return entry | {"f_s_interval": [0.0, 0.0], "f_d_interval": [0.0, 0.0]}
+        entry["f_s_interval"] = list(friction.offered_interval)
+        entry["f_d_interval"] = list(friction.dynamic_interval)
+        if not friction.settled:
+            entry["f_s_possible"] = list(friction.static_interval)
+        return entry

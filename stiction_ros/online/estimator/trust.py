@@ -1,0 +1,225 @@
+"""When an estimate of friction is trusted, and what a later window may change."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Container, Mapping, Sequence
+from typing import Self
+
+from stiction_ros.effects import HeStiction
+from stiction_ros.identification import ValveEstimate, VerdictKind
+from stiction_ros.settings import setting
+
+Interval = tuple[float, float]
+
+UNIMPORTANT = 0.01  # of f_S: a change of f_S or f_D that needs no new controller
+RESOLUTION = 1.01  # by which a friction offered exceeds one that is rejected
+TRIED = 1.06  # of the lower end: how far up from it a friction that is not settled may lie
+SETTLED = 1.12  # ratio of the ends of an interval of f_S from which on its middle is taken
+
+
+@dataclasses.dataclass(frozen=True)
+class TrustRule:
+    """A valve is trusted to have friction after agreeing verdicts in successive windows.
+
+    1. ``confirmations`` successive windows say *sticky* or *backlash*, which is friction without
+       a jump, and their intervals of f_S and of f_D overlap: the friction is trusted, with the
+       intersection of the intervals. Each end is first moved out by ``tolerance`` of f_S: an
+       interval of one window covers the noise, not that the process is a little nonlinear.
+    2. A later window is intersected with what is trusted. A loop that is compensated no
+       longer excites the friction band, so its window is wide and changes nothing.
+    3. Only ``contradictions`` successive windows whose intervals are disjoint from the trusted
+       ones replace it: by the new estimate if they find friction, by a healthy valve if they
+       say *healthy*.
+    """
+
+    confirmations: int = setting(2, "successive windows with friction before trust", low=1, high=20)
+    tolerance: float = setting(
+        0.02, "share of f_S by which every interval is widened", low=0.0, high=0.5
+    )
+    contradictions: int = setting(2, "successive disjoint windows before a change", low=1, high=20)
+
+
+@dataclasses.dataclass(frozen=True)
+class TrustedFriction:
+    """Friction of one valve that the controller may rely on; % of travel.
+
+    After a growth of friction only one move that failed and one that did not may be known, with
+    much in between. Then the friction is not ``settled``: it is offered at the lower end of its
+    interval, so that the next moves find out more.
+    """
+
+    static_friction: float
+    static_interval: Interval
+    dynamic_friction: float
+    dynamic_interval: Interval
+    settled: bool = True
+
+    @property
+    def offered_interval(self) -> Interval:
+        """The values of f_S that the controller should reckon with."""
+        low, high = self.static_interval
+        return (low, high) if self.settled else (low, min(high, TRIED * low))
+
+    def narrowed(
+        self, static: Interval, dynamic: float, dynamic_interval: Interval, *, anew: bool
+    ) -> Self:
+        """Return the friction as the moves since it changed tell it.
+
+        Args:
+            static, dynamic_interval: intervals that these moves allow.
+            dynamic: f_D, taken only where the one in force lies outside its interval.
+            anew: whether the moves are all since the change, so that they say it all.
+        """
+        both = static if anew else _intersect(self.static_interval, static) or static
+        settled = both[1] <= SETTLED * both[0]
+        value = 0.5 * (both[0] + both[1]) if settled else RESOLUTION * both[0]
+        if both[0] <= 0.0:  # the moves say nothing of how little it may be
+            value = min(self.static_friction, both[1])
+        known = dynamic_interval[0] <= self.dynamic_friction <= dynamic_interval[1]
+        return dataclasses.replace(
+            self,
+            static_friction=value,
+            static_interval=both,
+            dynamic_friction=self.dynamic_friction if known else dynamic,
+            dynamic_interval=self.dynamic_interval if known else dynamic_interval,
+            settled=settled,
+        )
+
+    def behaviour(self) -> HeStiction:
+        """Return He's law with these values."""
+        return HeStiction(self.static_friction, min(self.dynamic_friction, self.static_friction))
+
+
+class ValveTrust:
+    """The state of the rule for one valve."""
+
+    def __init__(self, rule: TrustRule) -> None:
+        """Start without trust."""
+        self.rule = rule
+        self.trusted: TrustedFriction | None = None
+        self._pending: TrustedFriction | None = None
+        self._found_windows = 0
+        self._disjoint_windows = 0
+        self._disjoint_verdict: VerdictKind | None = None
+
+    def update(self, estimate: ValveEstimate, firm: bool = False) -> TrustedFriction | None:
+        """Take in the estimate of one more window and return what is trusted now.
+
+        A ``firm`` trust is narrowed, but not replaced.
+        """
+        slack = self.rule.tolerance * estimate.static_friction
+        found = TrustedFriction(
+            estimate.static_friction,
+            _widened(estimate.static_interval, slack),
+            estimate.dynamic_friction,
+            _widened(estimate.dynamic_interval, slack),
+        )
+        if self.trusted is not None:
+            self._revise(found, estimate.verdict, firm)
+        elif estimate.verdict.has_friction:
+            both = _combine(self._pending, found) if self._pending is not None else None
+            self._found_windows = self._found_windows + 1 if both is not None else 1
+            self._pending = both if both is not None else found
+            if self._found_windows >= self.rule.confirmations:
+                self.trusted = self._pending
+        else:
+            self._found_windows, self._pending = 0, None
+        return self.trusted
+
+    def renew(self, friction: TrustedFriction | None) -> None:
+        """Trust what a change that was seen has left, None for a healthy valve."""
+        self.trusted, self._pending = friction, None
+        self._found_windows = self._disjoint_windows = 0
+
+    def _revise(self, found: TrustedFriction, verdict: VerdictKind, firm: bool) -> None:
+        assert self.trusted is not None
+        both = _combine(self.trusted, found)
+        if both is not None:
+            self.trusted, self._disjoint_windows = both, 0
+            return
+        if firm:
+            return
+        said = VerdictKind.STICKY if verdict.has_friction else verdict  # with a jump or without
+        if said is not self._disjoint_verdict:
+            self._disjoint_windows, self._disjoint_verdict = 0, said
+        self._disjoint_windows += 1
+        if self._disjoint_windows < self.rule.contradictions:
+            return
+        if said is VerdictKind.STICKY:
+            self.trusted, self._disjoint_windows = found, 0
+        elif said is VerdictKind.HEALTHY:
+            self.trusted, self._pending = None, None
+            self._found_windows = self._disjoint_windows = 0
+
+
+class Trust:
+    """The rule for all valves of a loop."""
+
+    def __init__(self, valves: Sequence[str], rule: TrustRule) -> None:
+        """Start without trust in any of ``valves``."""
+        self._valves = {name: ValveTrust(rule) for name in valves}
+
+    def retune(self, rule: TrustRule) -> None:
+        """Judge the next windows by ``rule``; what is trusted stays."""
+        for valve in self._valves.values():
+            valve.rule = rule
+
+    def update(
+        self,
+        estimates: Sequence[ValveEstimate],
+        kept: Container[str] = (),
+        firm: Container[str] = (),
+    ) -> Mapping[str, TrustedFriction]:
+        """Take in one fit and return the trusted friction by valve.
+
+        Valves that are ``kept`` stay as they are, ``firm`` ones may be narrowed.
+        """
+        for estimate in estimates:
+            if estimate.name not in kept:
+                self._valves[estimate.name].update(estimate, estimate.name in firm)
+        return self.trusted
+
+    def renew(self, valve: str, friction: TrustedFriction | None) -> None:
+        """Trust ``friction`` from now on, None for a healthy valve."""
+        self._valves[valve].renew(friction)
+
+    @property
+    def trusted(self) -> Mapping[str, TrustedFriction]:
+        """The trusted friction of each valve that has one."""
+        return {n: v.trusted for n, v in self._valves.items() if v.trusted is not None}
+
+
+def alike(one: Mapping[str, TrustedFriction], other: Mapping[str, TrustedFriction]) -> bool:
+    """Return whether a controller built on either would do the same, or nearly so."""
+    if one.keys() != other.keys():
+        return False
+    return all(
+        abs(a.static_friction - b.static_friction) <= UNIMPORTANT * b.static_friction
+        and abs(a.dynamic_friction - b.dynamic_friction) <= UNIMPORTANT * b.static_friction
+        and a.settled == b.settled
+        for a, b in ((one[name], other[name]) for name in one)
+    )
+
+
+def _combine(old: TrustedFriction, new: TrustedFriction) -> TrustedFriction | None:
+    """Return the intersection, the old point kept where it still fits; None when disjoint."""
+    static = _intersect(old.static_interval, new.static_interval)
+    dynamic = _intersect(old.dynamic_interval, new.dynamic_interval)
+    if static is None or dynamic is None:
+        return None
+    return TrustedFriction(
+        min(max(old.static_friction, static[0]), static[1]),
+        static,
+        min(max(old.dynamic_friction, dynamic[0]), dynamic[1]),
+        dynamic,
+    )
+
+
+def _widened(interval: Interval, slack: float) -> Interval:
+    return max(interval[0] - slack, 0.0), interval[1] + slack
+
+
+def _intersect(one: Interval, other: Interval) -> Interval | None:
+    low, high = max(one[0], other[0]), min(one[1], other[1])
+    return (low, high) if low <= high else None

@@ -1,0 +1,85 @@
+"""A worker process for the fits, so that nothing else waits for them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+from stiction_ros.identification import Identification, IdentificationOptions
+from stiction_ros.identification.warm_up import compile_loops
+from stiction_ros.online.estimator.live import METHOD, fit
+from stiction_ros.orphans import die_with_parent
+from stiction_ros.records import Record
+
+T = TypeVar("T")
+
+POLITE = 10  # by which a fit stands back behind what has to be in time, as nice does
+
+
+class FitWorker:
+    """One process that runs one fit after the other, in order.
+
+    It stands back behind the loop, whose samples cannot wait for a fit on a machine that is
+    busy. It leaves interrupts to its parent and dies with it. When it dies alone, as for want of
+    memory, the fits it had fail and the next one gets a new process.
+    """
+
+    def __init__(self) -> None:
+        """Start the process and let it load what it needs."""
+        self._start()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        others = set(multiprocessing.active_children())
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_settle)
+        self._ready = self._pool.submit(os.getpid)
+        self._processes = set(multiprocessing.active_children()) - others
+        # Before the first window is full.
+        self._compiled = self._pool.submit(compile_loops, (METHOD,))
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._ready.result()
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the process has all the machine code that a fit needs."""
+        return self._compiled.done()
+
+    def submit(self, record: Record, options: IdentificationOptions) -> Future[Identification]:
+        """Queue a fit; the future may hold the InputError of an unusable window."""
+        return self.call(fit, record, options)
+
+    def call(self, work: Callable[..., T], *arguments: Any) -> Future[T]:
+        """Queue a function of a module behind the fits; the future may hold what it raised."""
+        try:
+            return self._pool.submit(work, *arguments)
+        except BrokenProcessPool:
+            self._pool.shutdown()
+            self._start()
+            return self._pool.submit(work, *arguments)
+
+    def close(self) -> None:
+        """Drop queued fits and end the process once the running one is done.
+
+        Compilation is no fit: nobody waits for it.
+        """
+        if not self._compiled.done():
+            for process in self._processes:
+                process.kill()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _settle() -> None:
+    """Prepare the worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(POLITE)
+    parent = multiprocessing.parent_process()
+    if parent is not None and parent.pid is not None:
+        die_with_parent(signal.SIGKILL, parent.pid)

@@ -1,0 +1,1 @@
+"""What reaches a controller, and which of it counts."""

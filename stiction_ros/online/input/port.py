@@ -1,0 +1,379 @@
+"""What reaches a controller, sorted into samples by written rules."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from typing import TypeVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.online.input.applied_op import AppliedOp, Given
+from stiction_ros.online.input.sample_grid import Pace, SampleGrid, Succession
+from stiction_ros.online.input.samples import PortRules, PortState, Sample
+from stiction_ros.online.input.set_point_preview import SetPointPreview
+from stiction_ros.online.input.signal_check import SignalCheck
+
+T = TypeVar("T")
+
+SECOND = 1e9
+LATEST = 2_140_000_000 * 10**9  # ns: stamps end in 2038, and those that follow must fit
+PATIENCE = 3  # samples of PV that wait for the OP in force before a run begins without
+SLACK = 3  # samples that a stamp may be further than the receiver's clock allows
+LATENESS = 0.1  # s that a PV is waited for at least
+AWAKE = 1.0  # s in which a receiver that stood still may get the rest of what came
+LONGEST_GAP = 200  # samples; after a longer one a run begins anew
+KEPT = 5000  # messages of each kind that wait for the others of their sample
+
+
+@dataclasses.dataclass(frozen=True)
+class _Arrived:
+    stamp: int
+    pv: FloatArray
+
+
+class InputPort:
+    """Takes in messages as they come and gives samples to work through, oldest first.
+
+    In realtime the newest sample is answered and older ones are passed over; in lockstep every
+    sample is answered in its turn. Nothing that arrives can stop what comes after it.
+    """
+
+    def __init__(self, rules: PortRules) -> None:
+        """Start before a run; times are seconds that only rise, given with every call."""
+        self.rules = rules
+        self.preview: SetPointPreview | None = None
+        self.counts: Counter[str] = Counter()
+        self._check = SignalCheck(rules.instruments)
+        self._grid = SampleGrid(rules.step)
+        self._pace = Pace(rules.period)
+        self._refused = Succession(standing=rules.lockstep)
+        self._applied = AppliedOp(rules.step)
+        self._queue: list[_Arrived] = []
+        self._sp_at: dict[int, FloatArray] = {}
+        self._dv_at: dict[int, FloatArray | None] = {}
+        self._sp: FloatArray | None = None
+        self._dv: FloatArray | None = None
+        self._missed: dict[int, bool] = {}  # numbers of samples whose PV may still come
+        self._seen: dict[str, float] = {}
+        self._begun = self._anew = False
+        self._waiting = self._behind = 0
+        self._pv_number, self._pv_now, self._blind_from = -1, 0.0, 0.0
+        self._taken_at, self._in_time = 0.0, True
+        self._looked: float | None = None
+        self._awake, self._before = -math.inf, (-1, 0.0)  # the last PV before it slept
+
+    # ---- what comes in ---------------------------------------------------------------------
+
+    def add_pv(self, now: float, stamp: int, pv: FloatArray | None) -> None:
+        """Take in a measurement (p,), NaN for a tag that lacks; None: it has no tag of ours."""
+        if pv is None:
+            self.counts["wrong tags"] += 1
+            return
+        if not 0 <= stamp <= LATEST:
+            self.counts["ahead" if stamp > 0 else "stale"] += 1
+            return
+        self._seen["pv"] = now
+        self._queue.append(_Arrived(stamp, pv))
+        if len(self._queue) > KEPT:
+            del self._queue[0]
+            self.counts["overflow"] += 1
+
+    def add_sp(self, now: float, stamp: int, sp: FloatArray | None) -> None:
+        """Take in set-points (p,); None: not every tag is there."""
+        good = sp is not None and self._check.within(sp)
+        if good:
+            self._sp, self._seen["sp"] = sp, now
+        else:
+            self.counts["wrong tags" if sp is None else "refused sp"] += 1
+        if self.rules.lockstep and self.rules.scheduled and self._sp is not None:
+            _keep(self._sp_at, stamp, self._sp)
+
+    def add_dv(self, now: float, stamp: int, dv: FloatArray | None) -> None:
+        """Take in measured disturbances (d,); None: not every tag is there."""
+        if dv is not None and np.isfinite(dv).all():
+            self._dv, self._seen["dv"] = dv, now
+        else:
+            self.counts["wrong tags" if dv is None else "refused dv"] += 1
+        if self.rules.lockstep:
+            _keep(self._dv_at, stamp, self._dv)
+
+    def add_applied(self, now: float, stamp: int, op: FloatArray | None, ours: bool = True) -> None:
+        """Take in the OP (m,) that the valves are given at ``stamp``, and whether it is ours."""
+        if op is None or not np.isfinite(op).all():
+            self.counts["wrong tags" if op is None else "refused op_applied"] += 1
+            return
+        self._seen["op_applied"] = now
+        self._applied.add(stamp, op, ours)
+
+    def add_preview(self, preview: SetPointPreview | None) -> None:
+        """Take in set-points to come; None: it does not fit the outputs."""
+        if preview is None or not self._check.within(preview.values):
+            self.counts["refused sp_preview"] += 1
+            return
+        self.preview = preview
+
+    # ---- what goes out ---------------------------------------------------------------------
+
+    def ready(self) -> bool:
+        """Return whether :meth:`take` may give something."""
+        return bool(self._queue) and (not self.rules.lockstep or self._head() is not None)
+
+    def take(self, now: float) -> tuple[Sample, ...]:
+        """Return the samples to work through now, in their order; the last one is answered."""
+        if self.rules.lockstep:
+            return self._take_one(now)
+        arrived, self._queue = self._queue, []
+        if not arrived:
+            return ()
+        self._look_at(now)
+        self._pace.show(now, arrived[-1].stamp, self.rules.step)
+        if self._begun:
+            samples = self._take_newest(now, arrived)
+            if self._begun:
+                return samples
+        self._waiting += len(arrived)
+        return self._begin(now, arrived[-1])
+
+    def overdue(self, now: float) -> tuple[Sample, ...]:
+        """Return samples whose PV should have come by ``now`` and has not, the last answered.
+
+        To be called regularly, several times in a sample or every 20 ms.
+        """
+        if self.rules.lockstep or not self._begun:
+            return ()
+        period = self._pace.period
+        self._look_at(now)
+        self._looked = now
+        since = now - self._blind_from
+        if since < period + max(period, LATENESS) or now - self._awake < LATENESS:
+            return ()
+        # A PV that comes again within a period of its time is not late yet.
+        lacking = math.floor(since / period) - 1 - (self._grid.number - self._pv_number)
+        if lacking <= 0:
+            return ()
+        skipped = max(lacking - LONGEST_GAP, 0)
+        self._blind_from += skipped * period
+        self.counts["blind"] += lacking - skipped
+        samples = [self._missing(k == lacking - 1) for k in range(skipped, lacking)]
+        self._in_time, self._taken_at = False, now
+        return tuple(samples)
+
+    def sent(self, now: float) -> None:
+        """Note that the OP of the sample answered last has gone out."""
+        if not self.rules.lockstep and now - self._taken_at > self._pace.period:
+            self._in_time = False
+            self.counts["late op"] += 1
+
+    def rest(self) -> None:
+        """Forget what is queued: after a pause a run begins with the next PV.
+
+        In lockstep the plant has waited, so that a PV that follows on the last one continues.
+        """
+        self._queue.clear()
+        self._refused.clear()
+        self._looked = None
+        if not self.rules.lockstep:
+            self._begun, self._waiting = False, 0
+
+    def retune(self, period: float) -> None:
+        """Take samples to be ``period`` s apart by the receiver's clock."""
+        self._pace.retune(period)
+
+    @property
+    def next(self) -> int:
+        """The number of the next sample."""
+        return self._grid.number + 1
+
+    def due(self, stamp: int) -> int:
+        """Return the number of the sample at a stamp, or of the next one if that is over."""
+        return self.next if self.next == 0 else max(self.next, self._grid.number_of(stamp))
+
+    def stamp_of(self, number: int) -> int:
+        """Return the stamp of a sample of the present run, ns."""
+        return self._grid.stamp_of(number)
+
+    def state(self, now: float) -> PortState:
+        """Return how fresh everything is."""
+        lacks = ""
+        if not self._begun:
+            lacks = "sp" if self._sp is None else "op_applied"
+        return PortState(
+            {topic: now - seen for topic, seen in self._seen.items()},
+            0.0 if self.rules.lockstep else self._pace.period,
+            self._behind,
+            self._waiting,
+            lacks,
+            dict(self.counts),
+        )
+
+    # ---- lockstep --------------------------------------------------------------------------
+
+    def _head(self) -> _Arrived | None:
+        """Return the oldest sample that has all it needs; incomplete ones before it are lost."""
+        if self._begun:
+            self._refuse_what_does_not_fit()
+        waiting = sorted(self._queue, key=lambda one: one.stamp)
+        for one in waiting:
+            if self._complete(one.stamp):
+                self._queue = [other for other in self._queue if other.stamp >= one.stamp]
+                return one
+        return None
+
+    def _refuse_what_does_not_fit(self) -> None:
+        """Refuse old stamps; far ones too, unless the samples before them are there."""
+        newer = [self._grid.ahead(one.stamp) for one in self._queue]
+        far = min((n for n in newer if n > 0), default=0) > SLACK
+        queue, self._queue = self._queue, []
+        for one, ahead in zip(queue, newer, strict=True):
+            if self._begun and (far or ahead <= 0):
+                self.counts["ahead" if ahead > 0 else "stale"] += 1
+                if not self._refused.add(one.stamp, True):
+                    continue
+                self._end_run()
+            self._queue.append(one)
+
+    def _complete(self, stamp: int) -> bool:
+        if self._sp is None or (self.rules.scheduled and stamp not in self._sp_at):
+            return False
+        return not self.rules.needs_dv or stamp in self._dv_at
+
+    def _take_one(self, now: float) -> tuple[Sample, ...]:
+        head = self._head()
+        if head is None:
+            return ()
+        stamp = head.stamp
+        # Of several showings of one sample the last one counts.
+        pv = next(one.pv for one in reversed(self._queue) if one.stamp == stamp)
+        self._queue = [one for one in self._queue if one.stamp != stamp]
+        if not self._begun:
+            samples = self._begin(now, _Arrived(stamp, pv))
+        else:
+            self._refused.clear()
+            samples = self._follow(now, {self._grid.ahead(stamp): _Arrived(stamp, pv)})
+        for waiting in (self._sp_at, self._dv_at):
+            for old in [at for at in waiting if at <= stamp]:
+                del waiting[old]
+        return samples
+
+    # ---- realtime --------------------------------------------------------------------------
+
+    def _look_at(self, now: float) -> None:
+        """Note when the receiver itself stood still: what came is only now on its way."""
+        patience = max(self._pace.period, LATENESS)
+        if self._looked is not None and now - self._looked > patience:
+            self._looked = self._awake = now
+            self._before = self._pv_number, self._pv_now
+
+    def _take_newest(self, now: float, arrived: list[_Arrived]) -> tuple[Sample, ...]:
+        """Return the samples up to the newest that fits; not ``_begun`` after a new run."""
+        number, heard = self._pv_number, self._pv_now
+        if now - self._awake < AWAKE:
+            number, heard = self._before
+        since = max(now - heard, 0.0) / self._pace.period
+        latest = number - self._grid.number + SLACK + 2.0 * since
+        fitting: dict[int, _Arrived] = {}
+        for ahead, one in sorted(
+            ((self._grid.ahead(one.stamp), one) for one in arrived), key=lambda pair: pair[0]
+        ):
+            if ahead > max(latest, max(fitting, default=0) + SLACK):
+                self.counts["ahead"] += 1
+            elif ahead > 0:
+                fitting.setdefault(ahead, one)
+            else:
+                late = self._missed.pop(self._grid.number + ahead, False)
+                self.counts["late" if late else "stale"] += 1
+        if not fitting:
+            for one in arrived:
+                follows = self._refused.last is None or (
+                    one.stamp - self._refused.last <= (SLACK + 2.0 * since) * self.rules.step
+                )
+                if self._refused.add(one.stamp, follows or one.stamp < self._grid.stamp):
+                    self._end_run()
+                    break
+            return ()
+        self._refused.clear()
+        return self._follow(now, fitting)
+
+    # ---- both ------------------------------------------------------------------------------
+
+    def _end_run(self) -> None:
+        """Let a run begin with the next sample; enough of them have been waited for already."""
+        self.counts["new runs"] += 1
+        self._refused.clear()
+        self._begun, self._waiting = False, PATIENCE
+
+    def _begin(self, now: float, one: _Arrived) -> tuple[Sample, ...]:
+        """Begin a run with ``one`` if the OP in force is known or was waited for."""
+        in_force = self._applied.in_force(one.stamp)
+        waits = in_force is None and not self.rules.lockstep and self._waiting < PATIENCE
+        if self._sp is None or waits:
+            return ()
+        self._begun, self._waiting, self._behind = True, 0, 0
+        self._refused.clear()
+        self._check.forget()
+        self._grid.begin(one.stamp)
+        self._applied.before(one.stamp, True)
+        self._heard(now)
+        return (self._sample(one, one.stamp, True, Given(in_force), begins=True),)
+
+    def _follow(self, now: float, fitting: dict[int, _Arrived]) -> tuple[Sample, ...]:
+        """Return every sample up to the newest of ``fitting``, by samples ahead of the last."""
+        newest = max(fitting)
+        missing = newest - len(fitting)
+        if missing > LONGEST_GAP:
+            self._end_run()
+            return self._begin(now, fitting[newest])
+        self.counts["missing"] += missing
+        self.counts["passed over"] += len(fitting) - 1
+        self._behind = len(fitting) - 1
+        samples = []
+        for k in range(1, newest + 1):
+            one = fitting.get(k)
+            if one is None:
+                samples.append(self._missing(False))
+                continue
+            self._grid.advance(one.stamp)
+            samples.append(self._sample(one, one.stamp, k == newest, self._given(one.stamp)))
+        self._heard(now)
+        return tuple(samples)
+
+    def _missing(self, answered: bool) -> Sample:
+        self._grid.advance(None)
+        stamp = self._grid.stamp
+        _keep(self._missed, self._grid.number, True)
+        return self._sample(None, stamp, answered, self._given(stamp))
+
+    def _given(self, stamp: int) -> Given:
+        given = self._applied.before(stamp, self._in_time)
+        return dataclasses.replace(given, known=True) if self.rules.lockstep else given
+
+    def _heard(self, now: float) -> None:
+        """Note when the newest PV came."""
+        self._pv_number, self._pv_now = self._grid.number, now
+        self._blind_from = self._taken_at = now
+
+    def _sample(
+        self, one: _Arrived | None, stamp: int, answered: bool, given: Given, begins: bool = False
+    ) -> Sample:
+        if one is None:
+            pv = np.full(len(self.rules.instruments), np.nan)
+        else:
+            self.counts["bad values"] += int(np.count_nonzero(~np.isfinite(one.pv)))
+            pv = self._check.measured(stamp / SECOND, one.pv)
+            self.counts["out of range"] += int(np.count_nonzero(np.isfinite(one.pv) & np.isnan(pv)))
+        # An OP that stays in force while samples are passed over answers none of them.
+        self._in_time = answered
+        assert self._sp is not None
+        sp, dv = self._sp, self._dv
+        if self.rules.lockstep:
+            sp, dv = self._sp_at.get(stamp, sp), self._dv_at.get(stamp)
+        return Sample(self._grid.number, stamp, pv, sp, dv, answered, begins, given)
+
+
+def _keep(waiting: dict[int, T], stamp: int, value: T) -> None:
+    waiting[stamp] = value
+    if len(waiting) > KEPT:
+        del waiting[next(iter(waiting))]

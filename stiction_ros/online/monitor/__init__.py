@@ -1,0 +1,1 @@
+"""Whether the gap between loop and model grows, and what it is."""

@@ -1,0 +1,135 @@
+"""What the workflow says of one window: a plain function that a worker process can run."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from stiction_ros.discrepancy import (
+    Discrepancy,
+    FoundEffect,
+    GapOptions,
+    GapVerdict,
+    find_discrepancy,
+)
+from stiction_ros.effects import behaviours
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+
+@dataclasses.dataclass(frozen=True)
+class GapFinding:
+    """What was found in one window.
+
+    Attributes:
+        begin, end: first and last sample of the window, counted from the first of the run.
+        verdict: None when the window could not be used.
+        text: one sentence.
+        effects: each in a few words.
+        document: the mapping of ``gap --json`` without ``model_before`` and ``seconds``; its
+            times are seconds since ``begin``.
+    """
+
+    begin: int
+    end: int
+    verdict: GapVerdict | None
+    text: str
+    effects: tuple[str, ...]
+    document: Mapping[str, Any]
+
+    @property
+    def word(self) -> str:
+        """The verdict, or ``unusable``."""
+        return "unusable" if self.verdict is None else self.verdict.value
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping that diagnostics carry."""
+        return {
+            "begin": self.begin,
+            "end": self.end,
+            "verdict": self.word,
+            "text": self.text,
+            "effects": list(self.effects),
+            "gap": dict(self.document),
+        }
+
+
+def find_in_window(model: LoopModel, record: Record) -> GapFinding:
+    """Run the workflow, without bootstraps, on a window of a running loop.
+
+    Args:
+        model: the loop as it is known.
+        record: the window; its ``start`` counts from the first sample of the run.
+
+    Raises:
+        InputError: as :func:`stiction_ros.discrepancy.find_discrepancy`.
+    """
+    found = find_discrepancy(model, [record], GapOptions(quick=True))
+    effects = tuple(_effect(effect, record.start) for effect in found.effects)
+    begin = round(record.start / record.sample_time)
+    document = found.to_json()
+    del document["model_before"]  # known to whoever asked
+    del document["seconds"]  # another each time
+    return GapFinding(
+        begin, begin + len(record) - 1, found.verdict, _sentence(found, effects), effects, document
+    )
+
+
+def standing(old: GapFinding | None, new: GapFinding) -> GapFinding:
+    """Return the finding that stands after one more window of the same growth.
+
+    An effect may have left the later window: one that shows nothing takes nothing back.
+    """
+    silent = new.verdict in (None, GapVerdict.NONE, GapVerdict.UNTESTABLE)
+    return old if old is not None and silent else new
+
+
+def unusable(begin: int, end: int, reason: str) -> GapFinding:
+    """Return what is said of a window on which the workflow failed."""
+    return GapFinding(begin, end, None, f"window not usable: {reason}", (), {})
+
+
+def _sentence(found: Discrepancy, effects: Sequence[str]) -> str:
+    if found.verdict is GapVerdict.NONE:
+        return "no effect of the catalogue is found"
+    if found.verdict is GapVerdict.UNTESTABLE:
+        return "no effect is found, and the window could not show any of valve or process"
+    if found.verdict is GapVerdict.UNKNOWN:
+        rest = "the gap is there, but no effect of the catalogue explains it"
+        return "; ".join((*effects, rest))
+    if effects:
+        return "; ".join(effects)
+    return "one of " + ", ".join(_named(place, effect) for place, effect in found.alternatives)
+
+
+def _effect(effect: FoundEffect, start: float) -> str:
+    """Return an effect such as ``V1: stiction f_s 4.9 (4.6 to 5.2) %, f_d 2 (1.8 to 2.2) %``."""
+    units = _units(effect)
+    parts = []
+    for key, value in effect.parameters.items():
+        shift = start if key == "time" else 0.0
+        text = f"{key} {value + shift:.4g}"
+        if key in effect.intervals:
+            low, high = effect.intervals[key]
+            text += f" ({low + shift:.4g} to {high + shift:.4g})"
+        parts.append(f"{text} {units[key]}".rstrip() if key in units else text)
+    said = f"{_named(effect.place, effect.effect)} {', '.join(parts)}".rstrip()
+    others = " or ".join(_named(place, name) for place, name in effect.alternatives)
+    return f"{said}, or {others}" if others else said
+
+
+def _named(place: str, effect: str) -> str:
+    kind, _, tag = place.partition(":")
+    if kind == "valve":
+        return f"{tag}: {effect}"
+    return f"{tag}: {kind} {effect}" if tag else f"{kind} {effect}"
+
+
+def _units(effect: FoundEffect) -> dict[str, str]:
+    """Return the units of the parameters; a signal's own unit is not known here."""
+    found: dict[str, str] = {}
+    for kind in behaviours():
+        if kind.effect == effect.effect:
+            found |= {p.key: "" if "signal" in p.unit else p.unit for p in kind.parameters()}
+    return found

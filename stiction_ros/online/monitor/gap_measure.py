@@ -1,0 +1,195 @@
+"""The gap of one window of a running loop, held against that of a baseline."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.gap.measure import measure_gap
+from stiction_ros.discrepancy.likelihood.noise import (
+    Blocks,
+    BoolArray,
+    fit_noise,
+    left_by,
+    projector,
+    whiten,
+)
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+BATCHES = 24  # of the baseline, whose spread tells how much its mean square can be trusted
+SHORTEST = 60  # rows that an output needs
+CLEARED = 0.05  # a healthy window exceeds the limit of the way back this often
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputBaseline:
+    r"""Noise of one output in the baseline, by which later windows are judged.
+
+    Attributes:
+        name: tag.
+        ar: φ of the AR noise of the free run's residual, shape (p,).
+        std: s₀, standard deviation of its innovations, units of the output.
+        freedom: degrees of freedom that s₀² is worth,
+
+            .. math:: \nu_0 = \min(n_0 - q,\ 2 s_0^4 / \mathrm{Var}\, s_0^2)
+
+            with the variance of the mean square taken from :data:`BATCHES` batches, so that
+            heavy tails and a gap that comes in bursts widen the limit.
+        rows: n₀.
+        floor: standard deviation of the noise in a free run, units of the output.
+    """
+
+    name: str
+    ar: FloatArray
+    std: float
+    freedom: float
+    rows: int
+    floor: float
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputLook:
+    """One output in one window, units of the output.
+
+    Attributes:
+        name: tag.
+        gap: standard deviation s₁ of the innovations of the model's free run, under the noise
+            of the baseline.
+        baseline: the same in the baseline, s₀.
+        limit: of s₁/s₀, for a healthy loop to exceed as seldom as asked.
+        back: of s₁/s₀, below which a gap that had grown counts as gone.
+        free_run_rmse: of PV less the free run, on rows that nothing was fitted to.
+        noise_floor: standard deviation of the noise of the baseline in a free run.
+    """
+
+    name: str
+    gap: float
+    baseline: float
+    limit: float
+    back: float
+    free_run_rmse: float
+    noise_floor: float
+
+    @property
+    def growth(self) -> float:
+        """The gap over that of the baseline, s₁/s₀."""
+        return self.gap / max(self.baseline, 1e-300)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping that diagnostics carry."""
+        return dataclasses.asdict(self)
+
+
+def begun_at_stems(model: LoopModel, record: Record, count: int) -> Record:
+    """Return the last ``count`` samples, the first OP replaced by the modelled stems.
+
+    A free run takes a stem to be where OP is at its first sample. A sticky valve seldom is, so
+    the valves' effects are run over all samples before. With ideal valves nothing is replaced.
+
+    Args:
+        model: whose valves are run.
+        record: the window and what came before it.
+        count: samples of the window.
+    """
+    first = max(len(record) - count, 0)
+    part = record.part(first, len(record))
+    op = part.op.copy()
+    for valve, (low, high) in zip(model.valves, model.limits.tolist(), strict=True):
+        if not valve.effects or valve.name not in record.valves:
+            continue
+        column = record.valves.index(valve.name)
+        stem = np.clip(record.op[: first + 1, column], low, high)
+        for effect in valve.effects:
+            stem = effect.simulate(stem, float(stem[0]), record.sample_time)
+        op[0, column] = min(max(float(stem[-1]), low), high)
+    return dataclasses.replace(part, op=op)
+
+
+def baseline_of(model: LoopModel, record: Record) -> tuple[OutputBaseline, ...]:
+    """Return the noise of every output in the baseline.
+
+    Raises:
+        InputError: a record that does not fit the model, or a model whose free run grows
+            without bound.
+    """
+    run = FreeRun(model, join_records(model, [record]))
+    return tuple(_output_baseline(run, i) for i in range(len(model.outputs)))
+
+
+def look_at(
+    model: LoopModel, record: Record, known: tuple[OutputBaseline, ...], chance: float
+) -> tuple[OutputLook, ...]:
+    r"""Measure the gap of one window and the limits that it is held against.
+
+    With e the innovations of the window's free run under the noise of the baseline, their mean
+    square over that of the baseline follows Fisher's distribution while nothing changes:
+
+    .. math:: s_1^2 / s_0^2 \sim F(\nu_1, \nu_0), \quad \nu_1 = \nu_0 n_1 / n_0
+
+    Args:
+        model: the loop as it is known.
+        record: the window.
+        known: what :func:`baseline_of` gives for the same model.
+        chance: that the limit of any output is exceeded in a window of a healthy loop.
+
+    Raises:
+        InputError: as :func:`baseline_of`.
+    """
+    run = FreeRun(model, join_records(model, [record]))
+    shares = measure_gap(Baseline.of(run))
+    looks = []
+    for i, base in enumerate(known):
+        rows = _rows(run, i)
+        gap = _innovation_std(run, i, base.ar, rows)
+        freedom = base.freedom * int(rows.sum()) / max(base.rows, 1)
+        limit, back = (
+            math.sqrt(float(fisher.isf(level / len(known), freedom, base.freedom)))
+            for level in (chance, max(CLEARED, chance))
+        )
+        rmse = shares[i].free_run_rmse
+        looks.append(OutputLook(base.name, gap, base.std, limit, back, rmse, base.floor))
+    return tuple(looks)
+
+
+def _rows(run: FreeRun, output: int) -> BoolArray:
+    """Return the rows that can be scored, held-out ones included, shape (N,)."""
+    blocks = run.blocks(output)
+    return np.asarray(blocks.train | blocks.held)
+
+
+def _output_baseline(run: FreeRun, output: int) -> OutputBaseline:
+    rows = _rows(run, output)
+    noise = fit_noise(
+        run.gap[:, output], run.free[output], Blocks(rows, np.zeros_like(rows, dtype=bool))
+    )
+    used = projector(run.free[output][rows]).shape[1] + len(noise.ar)
+    count = max(int(rows.sum()) - used, 1)
+    squares = noise.innovations[rows] ** 2
+    variance = float(squares.sum()) / count
+    means = np.array([batch.mean() for batch in np.array_split(squares, BATCHES) if len(batch)])
+    spread = float(means.var(ddof=1)) / len(means) if len(means) > 1 else 0.0
+    freedom = min(float(count), 2.0 * variance**2 / max(spread, 1e-300))
+    residual = float(np.sqrt(np.mean(noise.residual[rows] ** 2)))
+    return OutputBaseline(
+        run.model.outputs[output],
+        noise.ar,
+        math.sqrt(variance),
+        max(freedom, 2.0),
+        int(rows.sum()),
+        min(noise.stationary_std, residual),
+    )
+
+
+def _innovation_std(run: FreeRun, output: int, ar: FloatArray, rows: BoolArray) -> float:
+    """Return the standard deviation of the innovations with start and level left open."""
+    basis = projector(whiten(run.free[output], ar)[rows])
+    left = left_by(basis, whiten(run.gap[:, output], ar)[rows])
+    return math.sqrt(float(left @ left) / max(len(left) - basis.shape[1], 1))

@@ -1,0 +1,261 @@
+"""When the gap between loop and model has grown, and on which windows that is looked into."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.monitor.gap_measure import (
+    OutputBaseline,
+    OutputLook,
+    baseline_of,
+    begun_at_stems,
+    look_at,
+)
+from stiction_ros.records import Record
+from stiction_ros.settings import setting
+
+HISTORY_SAMPLES = 20_000  # from which the stems of sticky valves are known
+
+
+@dataclasses.dataclass(frozen=True)
+class MonitorRule:
+    """How a running loop is held against its model.
+
+    Every ``monitor_period`` samples the gap of the last ``monitor_window`` samples is held
+    against that of ``monitor_baseline`` samples at the beginning. It has *grown* when it
+    exceeds, on any output, what a loop that does not change exceeds with the chance
+    ``monitor_false_alarm`` a window, and the baseline by ``monitor_growth``. It has *gone* when
+    it is within what nineteen of twenty unchanged windows show.
+    """
+
+    monitor: bool = setting(False, "compare the loop with its model and look into a grown gap")
+    monitor_window: int = setting(1000, "samples whose gap is measured", low=200)
+    monitor_period: int = setting(250, "samples between two measurements", low=1)
+    monitor_baseline: int = setting(
+        1000, "samples at the beginning with which later gaps are compared", low=200
+    )
+    monitor_false_alarm: float = setting(
+        0.001, "chance that a window of an unchanged loop counts as grown", low=1e-12, high=0.05
+    )
+    monitor_growth: float = setting(
+        0.1, "smallest growth that matters, share of the baseline's gap", low=0.0, high=10.0
+    )
+
+    @property
+    def lead(self) -> int:
+        """Fewest samples before a window, over which the stems find their places."""
+        return self.monitor_window // 2
+
+
+@dataclasses.dataclass(frozen=True)
+class GapLook:
+    """One measurement of the gap.
+
+    Attributes:
+        begin, end: first and last sample of the window.
+        outputs: empty when the window could not be used.
+        grown: whether the gap counts as grown now.
+        alarm: whether it has grown with this window.
+        failure: why the window could not be used, or empty.
+        job: model and window that the workflow is to look into, or None.
+    """
+
+    begin: int
+    end: int
+    outputs: tuple[OutputLook, ...]
+    grown: bool
+    alarm: bool = False
+    failure: str = ""
+    job: tuple[LoopModel, Record] | None = None
+
+    @property
+    def worst(self) -> OutputLook | None:
+        """The output whose gap has grown most against its limit."""
+        return max(self.outputs, key=lambda look: look.growth / look.limit, default=None)
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        worst = self.worst
+        if worst is None:
+            return self.failure
+        if self.grown:
+            return f"gap of {worst.name} is {worst.growth:.3g} times the baseline's"
+        return "gap as in the baseline"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping that diagnostics carry."""
+        return {
+            "begin": self.begin,
+            "end": self.end,
+            "grown": self.grown,
+            "alarm": self.alarm,
+            "failure": self.failure,
+            "outputs": {look.name: look.to_json() for look in self.outputs},
+        }
+
+
+class GapMonitor:
+    """Keeps the window, the baseline and whether the gap has grown.
+
+    The baseline is a stretch of signals, not a figure: another model is measured on the same
+    stretch. When as many samples have passed under another model, they become the baseline if
+    their gap is smaller: a limit cycle, say, is no good yardstick.
+
+    The workflow looks into the window with which the gap has grown, and into one more every
+    half window while it stays so, up to the first that lies wholly behind the alarm.
+    """
+
+    def __init__(
+        self,
+        rule: MonitorRule,
+        loop: str,
+        valves: Sequence[str],
+        outputs: Sequence[str],
+        sample_time: float,
+    ) -> None:
+        """Start with an empty window, without baseline and model."""
+        self.rule = rule
+        self._loop, self._sample_time = loop, sample_time
+        self._valves, self._outputs = tuple(valves), tuple(outputs)
+        self._coming: list[tuple[int, LoopModel]] = []
+        self.model: LoopModel | None = None
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        longest = max(self.rule.monitor_window, self.rule.monitor_baseline) + self.rule.lead
+        longest = max(longest, HISTORY_SAMPLES)
+        self._op: deque[FloatArray] = deque(maxlen=longest)
+        self._pv: deque[FloatArray] = deque(maxlen=longest)
+        self._reference: Record | None = None
+        self._changed: int | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        """Drop what was measured by another model."""
+        self._known: tuple[OutputBaseline, ...] = ()
+        self._grown_since: int | None = None
+        self._looked_into: int | None = None
+
+    def retune(self, rule: MonitorRule) -> None:
+        """Change the rule from the next sample on; turned on or with other lengths, begin anew."""
+        old, new = ((r.monitor, r.monitor_window, r.monitor_baseline) for r in (self.rule, rule))
+        self.rule = rule
+        if old != new:
+            self._begin_anew()
+
+    @property
+    def has_model(self) -> bool:
+        """Whether a model is in force or will be."""
+        return self.model is not None or bool(self._coming)
+
+    def use(self, model: LoopModel, sample: int) -> None:
+        """Compare with ``model`` from the window on that ends at ``sample`` or later."""
+        self._coming.append((sample, model))
+
+    def restart(self) -> None:
+        """Empty the window, as after samples that were missed; the baseline is kept."""
+        self._op.clear()
+        self._pv.clear()
+
+    def add(self, sample: int, op: FloatArray, pv: FloatArray) -> GapLook | None:
+        """Take in one sample, OP (m,) and PV (p,); return a measurement when one is due.
+
+        Nothing is kept while the rule's ``monitor`` is false.
+        No window holds a sample that is not finite: it begins anew behind it.
+        """
+        self._take_model(sample)
+        if not self.rule.monitor:
+            return None
+        if not (np.isfinite(op).all() and np.isfinite(pv).all()):
+            self.restart()
+            return None
+        self._op.append(np.array(op, dtype=float))
+        self._pv.append(np.array(pv, dtype=float))
+        if (sample + 1) % self.rule.monitor_period:
+            return None
+        if self._reference is None:
+            self._reference = self._last(self.rule.monitor_baseline, sample)
+        window = self._last(self.rule.monitor_window, sample)
+        if self.model is None or self._reference is None or window is None:
+            return None
+        try:
+            return self._look(self.model, self._reference, window, sample)
+        except InputError as error:
+            begin = sample + 1 - self.rule.monitor_window
+            return GapLook(begin, sample, (), self._grown_since is not None, failure=str(error))
+
+    def _take_model(self, sample: int) -> None:
+        while self._coming and self._coming[0][0] <= sample:
+            self.model = self._coming.pop(0)[1]
+            self._changed = None if self._reference is None else sample
+            self._forget()
+
+    def _last(self, count: int, sample: int) -> Record | None:
+        """Return all samples that are kept; None when too few for ``count`` and their lead."""
+        if len(self._op) < count + self.rule.lead:
+            return None
+        return Record(
+            self._loop,
+            self._sample_time,
+            self._valves,
+            self._outputs,
+            np.array(self._op),
+            np.array(self._pv),
+            start=(sample + 1 - len(self._op)) * self._sample_time,
+        )
+
+    def _look(self, model: LoopModel, reference: Record, window: Record, sample: int) -> GapLook:
+        count = self.rule.monitor_baseline
+        if not self._known:
+            self._known = baseline_of(model, begun_at_stems(model, reference, count))
+        self._replace_baseline(model, sample)
+        record = begun_at_stems(model, window, self.rule.monitor_window)
+        outputs = look_at(model, record, self._known, self.rule.monitor_false_alarm)
+        least = 1.0 + self.rule.monitor_growth
+        if self._grown_since is None:
+            if any(look.growth > max(look.limit, least) for look in outputs):
+                self._grown_since, self._looked_into = sample, None
+        elif all(look.growth <= look.back for look in outputs):
+            self._grown_since = None
+        job = (model, record) if self._is_looked_into(sample) else None
+        begin = sample + 1 - len(record)
+        since = self._grown_since
+        return GapLook(begin, sample, outputs, since is not None, since == sample, job=job)
+
+    def _replace_baseline(self, model: LoopModel, sample: int) -> None:
+        """Take the first stretch under a changed model for the baseline if its gap is smaller."""
+        count = self.rule.monitor_baseline
+        if self._changed is None or sample + 1 - self._changed < count:
+            return
+        stretch = self._last(count, sample)
+        if stretch is None:
+            return
+        self._changed = None
+        known = baseline_of(model, begun_at_stems(model, stretch, count))
+        if _size(known) < _size(self._known):
+            self._reference, self._known = stretch, known
+
+    def _is_looked_into(self, sample: int) -> bool:
+        if self._grown_since is None:
+            return False
+        window = self.rule.monitor_window
+        if self._looked_into is not None:
+            over = self._looked_into >= self._grown_since + window
+            if over or sample < self._looked_into + window // 2:
+                return False
+        self._looked_into = sample
+        return True
+
+
+def _size(known: Sequence[OutputBaseline]) -> float:
+    """Return the gap of all outputs as one figure, the mean logarithm."""
+    return float(np.mean([np.log(max(base.std, 1e-300)) for base in known]))

@@ -1,0 +1,1 @@
+"""Recorded runs once more without ROS, held against what was published."""

@@ -1,0 +1,322 @@
+"""What a replay needs of a bag: the signals in their order, the settings, what was published."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
+from stiction_ros.records.bag.run_metadata import mapping_of
+from stiction_ros.records.run.bag_reader import JOINT_STATE
+from stiction_ros.records.run.bag_runs import tell_runs
+from stiction_ros.records.run.gap_log import GapLog, gap_log
+from stiction_ros.records.run.log import Fit, ModeChange, fits, mode_changes
+from stiction_ros.records.storage.bag_metadata import BagTopic
+
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+STRING = "std_msgs/msg/String"
+PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
+_INPUTS = ("pv", "op", "op_applied", "sp", "dv")
+_TEXTS = ("config", "loop_model")
+_KIND_BY_PARAMETER = {"confirmations": "estimator", "horizon": "controller"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Signal:
+    """One message of a signal, such as ``pv`` or ``op_applied``: stamp in ns, tags, values.
+
+    ``by`` is the full name of the node whose OP it is; empty where that is not told.
+    """
+
+    kind: str
+    stamp: int
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    by: str = ""
+
+    def of(self, names: Sequence[str]) -> FloatArray | None:
+        """Return the values of ``names``, shape (len(names),); None when one is missing."""
+        if len(self.names) != len(self.values):
+            return None
+        found = dict(zip(self.names, self.values, strict=True))
+        if any(name not in found for name in names):
+            return None
+        return np.array([found[name] for name in names], dtype=float)
+
+
+@dataclasses.dataclass(frozen=True)
+class PublishedFit:
+    """One message of ``stiction``.
+
+    Attributes:
+        rows: value, lower and upper end by ``V1.f_s``, %; empty for an unusable window.
+        token: ``valid_from`` of the loop model in force, as text.
+    """
+
+    rows: Mapping[str, tuple[float, float, float]]
+    token: str
+
+
+@dataclasses.dataclass(frozen=True)
+class PublishedModel:
+    """One message of ``loop_model``, and how many ``op`` came before it in the bag."""
+
+    text: str
+    valid_from: int
+    ops_before: int
+
+
+@dataclasses.dataclass(frozen=True)
+class NodeConfig:
+    """What a node told on ``~/config``: its name, version, parameters and loop model."""
+
+    node: str
+    version: str
+    parameters: Mapping[str, Any]
+    model: Mapping[str, Any] | None
+
+
+@dataclasses.dataclass(frozen=True)
+class ReplayBag:
+    """A bag, ready to be replayed.
+
+    Attributes:
+        name: of the bag.
+        namespace: of the loop's topics.
+        signals: in the order of the bag.
+        estimator, controller: configurations, None when the bag has none.
+        published_fits: messages of ``stiction`` by the end of their window, ns.
+        told_fits: the fits in ``/diagnostics`` by the end of their window, ns.
+        told_gaps: what the monitor told in ``/diagnostics``.
+        models: messages of ``loop_model`` in their order.
+        modes: changes of mode in ``/diagnostics``, the first mode included.
+        counted: a stamp in ns and how many samples the estimator had taken in up to it; None
+            when the bag does not tell.
+        notes: what was left out or stands in the way, one sentence each.
+    """
+
+    name: str
+    namespace: str
+    signals: tuple[Signal, ...]
+    estimator: NodeConfig | None
+    controller: NodeConfig | None
+    published_fits: Mapping[int, PublishedFit]
+    told_fits: Mapping[int, Fit]
+    told_gaps: GapLog
+    models: tuple[PublishedModel, ...]
+    modes: tuple[ModeChange, ...]
+    counted: tuple[int, int] | None
+    notes: tuple[str, ...]
+
+    def stamps(self, kind: str) -> list[int]:
+        """Return the stamps of one signal in ascending order, each once, ns."""
+        return sorted({signal.stamp for signal in self.signals if signal.kind == kind})
+
+
+def read_replay_bag(path: str | Path, *, namespace: str | None = None) -> ReplayBag:
+    """Read what a replay needs from a bag, in one pass.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        namespace: of the loop; needed when the bag holds several loops.
+
+    Raises:
+        InputError: no such bag, damaged, without ``pv`` and ``op``, or of several loops.
+    """
+    notes: list[str] = []
+    messages = list(read_messages(path, wanted=_wanted, notes=notes))
+    space = _loop(messages, namespace, str(path))
+    inside = [m for m in messages if _node_or_topic_space(m) in (space, None)]
+    configs = _configs(inside, space, notes)
+    loops = {_hardware(config) for config in configs.values()}
+    diagnostics = [
+        m
+        for m in inside
+        if m.type == DIAGNOSTICS and (not loops or any(_is_of(s, loops) for s in m.message.status))
+    ]
+    notes += _changed_parameters(inside, configs.values())
+    signals = tuple(_signals(inside))
+    stamps = [signal.stamp for signal in signals if signal.kind == "pv"]
+    runs = tell_runs(stamps, range(len(stamps))).runs
+    if len(runs) > 1:
+        notes.append(f"holds {len(runs)} runs, a replay needs one run from its first sample")
+    return ReplayBag(
+        name=Path(path).name,
+        namespace=space,
+        signals=signals,
+        estimator=configs.get("estimator"),
+        controller=configs.get("controller"),
+        published_fits=dict(_published_fits(inside)),
+        told_fits={fit.stamp: fit for fit in fits(diagnostics)},
+        told_gaps=gap_log(diagnostics),
+        models=tuple(_models(inside)),
+        modes=mode_changes(diagnostics),
+        counted=_counted(diagnostics, configs.get("estimator")),
+        notes=tuple(notes),
+    )
+
+
+def _wanted(topic: BagTopic) -> bool:
+    name = last_part(topic.name)[1]
+    return (
+        (topic.type == JOINT_STATE and name in (*_INPUTS, "stiction"))
+        or (topic.type == STRING and name in _TEXTS)
+        or topic.type in (DIAGNOSTICS, PARAMETER_EVENT)
+    )
+
+
+def _loop(messages: Iterable[BagMessage], namespace: str | None, where: str) -> str:
+    """Return the namespace of the loop to replay."""
+    found: dict[str, set[str]] = {}
+    for message in messages:
+        space, name = last_part(message.topic)
+        if message.type == JOINT_STATE:
+            found.setdefault(space, set()).add(name)
+    loops = sorted(space for space, names in found.items() if {"pv", "op"} <= names)
+    if namespace is not None:
+        wanted = "/" + namespace.strip("/") if namespace.strip("/") else ""
+        if wanted not in loops:
+            _refuse_listened({wanted: found.get(wanted, set())}, where)
+            known = ", ".join(space or "/" for space in loops) or "none"
+            raise InputError(
+                f"holds no loop in the namespace {namespace}",
+                where=where,
+                fix=f"its loops are {known}",
+            )
+        return wanted
+    if not loops:
+        _refuse_listened(found, where)
+        raise InputError("holds no topics pv and op", where=where, fix="record both")
+    if len(loops) > 1:
+        raise InputError(
+            f"holds {len(loops)} loops ({', '.join(space or '/' for space in loops)})",
+            where=where,
+            fix="choose one by --namespace",
+        )
+    return loops[0]
+
+
+def _refuse_listened(found: Mapping[str, set[str]], where: str) -> None:
+    """Raise InputError when a loop has ``pv`` and ``op_applied`` but nobody gave an ``op``."""
+    if any({"pv", "op_applied"} <= names for names in found.values()):
+        raise InputError(
+            "was recorded while only listening (op_applied, no op): no controller's OP to replay",
+            where=where,
+            fix="identify, report, convert and gap take it",
+        )
+
+
+def _node_or_topic_space(message: BagMessage) -> str | None:
+    """Return the namespace a message belongs to; None for the global topics."""
+    space, name = last_part(message.topic)
+    if message.type in (DIAGNOSTICS, PARAMETER_EVENT):
+        return None
+    return space.rpartition("/")[0] if name == "config" else space
+
+
+def _signals(messages: Iterable[BagMessage]) -> Iterator[Signal]:
+    for message in messages:
+        kind = last_part(message.topic)[1]
+        if message.type == JOINT_STATE and kind in _INPUTS:
+            state = message.message
+            values = tuple(float(value) for value in state.position)
+            names, by = tuple(map(str, state.name)), str(state.header.frame_id)
+            yield Signal(kind, stamp_ns(state), names, values, by)
+
+
+def _published_fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, PublishedFit]]:
+    for message in messages:
+        if message.type != JOINT_STATE or last_part(message.topic)[1] != "stiction":
+            continue
+        state = message.message
+        columns = (state.name, state.position, state.velocity, state.effort)
+        rows = {
+            str(name): (float(value), float(low), float(high))
+            for name, value, low, high in zip(*columns, strict=False)
+        }
+        yield stamp_ns(state), PublishedFit(rows, str(state.header.frame_id))
+
+
+def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
+    ops = 0
+    for message in messages:
+        name = last_part(message.topic)[1]
+        if message.type == JOINT_STATE and name == "op":
+            ops += 1
+        elif message.type == STRING and name == "loop_model":
+            text = str(message.message.data)
+            document = mapping_of(text)
+            valid_from = document.get("valid_from", 0)
+            yield PublishedModel(text, valid_from if isinstance(valid_from, int) else 0, ops)
+
+
+def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> dict[str, NodeConfig]:
+    """Return the configurations of estimator and controller, told apart by their parameters."""
+    found: dict[str, NodeConfig] = {}
+    for message in messages:
+        if message.type != STRING or last_part(message.topic)[1] != "config":
+            continue
+        document = mapping_of(str(message.message.data))
+        parameters, model = document.get("parameters"), document.get("model")
+        if not isinstance(parameters, dict):
+            continue
+        kind = next((k for key, k in _KIND_BY_PARAMETER.items() if key in parameters), None)
+        if kind is None:
+            continue
+        config = NodeConfig(
+            str(document.get("node", f"{space}/{kind}")),
+            str(document.get("version", "")),
+            parameters,
+            model if isinstance(model, dict) else None,
+        )
+        if kind in found and found[kind] != config:
+            notes.append(f"{config.node} was started more than once, the first start is replayed")
+            continue
+        found.setdefault(kind, config)
+    return found
+
+
+def _hardware(config: NodeConfig) -> str:
+    """Return the loop that the diagnostics of a node name as their hardware."""
+    named = config.parameters.get("loop") or (config.model or {}).get("loop", "")
+    return str(named)
+
+
+def _is_of(status: Any, loops: set[str]) -> bool:
+    return not status.hardware_id or str(status.hardware_id) in loops
+
+
+def _changed_parameters(messages: Iterable[BagMessage], configs: Iterable[NodeConfig]) -> list[str]:
+    """Return a note per node whose parameters were changed while it ran."""
+    nodes = {config.node for config in configs}
+    changed: dict[str, dict[str, None]] = {}
+    for message in messages:
+        if message.type == PARAMETER_EVENT and message.message.node in nodes:
+            names = [str(parameter.name) for parameter in message.message.changed_parameters]
+            changed.setdefault(message.message.node, {}).update(dict.fromkeys(names))
+    return [
+        f"{node}: {', '.join(names)} changed while it ran; the values at its start are replayed"
+        for node, names in changed.items()
+        if names
+    ]
+
+
+def _counted(
+    diagnostics: Iterable[BagMessage], estimator: NodeConfig | None
+) -> tuple[int, int] | None:
+    """Return a stamp and the estimator's count of samples at it."""
+    name = "estimator" if estimator is None else estimator.node.rpartition("/")[2]
+    for message in diagnostics:
+        for status in message.message.status:
+            if status.name != f"{name}: status":
+                continue
+            count = {item.key: item.value for item in status.values}.get("sample", "")
+            if count.isdecimal() and int(count) > 0:
+                return stamp_ns(message.message), int(count)
+    return None

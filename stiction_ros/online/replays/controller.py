@@ -1,0 +1,232 @@
+"""The controller of a recorded run once more: every ``op``, every change of mode."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.input.applied_op import Given
+from stiction_ros.online.input.port import LONGEST_GAP
+from stiction_ros.online.input.samples import Sample
+from stiction_ros.online.input.signal_check import SignalCheck
+from stiction_ros.online.node_settings import ControllerNodeSettings
+from stiction_ros.online.replays.bag import ReplayBag
+from stiction_ros.records.run.log import ModeChange
+
+SECOND = 10**9
+
+
+@dataclasses.dataclass(frozen=True)
+class Offer:
+    """A loop model for the controller: its YAML, and the sample of the run that it is for."""
+
+    text: str
+    sample: int
+
+
+@dataclasses.dataclass(frozen=True)
+class OpMatch:
+    """How the recorded ``op`` and the replayed ones compare.
+
+    Attributes:
+        compared: samples at which both are there.
+        equal: how many of them agree in every bit.
+        first_difference: which sample differs first and how; empty when none does.
+    """
+
+    compared: int = 0
+    equal: int = 0
+    first_difference: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class ReplayedControl:
+    """What the controller did in the replay.
+
+    Attributes:
+        changes: modes in their order, the one at the start first.
+        op: comparison with the recorded ``op``.
+        notes: why it stopped or left something out.
+    """
+
+    changes: tuple[ModeChange, ...]
+    op: OpMatch
+    notes: tuple[str, ...]
+
+
+def replay_controller(
+    bag: ReplayBag,
+    settings: ControllerNodeSettings,
+    model: LoopModel,
+    offers: tuple[Offer, ...],
+    origin: int,
+) -> ReplayedControl:
+    """Step the controller over the recorded ``pv``, ``op_applied``, ``sp`` and ``dv``.
+
+    Args:
+        bag: the recorded run.
+        settings, model: as the node had them.
+        offers: loop models of the estimator in their order.
+        origin: stamp of sample 0 of the run, ns.
+
+    Raises:
+        InputError: settings that do not fit the model.
+    """
+    live = LiveController(settings, model)
+    recorded = _recorded_op(bag, model)
+    step = round(model.sample_time * SECOND)
+    notes: list[str] = []
+    changes: list[ModeChange] = []
+    match = OpMatch()
+    first: int | None = None
+    waiting = list(offers)
+    for sample in _samples(bag, settings, model, notes):
+        if first is None:
+            first = (sample.stamp - origin + step // 2) // step
+        now = first + sample.number
+        while waiting and waiting[0].sample <= now:
+            _offer(live, waiting.pop(0), first, notes)
+        told = len(live.changes) if changes else 0
+        if sample.begins and sample.given.op is not None:
+            live.begin(sample.given.op)
+        elif sample.given.op is not None:
+            live.applied(sample.given.op, ours=sample.given.ours)
+        if not sample.answered:
+            live.pass_over(sample.pv, sample.dv)
+            continue
+        op = live.step(sample.pv, sample.sp, sample.dv).op
+        match = _compared(match, op, recorded.get(sample.stamp), (sample.stamp - origin) / SECOND)
+        frictions = dict(live.known_friction())
+        for change in live.changes[told:]:
+            stamp = origin + (first + change.sample) * step
+            changes.append(
+                ModeChange(stamp, change.mode.value, change.model, change.reason, frictions)
+            )
+    return ReplayedControl(_without_repeats(changes), match, tuple(notes))
+
+
+def _offer(live: LiveController, offer: Offer, first: int, notes: list[str]) -> None:
+    try:
+        live.offer(LoopModel.from_yaml(offer.text, "loop_model"), offer.sample - first)
+    except InputError as error:
+        notes.append(f"the model for sample {offer.sample} is refused: {error}")
+
+
+def _samples(
+    bag: ReplayBag, settings: ControllerNodeSettings, model: LoopModel, notes: list[str]
+) -> Iterator[Sample]:
+    """Yield every sample that has all the controller waits for, oldest first.
+
+    In realtime a sample without a recorded ``op`` was passed over, and one without ``pv`` was
+    stepped without; in lockstep every one was answered.
+    """
+    lockstep = settings.pace == "lockstep"
+    pv, dv = _by_stamp(bag, "pv", model.outputs), _disturbances(bag, model)
+    op, given = _recorded_op(bag, model), _given(bag, model)
+    if lockstep and settings.sp_source == "schedule":
+        sp = _by_stamp(bag, "sp", model.outputs)
+    else:
+        sp = _held_set_points(bag, model.outputs)
+    needs_dv = bool(model.process.measured_disturbances) and lockstep
+    check = SignalCheck(model.instruments)
+    missing = np.full(len(model.outputs), np.nan)
+    step = round(model.sample_time * SECOND)
+    stamps = sorted(pv) if lockstep else [s for s in sorted({*pv, *op}) if s >= min(op, default=0)]
+    held_sp = held_dv = None
+    number, before = -1, 0
+    for stamp in stamps:
+        answered = lockstep or stamp in op
+        lacking = "sp" if answered and stamp not in sp else ""
+        if lacking or (needs_dv and stamp not in dv):
+            notes.append(
+                f"{lacking or 'dv'} is missing at {stamp / SECOND:.9g} s, the replay ends there"
+            )
+            return
+        held_sp, held_dv = _good(check, sp.get(stamp), held_sp), dv.get(stamp, held_dv)
+        if held_sp is None:
+            continue  # no set-point that can be used has come yet
+        begins = number < 0
+        gap = 0 if begins else min((stamp - before + step // 2) // step - 1, LONGEST_GAP)
+        for _ in range(gap):
+            number += 1
+            told, before = given.get(before, Given()), before + step
+            yield Sample(number, before, missing, held_sp, held_dv, False, False, told)
+        number += 1
+        told = given.get(stamp - step if begins else before, Given())
+        shown = check.measured(stamp / SECOND, pv[stamp]) if stamp in pv else missing
+        yield Sample(number, stamp, shown, held_sp, held_dv, answered, begins, told)
+        before = stamp
+
+
+def _good(check: SignalCheck, sp: FloatArray | None, held: FloatArray | None) -> FloatArray | None:
+    return sp if sp is not None and check.within(sp) else held
+
+
+def _by_stamp(bag: ReplayBag, kind: str, names: tuple[str, ...]) -> dict[int, FloatArray]:
+    """Return the values of one signal by stamp; of several at one stamp the first."""
+    found: dict[int, FloatArray] = {}
+    for signal in bag.signals:
+        if signal.kind == kind and signal.stamp not in found:
+            values = signal.of(names)
+            if values is not None:
+                found[signal.stamp] = values
+    return found
+
+
+def _disturbances(bag: ReplayBag, model: LoopModel) -> Mapping[int, FloatArray]:
+    return _by_stamp(bag, "dv", model.process.measured_disturbances)
+
+
+def _held_set_points(bag: ReplayBag, names: tuple[str, ...]) -> dict[int, FloatArray]:
+    """Return the set-points recorded last before the ``op`` of each stamp."""
+    found: dict[int, FloatArray] = {}
+    held: FloatArray | None = None
+    for signal in bag.signals:
+        if signal.kind == "sp":
+            values = signal.of(names)
+            held = held if values is None else values
+        elif signal.kind == "op" and held is not None:
+            found.setdefault(signal.stamp, held)
+    return found
+
+
+def _given(bag: ReplayBag, model: LoopModel) -> dict[int, Given]:
+    """Return what the valves were given by stamp; of several at one stamp the first."""
+    own = {"", bag.controller.node if bag.controller is not None else ""}
+    found: dict[int, Given] = {}
+    for signal in bag.signals:
+        if signal.kind == "op_applied" and signal.stamp not in found:
+            op = signal.of(model.valve_names)
+            if op is not None:
+                found[signal.stamp] = Given(op, ours=signal.by in own)
+    return found
+
+
+def _recorded_op(bag: ReplayBag, model: LoopModel) -> dict[int, FloatArray]:
+    return _by_stamp(bag, "op", model.valve_names)
+
+
+def _compared(match: OpMatch, op: FloatArray, recorded: FloatArray | None, time: float) -> OpMatch:
+    if recorded is None:
+        return match
+    same = np.array_equal(op, recorded)
+    difference = match.first_difference
+    if not same and not difference:
+        difference = f"op at {time:.9g} s: recorded {recorded.tolist()}, replayed {op.tolist()}"
+    return OpMatch(match.compared + 1, match.equal + same, difference)
+
+
+def _without_repeats(changes: list[ModeChange]) -> tuple[ModeChange, ...]:
+    """Drop changes that change neither mode nor model nor friction, as their readers do."""
+    kept: list[ModeChange] = []
+    for change in changes:
+        force = (change.mode, change.model, change.frictions)
+        if not kept or force != (kept[-1].mode, kept[-1].model, kept[-1].frictions):
+            kept.append(change)
+    return tuple(kept)

@@ -1,0 +1,203 @@
+"""What a replay says: fits, ``op`` and changes of mode, each held against the recorded ones."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Sequence
+from typing import Any
+
+from stiction_ros.json_values import finite
+from stiction_ros.online.replays.bag import ReplayBag
+from stiction_ros.online.replays.controller import SECOND, OpMatch
+from stiction_ros.online.replays.estimator import ReplayedFit
+from stiction_ros.records.run.log import ModeChange
+
+
+class Match(enum.StrEnum):
+    """How something replayed compares with what was recorded."""
+
+    EQUAL = "equal"
+    DIFFERENT = "different"
+    NOT_COMPARED = "not_compared"
+
+
+@dataclasses.dataclass(frozen=True)
+class FitMatch:
+    """One fit, replayed and recorded.
+
+    Attributes:
+        fit: of the replay.
+        match: equal in every bit, different, or not compared.
+        difference: the first difference, or why it is not compared; empty when equal.
+    """
+
+    fit: ReplayedFit
+    match: Match
+    difference: str
+
+
+@dataclasses.dataclass(frozen=True)
+class ModeMatch:
+    """The changes of mode, recorded and replayed.
+
+    Attributes:
+        recorded, replayed: in their order.
+        match: equal when stamps, modes, models, reasons and frictions are.
+        difference: the first difference, or why nothing is compared; empty when equal.
+        before: mode in force when a bag that begins late begins; empty otherwise.
+    """
+
+    recorded: tuple[ModeChange, ...]
+    replayed: tuple[ModeChange, ...]
+    match: Match
+    difference: str
+    before: str = ""
+
+    @property
+    def swaps(self) -> tuple[ModeChange | None, ModeChange | None]:
+        """The swap that was recorded and the replayed one."""
+        return swap_of(self.recorded, self.before), swap_of(self.replayed, self.before)
+
+
+@dataclasses.dataclass(frozen=True)
+class MonitorMatch:
+    """What the monitor told, replayed and recorded.
+
+    Attributes:
+        looks, equal_looks: measurements of the gap in the bag, and how many came again.
+        findings, equal_findings: windows looked into, likewise.
+        match: equal in every bit, different, or not compared.
+        difference: the first difference, or why nothing is compared; empty when equal.
+    """
+
+    looks: int
+    equal_looks: int
+    findings: int
+    equal_findings: int
+    match: Match
+    difference: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """A replay and its comparison with what was recorded.
+
+    Attributes:
+        bag: the recorded run.
+        origin: stamp of sample 0 of the run, ns.
+        from_first_sample: whether the bag holds the run from its first sample.
+        samples: of the run up to the end of the bag.
+        fits: every fit that was due within the bag.
+        modes: None when the bag has no configuration of a controller.
+        op: None likewise, and for a bag that begins later than the run.
+        notes: what stands in the way of equality, one sentence each.
+        monitor: None when the estimator ran without monitor.
+    """
+
+    bag: ReplayBag
+    origin: int
+    from_first_sample: bool
+    samples: int
+    fits: tuple[FitMatch, ...]
+    modes: ModeMatch | None
+    op: OpMatch | None
+    notes: tuple[str, ...]
+    monitor: MonitorMatch | None = None
+
+    @property
+    def match(self) -> Match:
+        """``different`` when anything compared differs, ``equal`` when anything is compared."""
+        found = [fit.match for fit in self.fits]
+        if self.modes is not None:
+            found.append(self.modes.match)
+        if self.op is not None and self.op.compared:
+            found.append(Match.DIFFERENT if self.op.first_difference else Match.EQUAL)
+        if self.monitor is not None:
+            found.append(self.monitor.match)
+        for match in (Match.DIFFERENT, Match.EQUAL):
+            if match in found:
+                return match
+        return Match.NOT_COMPARED
+
+    @property
+    def first_difference(self) -> str:
+        """The first difference: of fits, ``op``, modes, then the monitor; empty for none."""
+        for fit in self.fits:
+            if fit.match is Match.DIFFERENT:
+                return f"fit at {self.seconds(fit.fit.stamp):.9g} s: {fit.difference}"
+        if self.op is not None and self.op.first_difference:
+            return self.op.first_difference
+        if self.modes is not None and self.modes.match is Match.DIFFERENT:
+            return self.modes.difference
+        if self.monitor is not None and self.monitor.match is Match.DIFFERENT:
+            return self.monitor.difference
+        return ""
+
+    def seconds(self, stamp: int) -> float:
+        """Return the time of a stamp in s since the first sample of the run."""
+        return (stamp - self.origin) / SECOND
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``replay --json``; times in s since the run's first sample."""
+        document = {
+            "bag": self.bag.name,
+            "match": self.match.value,
+            "first_difference": self.first_difference,
+            "from_first_sample": self.from_first_sample,
+            "samples": self.samples,
+            "fits": [self._fit(match) for match in self.fits],
+            "op": None if self.op is None else dataclasses.asdict(self.op),
+            "modes": None if self.modes is None else self._modes(self.modes),
+            "swap": None if self.modes is None else self._swap(self.modes),
+            "monitor": None if self.monitor is None else dataclasses.asdict(self.monitor),
+            "notes": list(self.notes),
+        }
+        return dict(finite(document))
+
+    def _fit(self, match: FitMatch) -> dict[str, Any]:
+        update = match.fit.update
+        valves = () if update is None else update.identification.valves
+        return {
+            "sample": match.fit.end,
+            "time": self.seconds(match.fit.stamp),
+            "match": match.match.value,
+            "difference": match.difference,
+            "whole_window": match.fit.whole,
+            "failure": match.fit.failure,
+            "loop_model": bool(match.fit.model_text),
+            "valves": [valve.to_json() for valve in valves],
+        }
+
+    def _modes(self, modes: ModeMatch) -> dict[str, Any]:
+        return {
+            "match": modes.match.value,
+            "difference": modes.difference,
+            "recorded": [self._change(change) for change in modes.recorded],
+            "replayed": [self._change(change) for change in modes.replayed],
+        }
+
+    def _swap(self, modes: ModeMatch) -> dict[str, float | None]:
+        recorded, replayed = modes.swaps
+        return {
+            "recorded": None if recorded is None else self.seconds(recorded.stamp),
+            "replayed": None if replayed is None else self.seconds(replayed.stamp),
+        }
+
+    def _change(self, change: ModeChange) -> dict[str, Any]:
+        return {
+            "time": self.seconds(change.stamp),
+            "mode": change.mode,
+            "model": change.model,
+            "reason": change.reason,
+            "friction": dict(change.frictions),
+        }
+
+
+def swap_of(changes: Sequence[ModeChange], before: str = "") -> ModeChange | None:
+    """Return the first change from ``unaware`` to a mode that knows of the friction."""
+    for change in changes:
+        if before == "unaware" and change.mode in ("embedding", "inversion"):
+            return change
+        before = change.mode
+    return None

@@ -1,0 +1,43 @@
+"""One figure or table of the paper: what it prints, and what comes out here."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.report.drawing import Drawing
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One number, or one claim, beside ours.
+
+    Attributes:
+        what: in words.
+        printed: as the paper has it; empty where it has none.
+        ours: what came out here.
+        remark: a misprint, a deviation, or the reason for one.
+    """
+
+    what: str
+    printed: str
+    ours: str
+    remark: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Exhibit:
+    """A figure or a table.
+
+    Attributes:
+        name: of the option that asks for it, such as ``figure2`` or ``tableA.3``.
+        title: heading.
+        rows: numbers side by side; a drawing may have none.
+        drawing: None for a table.
+        remark: what holds for all of it.
+    """
+
+    name: str
+    title: str
+    rows: tuple[Row, ...] = ()
+    drawing: Drawing | None = None
+    remark: str = ""

@@ -1,0 +1,163 @@
+"""The grid search that the paper compares with, reference [20], as published.
+
+A triangular grid over (f_S, f_D) of all valves at once. For one point after another the stem is
+simulated, by the smoothed law (5) at τ = 10⁴; for one delay after another the ARX coefficients
+are found by least squares, and SE (14) is kept. The lowest mean SE wins. Nothing is shared
+between points: this is the baseline, and its cost is the number of points times the number of
+choices of delays.
+
+A record of p outputs has p independent least-squares problems per choice of delays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.identification.problem.equation_error import (
+    ArxOrders,
+    Delays,
+    EquationError,
+    fit_outputs,
+)
+from stiction_ros.identification.result.identification import FitStatus, Identification
+from stiction_ros.identification.result.search_log import SearchLog
+from stiction_ros.paper.one_step_result import (
+    Answer,
+    check_record,
+    delay_choices,
+    evaluated,
+    friction_limits,
+    result,
+)
+from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.smoothed.laws import smooth_law
+from stiction_ros.paper.smoothed.stems import final_smoothing
+from stiction_ros.records.record import Record
+
+MAX_POINTS = 2_000_000
+MAX_CHOICES = 20_000
+Progress = Callable[[float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class GridPoint:
+    """The best point of a grid.
+
+    Attributes:
+        friction: rows (f_S, f_D), shape (m, 2), %.
+        delays: for each output the t_d of each valve, samples.
+        found: stems and ARX models there; its ``squared_error`` is (12a).
+        points: grid points that were worked through.
+    """
+
+    friction: FloatArray
+    delays: Delays
+    found: EquationError
+    points: int
+
+
+def nodes(limit: float, step: float) -> FloatArray:
+    """Return the rows (f_S, f_D) of one valve's triangle, 0 ≤ f_D ≤ f_S ≤ limit, shape (n, 2).
+
+    Nodes are whole multiples of ``step``, so that round numbers are on the grid.
+    """
+    values = step * np.arange(int(np.floor(limit / step * (1.0 + 1e-12))) + 1)
+    return np.array(
+        [(static, dynamic) for static in values for dynamic in values[values <= static]]
+    )
+
+
+def count_points(record: Record, options: PaperOptions) -> int:
+    """Return the number of grid points of a record, by which a benchmark extrapolates."""
+    sides = np.floor(friction_limits(record, options) / options.grid_step * (1.0 + 1e-12)) + 1.0
+    return int(np.prod([side * (side + 1.0) / 2.0 for side in sides.tolist()]))
+
+
+def identify(
+    record: Record,
+    options: PaperOptions | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Identify by the grid search.
+
+    Args:
+        record: what was measured.
+        options: orders, delay range, ``grid_step``, ``grid_law``; None for the defaults.
+        progress: called with the share done, 0 to 1.
+
+    Raises:
+        InputError: a record that no model can be fitted to, a step coarser than the OP span,
+            or a grid of more than ``MAX_POINTS`` points.
+    """
+    begun = time.perf_counter()
+    options = options or PaperOptions(method="grid")
+    orders = check_record(record, options)
+    best = search(record, options, orders, progress or (lambda share: None))
+    stable = all(fit.largest_root < 1.0 for fit in best.found.fits)
+    answer = Answer(
+        FitStatus.OK if stable else FitStatus.NO_MODEL,
+        "" if stable else "the process at the best point is unstable",
+        best.friction,
+        best.found.fits,
+        best.found.stems,
+    )
+    log = SearchLog(
+        squared_error=evaluated(record, options, best.friction, best.delays).squared_error,
+        objective=best.found.squared_error,
+        output_order=orders.output,
+        input_order=orders.input,
+        first=orders.first,
+        points=best.points,
+        delays_tried=len(delay_choices(record, options, MAX_CHOICES)),
+    )
+    return result(record, options, answer, log, time.perf_counter() - begun)
+
+
+def search(
+    record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
+) -> GridPoint:
+    """Return the grid point and delays of lowest mean SE; see :func:`identify`."""
+    limits = friction_limits(record, options)
+    if options.grid_step > limits.max():
+        raise InputError(
+            f"step {options.grid_step:g} % is coarser than the largest friction {limits.max():g} %",
+            where="grid_step",
+            fix="choose a smaller step",
+        )
+    total = count_points(record, options)
+    if total > MAX_POINTS:
+        raise InputError(
+            f"the grid has {total} points, up to {MAX_POINTS} are worked through",
+            where="grid_step",
+            fix="choose a larger step or a friction limit",
+        )
+    choices = delay_choices(record, options, MAX_CHOICES)
+    law, hard = smooth_law(options.law), options.grid_law == "hard"
+    smoothing = final_smoothing(limits)
+    best: GridPoint | None = None
+    for number, friction in enumerate(_points(limits, options.grid_step), start=1):
+        stems = (
+            law.hard_stems(record.op, friction)
+            if hard
+            else law.stems(record.op, friction, smoothing)
+        )
+        for delays in choices:
+            found = fit_outputs(record.pv, stems, delays, orders)
+            if best is None or found.squared_error < best.found.squared_error:
+                best = GridPoint(friction, delays, found, total)
+        progress(number / total)
+    assert best is not None  # every triangle has its corner (0, 0)
+    return best
+
+
+def _points(limits: FloatArray, step: float) -> Iterator[FloatArray]:
+    """Yield the frictions of all valves, shape (m, 2), one grid point after another."""
+    for rows in itertools.product(*(nodes(limit, step) for limit in limits.tolist())):
+        yield np.array(rows)

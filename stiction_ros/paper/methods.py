@@ -1,0 +1,58 @@
+"""Identification by the paper's methods.
+
+- ``nlp``: the nonlinear programme (12) at its best, :mod:`.programme.nlp`.
+- ``nlp_printed``: the same to the letter, :mod:`.programme.printed`.
+- ``grid``: the grid search that the paper compares with, :mod:`.grid_search`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+
+from stiction_ros.identification import Identification
+from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
+from stiction_ros.paper.options import PaperOptions
+from stiction_ros.records import Record
+
+Progress = Callable[[float], None]
+Method = Callable[[Record, PaperOptions, Progress | None], Identification]
+
+
+def _in_module(name: str) -> Method:
+    """Return ``identify`` of a module here, imported when called: CasADi loads slowly."""
+
+    def run(record: Record, options: PaperOptions, progress: Progress | None) -> Identification:
+        method: Method = importlib.import_module(f"stiction_ros.paper.{name}").identify
+        return method(record, options, progress)
+
+    return run
+
+
+METHODS: Mapping[str, Method] = {
+    "nlp": _in_module("programme.nlp"),
+    "nlp_printed": _in_module("programme.printed"),
+    "grid": _in_module("grid_search"),
+}
+
+
+def identify(
+    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
+) -> Identification:
+    """Identify friction and linear dynamics as the paper does; see :class:`PaperOptions`.
+
+    Args:
+        record: what was measured.
+        options: ``options.method`` names the method; None for the nonlinear programme.
+        progress: called with the share done, 0 to 1.
+
+    Returns:
+        Point estimates without verdict or interval; ``search`` tells what was tried.
+
+    Raises:
+        InputError: a record that no model can be fitted to, or OP and PV clearly swapped.
+    """
+    options = options or PaperOptions()
+    if options.check_columns:
+        refuse_swapped(record, swapped_columns(record))
+    return METHODS[options.method](record, options, progress)

@@ -1,0 +1,247 @@
+"""What the paper's two methods share: checks, delays to try, and the result."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.identification.linear.data import nrmse_fit
+from stiction_ros.identification.options import limited
+from stiction_ros.identification.problem.equation_error import (
+    ArxFit,
+    ArxOrders,
+    Delays,
+    EquationError,
+    fit_outputs,
+)
+from stiction_ros.identification.problem.input_checks import (
+    TOO_SHORT,
+    require_samples,
+    require_signals,
+)
+from stiction_ros.identification.result.identification import (
+    FitStatus,
+    Identification,
+    OutputModel,
+    ValveEstimate,
+    VerdictKind,
+)
+from stiction_ros.identification.result.search_log import SearchLog
+from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.smoothed.laws import smooth_law
+from stiction_ros.paper.sustained_oscillation import sustained_oscillations
+from stiction_ros.records.record import Record
+
+DEFAULT_ORDER = 3
+MIN_SAMPLES = 60
+NO_EVIDENCE = (
+    "this method gives the one best point: no interval and no verdict; as interval the whole "
+    "range of friction stands, of which it rejects nothing"
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """Where a method ended.
+
+    Attributes:
+        status, reason: ok, or why the answer is not to be trusted.
+        friction: rows (f_S, f_D), shape (m, 2), %.
+        fits: the ARX model of every output.
+        stems: stem positions that go with them, shape (m, N), %.
+    """
+
+    status: FitStatus
+    reason: str
+    friction: FloatArray
+    fits: tuple[ArxFit, ...]
+    stems: FloatArray
+
+
+def check_record(record: Record, options: PaperOptions) -> ArxOrders:
+    """Return the orders and ε of a record that can be worked on.
+
+    Raises:
+        InputError: a law that these methods do not have, no valve or output, a constant
+            signal, or too few samples.
+    """
+    smooth_law(options.law)
+    require_signals(record)
+    orders = orders_of(record, options)
+    unknowns = orders.output + len(record.valves) * orders.input
+    needed = orders.first + max(MIN_SAMPLES, 5 * (unknowns + 3))
+    require_samples(record, needed, TOO_SHORT)
+    return orders
+
+
+def orders_of(record: Record, options: PaperOptions) -> ArxOrders:
+    """Return the orders of a record, per channel where the options give them so, and ε.
+
+    Raises:
+        InputError: a number of orders that is not that of the outputs or of the valves.
+    """
+    m, p = len(record.valves), len(record.outputs)
+    longest = [options.delay[1]] * m
+    output = DEFAULT_ORDER if options.output_order is None else options.output_order
+    past = output if options.input_order is None else options.input_order
+    if isinstance(output, int) and isinstance(past, int):
+        return ArxOrders.over(output, past, longest)
+    outputs = (output,) * p if isinstance(output, int) else output
+    rows = (past,) * p if isinstance(past, int) else past
+    inputs = tuple((row,) * m if isinstance(row, int) else row for row in rows)
+    if len(outputs) != p:
+        raise InputError(f"{len(outputs)} orders n_a for {p} outputs", where="na")
+    if len(inputs) != p or any(len(row) != m for row in inputs):
+        raise InputError(f"orders n_b are not {p} rows of {m}, a row an output", where="nb")
+    shared = ArxOrders.over(max(outputs), max(map(max, inputs)), longest)
+    return dataclasses.replace(shared, channels=tuple(zip(outputs, inputs, strict=True)))
+
+
+def evaluated(
+    record: Record, options: PaperOptions, friction: FloatArray, delays: Delays
+) -> EquationError:
+    """Return (12a) at a friction, rows (f_S, f_D), (m, 2), %, under the hard law of the options."""
+    stems = smooth_law(options.law).hard_stems(record.op, np.asarray(friction, dtype=float))
+    return fit_outputs(record.pv, stems, delays, orders_of(record, options))
+
+
+def friction_limits(record: Record, options: PaperOptions) -> FloatArray:
+    """Return f_max of every valve, shape (m,), %.
+
+    It is Δu of the sustained oscillation unless the options give another, and never more than
+    OP spans.
+
+    Raises:
+        InputError: a number of limits that is not that of the valves.
+    """
+    if options.friction_limit is None:
+        found = [one.span for one in sustained_oscillations(record)]
+        return np.asarray(found, dtype=float)
+    return limited(np.ptp(record.op, axis=0), options.friction_limit)
+
+
+def delay_choices(record: Record, options: PaperOptions, most: int) -> list[Delays]:
+    """Return all T^(m p) choices of delays, one delay per output and valve.
+
+    Raises:
+        InputError: more than ``most`` choices.
+    """
+    low, high = options.delay
+    channels = len(record.valves) * len(record.outputs)
+    count = (high - low + 1) ** channels
+    if count > most:
+        raise InputError(
+            f"{high - low + 1} delays on {channels} channels are {count} choices, "
+            f"method {options.method} takes up to {most}",
+            where="delay",
+            fix="narrow the range",
+        )
+    width = len(record.valves)
+    return [
+        tuple(tuple(flat[i : i + width]) for i in range(0, channels, width))
+        for flat in itertools.product(range(low, high + 1), repeat=channels)
+    ]
+
+
+def result(
+    record: Record,
+    options: PaperOptions,
+    answer: Answer,
+    log: SearchLog,
+    seconds: float,
+) -> Identification:
+    """Return the result of a one-step method in the form of all methods."""
+    limits = friction_limits(record, options)
+    stem = answer.stems.T.copy()
+    stem.flags.writeable = False
+    outputs = tuple(
+        output_model(record, i, fit, answer.stems, orders_of(record, options))
+        for i, fit in enumerate(answer.fits)
+    )
+    notes = [*record.notes, NO_EVIDENCE]
+    if options.friction_limit is None:
+        notes += [f"largest friction tried: {one}" for one in sustained_oscillations(record)]
+    if options.output_order is None:
+        notes.append(f"orders were not given: n_a = {DEFAULT_ORDER} was taken")
+    low, high = options.delay
+    notes += [
+        f"delay of {valve} to {output.name} is the longest tried, try a wider range"
+        for output in outputs
+        for valve, delay in output.delay.items()
+        if delay == high > low
+    ]
+    return Identification(
+        status=answer.status,
+        reason=answer.reason,
+        method=options.method,
+        samples=len(record),
+        sample_time=record.sample_time,
+        seconds=seconds,
+        valves=tuple(
+            valve_estimate(
+                record, j, answer.friction[j], answer.stems[j], float(limits[j]), options.law
+            )
+            for j in range(len(record.valves))
+        ),
+        outputs=outputs,
+        stem=stem,
+        notes=tuple(notes),
+        search=log,
+    )
+
+
+def valve_estimate(
+    record: Record,
+    valve: int,
+    friction: FloatArray,
+    stem: FloatArray,
+    limit: float,
+    law: str = "he",
+) -> ValveEstimate:
+    """Return a point estimate: undecided, with intervals from 0 to the largest friction.
+
+    f_D is at most f_S, so both intervals reach from 0 to f_max.
+    """
+    static, dynamic = float(friction[0]), float(min(friction[0], friction[1]))
+    moves = int(np.count_nonzero(np.abs(np.diff(stem)) > 1e-9 * max(limit, 1e-300)))
+    return ValveEstimate(
+        name=record.valves[valve],
+        verdict=VerdictKind.UNDECIDED,
+        law=law,
+        static_friction=static,
+        static_interval=(0.0, max(limit, static)),
+        dynamic_friction=dynamic,
+        dynamic_interval=(0.0, max(limit, dynamic)),
+        jump=static - dynamic,
+        stem_start=float(record.op[0, valve]),
+        moves=moves,
+        evidence={"share": static / float(np.ptp(record.op[:, valve])), "moves": float(moves)},
+    )
+
+
+def output_model(
+    record: Record, output: int, fit: ArxFit, stems: FloatArray, orders: ArxOrders
+) -> OutputModel:
+    """Return one output's model with its one-step and its free-run fit."""
+    y = record.pv[:, output]
+    first, tail = orders.first, y[orders.first :]
+    past, inputs = orders.of_output(output, len(stems))
+    free_parameters = past + sum(inputs) + 1
+    variance = fit.squared_error / max(len(tail) - free_parameters, 1)
+    return OutputModel(
+        name=record.outputs[output],
+        a=tuple(map(float, fit.a[:past])),
+        b={
+            tag: tuple(map(float, row[:width]))
+            for tag, row, width in zip(record.valves, fit.b, inputs, strict=True)
+        },
+        delay=dict(zip(record.valves, fit.delays, strict=True)),
+        bias=fit.constant,
+        noise_std=float(np.sqrt(variance)),
+        fit_one_step=nrmse_fit(tail, tail - fit.residuals),
+        fit_free_run=nrmse_fit(tail, fit.free_run(y, stems, first)),
+    )

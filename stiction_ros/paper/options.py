@@ -1,0 +1,94 @@
+"""What a caller of the paper's methods may choose."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification import IdentificationOptions
+
+METHOD_NAMES = ("nlp", "nlp_printed", "grid")
+GRID_LAWS = ("smoothed", "hard")
+OutputOrders = int | tuple[int, ...]
+InputOrders = int | tuple[int | tuple[int, ...], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class PaperOptions:
+    """Options of :func:`stiction_ros.paper.methods.identify`.
+
+    Attributes:
+        method: ``nlp``, the nonlinear programme (12) at its best; ``nlp_printed``, the same to the
+            letter of the paper; or ``grid``.
+        output_order: n_a, or one for each output (8a); None takes 3.
+        input_order: n_b, or for each output one, or one for each valve (8b), (8c); None means
+            equal to n_a.
+        delay: inclusive range of t_d, samples, for every channel.
+        law: friction law, one with a smoothed form: ``he``, ``kano``, ``xch`` or
+            ``semi_physical`` with K = 1.99.
+        friction_limit: f_max, %, one for all valves or one for each; None is Δu, the span of
+            OP's sustained oscillation, found in the record.
+        starts: M, first guesses of the nonlinear programme for every choice of delays.
+        grid_step: step of f_S and of f_D, %.
+        grid_law: stem of the grid, ``smoothed`` as published or ``hard``.
+        check_columns: refuse a record in which OP and PV are clearly swapped.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    method: str = "nlp"
+    output_order: OutputOrders | None = None
+    input_order: InputOrders | None = None
+    delay: tuple[int, int] = (0, 10)
+    law: str = "he"
+    friction_limit: float | tuple[float, ...] | None = None
+    starts: int = 7
+    grid_step: float = 0.5
+    grid_law: str = "smoothed"
+    check_columns: bool = True
+
+    def __post_init__(self) -> None:
+        for key, known in (("method", METHOD_NAMES), ("grid_law", GRID_LAWS)):
+            if getattr(self, key) not in known:
+                raise InputError(
+                    f"unknown value {getattr(self, key)!r}",
+                    where=key,
+                    fix=f"use {' | '.join(known)}",
+                )
+        if not 1 <= self.starts <= 1000:
+            raise InputError(f"{self.starts} lies outside 1 to 1000", where="starts")
+        if not (math.isfinite(self.grid_step) and self.grid_step > 0.0):
+            raise InputError(f"{self.grid_step} is not positive", where="grid_step")
+        # What both kinds of method share is checked in one place.
+        for output in _flat(self.output_order):
+            for past in _flat(self.input_order):
+                IdentificationOptions(
+                    output_order=output,
+                    input_order=past,
+                    delay=self.delay,
+                    friction_limit=self.friction_limit,
+                )
+
+    @classmethod
+    def of(cls, options: IdentificationOptions, method: str, **chosen: object) -> PaperOptions:
+        """Return options of a method of the paper with the orders and delays of ``options``.
+
+        Args:
+            options: of an identification by the default search.
+            method: ``nlp``, ``nlp_printed`` or ``grid``.
+            chosen: other attributes of this class.
+        """
+        shared = {
+            key: getattr(options, key)
+            for key in ("output_order", "input_order", "delay", "law", "friction_limit")
+        }
+        return cls(method=method, **(shared | {"check_columns": options.check_columns} | chosen))
+
+
+def _flat(orders: OutputOrders | InputOrders | None) -> tuple[int | None, ...]:
+    """Return all single orders."""
+    if orders is None or isinstance(orders, int):
+        return (orders,)
+    return tuple(one for entry in orders for one in _flat(entry))

@@ -1,0 +1,199 @@
+r"""The paper's nonlinear programme (12) for one choice of delays.
+
+.. math::
+    \min_{f_S, f_D, \theta} \ \frac1p \sum_i \mathrm{SE}^{(i)} \quad (12a) \qquad
+    \text{s.t.} \quad 0 \le f_D \le f_S \le \Delta u \ (12d), (12e), \quad
+    \sigma^2(\hat\chi) \ge \alpha \, \sigma^2(u) \ (12f)
+
+with the stem of the smoothed law (12b) and the ARX prediction (12c). Single shooting: the
+unknowns are 2m frictions and, per output, n_a + m n_b coefficients and a constant.
+
+OP is scaled by its span, the objective by its value at the ARX start (15)-(16), and the
+coefficients by the triangular factor of the regressors at that start, so that the Hessian in
+them begins near a multiple of the identity. The Hessian is exact.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.problem.equation_error import Delays, fit_arx, largest_root
+from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
+from stiction_ros.paper.programme.programme_terms import Terms
+
+FEASIBILITY = 1e-6
+MAX_ITERATIONS = 60
+IPOPT = {
+    "print_level": 0,
+    "sb": "yes",
+    "tol": 1e-5,
+    "acceptable_tol": 1e-3,
+    "acceptable_iter": 4,
+    "mu_init": 1e-4,
+    # Data are scaled above; steep spots of the smoothed law must not scale the objective.
+    "nlp_scaling_method": "none",
+    "bound_push": 1e-8,
+    "bound_frac": 1e-8,
+    "slack_bound_push": 1e-8,
+    "slack_bound_frac": 1e-8,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Solution:
+    """One end of IPOPT; a failure is a value.
+
+    Attributes:
+        x: scaled unknowns, shape (2m + p (n_a + m n_b + 1),).
+        friction: rows (f_S, f_D), shape (m, 2), %.
+        objective: (12a), squared engineering units.
+        status: IPOPT's own word.
+        iterations: of IPOPT.
+        feasible: whether all constraints hold.
+        stable: whether every identified A(q) has its roots inside the unit circle.
+    """
+
+    x: FloatArray
+    friction: FloatArray
+    objective: float
+    status: str
+    iterations: int
+    feasible: bool
+    stable: bool
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it may win: finite, feasible and stable."""
+        return self.feasible and self.stable and bool(np.isfinite(self.objective))
+
+
+class FrictionProgramme:
+    """Problem (12) for given delays; one solver serves every start."""
+
+    def __init__(self, data: ProgrammeData, delays: Delays) -> None:
+        self.data, self.delays, self.frame = data, delays, Frame.of(data, delays)
+        self._stems = self._build_stems()
+        self._solver = self._build_solver()
+
+    def start(self, friction: FloatArray) -> FloatArray:
+        """Return unknowns with these frictions, shape (m, 2), %, and the ARX start (15)."""
+        x = np.zeros(self.frame.size)
+        x[: 2 * self.frame.valves] = (friction / self.data.op_span[:, None]).ravel()
+        return x
+
+    def fitted(self, friction: FloatArray, smoothing: FloatArray) -> tuple[FloatArray, float]:
+        """Return unknowns with the least-squares coefficients of these frictions, and (12a).
+
+        Args:
+            friction: rows (f_S, f_D), shape (m, 2), %.
+            smoothing: τ of every valve, shape (m,), 1/%.
+        """
+        span, data = self.data.op_span, self.data
+        stems = np.array(self._stems(friction / span[:, None], smoothing * span))
+        x, total = self.start(friction), 0.0
+        for i, (y, row) in enumerate(zip(data.pv, self.delays, strict=True)):
+            kept = data.orders.kept(i, self.frame.valves)
+            fit = fit_arx(y, stems, row, data.orders, kept)
+            theta = np.concatenate([fit.a, fit.b.ravel(), [fit.constant]])
+            place = 2 * self.frame.valves + i * self.frame.width
+            free = np.flatnonzero(np.append(kept, True))
+            part = np.linalg.solve(
+                self.frame.basis[i][np.ix_(free, free)], (theta - self.frame.theta[i])[free]
+            )
+            x[place + free] = part
+            total += fit.squared_error
+        return x, total / self.frame.outputs
+
+    def solve(self, x: FloatArray, smoothing: FloatArray) -> Solution:
+        """Run IPOPT once, then solve the coefficients with the frictions held.
+
+        The last is linear least squares; it completes what an iteration limit cut short.
+
+        Args:
+            x: start.
+            smoothing: τ of every valve, shape (m,), 1/%.
+        """
+        count = 2 * self.frame.valves
+        low, high = np.full(self.frame.size, -np.inf), np.full(self.frame.size, np.inf)
+        low[:count], high[:count] = 0.0, np.repeat(self.data.limit / self.data.op_span, 2)
+        low[self.frame.held], high[self.frame.held] = 0.0, 0.0
+        answer = self._solver(
+            x0=x, p=smoothing * self.data.op_span, lbx=low, ubx=high, lbg=0.0, ubg=np.inf
+        )
+        stats = self._solver.stats()
+        end = np.array(answer["x"]).ravel()
+        slack = np.array(answer["g"]).ravel()
+        friction = end[:count].reshape(-1, 2) * self.data.op_span[:, None]
+        objective = float(answer["f"]) * self.frame.start_error
+        if np.isfinite(end).all():
+            polished, least = self.fitted(friction, smoothing)
+            if not least >= objective:
+                end, objective = polished, least
+        finite = bool(np.isfinite(end).all() and np.isfinite(slack).all())
+        return Solution(
+            x=end,
+            friction=friction,
+            objective=objective,
+            status=str(stats["return_status"]),
+            iterations=int(stats["iter_count"]),
+            feasible=finite and bool(slack.min(initial=0.0) >= -FEASIBILITY),
+            stable=finite and max(largest_root(fit.a) for fit in self.frame.models(end)) < 1.0,
+        )
+
+    def _build_stems(self) -> Any:
+        friction, smoothing = (
+            ca.MX.sym("f", self.frame.valves, 2),
+            ca.MX.sym("tau", self.frame.valves),
+        )
+        rows = [
+            self.data.stems.expression(0, u, ca.vertcat(friction[j, :].T, smoothing[j]))[0]
+            for j, u in enumerate(self.data.op)
+        ]
+        return ca.Function("stems", [friction, smoothing], [ca.vertcat(*rows)])
+
+    def _build_solver(self) -> Any:
+        problem, derivatives = self._build()
+        options = derivatives | {
+            "print_time": False,
+            "no_nlp_grad": True,
+            "calc_f": False,
+            "calc_g": False,
+            "calc_lam_p": False,
+            "ipopt": IPOPT | {"max_iter": MAX_ITERATIONS},
+        }
+        return ca.nlpsol("friction", "ipopt", problem, options)
+
+    def _build(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        x, smoothing = ca.MX.sym("x", self.frame.size), ca.MX.sym("tau", self.frame.valves)
+        weight, price = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 2 * self.frame.valves)
+        terms = [Terms(self.frame, x, smoothing, order) for order in range(3)]
+        value, limits = terms[0].objective(), terms[0].constraints()
+        functions: dict[str, Any] = {
+            "grad_f": ca.Function(
+                "grad_f",
+                [x, smoothing],
+                [terms[1].objective(), terms[1].gradient()],
+                ["x", "p"],
+                ["f", "grad_f_x"],
+            ),
+            "jac_g": ca.Function(
+                "jac_g",
+                [x, smoothing],
+                [terms[1].constraints(), terms[1].jacobian()],
+                ["x", "p"],
+                ["g", "jac_g_x"],
+            ),
+            "hess_lag": ca.Function(
+                "hess_lag",
+                [x, smoothing, weight, price],
+                [ca.triu(terms[2].hessian(weight, price))],
+                ["x", "p", "lam_f", "lam_g"],
+                ["triu_hess_gamma_x_x"],
+            ),
+        }
+        return {"x": x, "p": smoothing, "f": value, "g": limits}, functions

@@ -1,0 +1,237 @@
+"""The nonlinear programme (12) within the paper's M × T runs of IPOPT.
+
+Every run solves the programme in the frictions alone (:mod:`.reduced_programme`). Points of the
+border, of the line of S_0 and from inside the triangle are ranked by their own (12a), one
+linear least squares each; none of them is a round number on purpose. Then, until M runs for each
+of T choices of delays are spent:
+
+1. every choice of delays is solved from its best points, far apart, with a third of the runs;
+2. in turn, the best end so far is gone on from (the best of many points about it, one valve
+   released, wider slopes, the other choices of delays), and the next best point is tried with the
+   delays of the best end.
+
+The best objective of a stable process wins.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.problem.equation_error import Delays
+from stiction_ros.identification.result.identification import FitStatus, Identification
+from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
+from stiction_ros.paper.one_step_result import (
+    Answer,
+    check_record,
+    delay_choices,
+    evaluated,
+    friction_limits,
+    result,
+)
+from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
+from stiction_ros.paper.programme.criterion import Criterion, StemTable
+from stiction_ros.paper.programme.reduced_programme import ReducedProgramme, ReducedSolution
+from stiction_ros.paper.programme.starts import Start, StartKind, around, candidates
+from stiction_ros.records import Record
+
+MAX_CHOICES = 500
+POINTS = 2000  # inside the widest triangle, to choose starts from
+OPENING = 3  # the first runs are a third of all
+WIDTH = 0.05  # of f_max: first difference quotients from a start
+NARROW = 0.025  # the same from an end
+AROUND = 0.05  # of f_max: points about an end, to choose the next start from
+NEARER = 0.3
+POINTS_AROUND = 200
+APART = 0.05  # of f_max: starts and ends nearer than that are one place
+Progress = Callable[[float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class _End:
+    """Where one run came to."""
+
+    delays: Delays
+    solution: ReducedSolution
+    stable: bool
+
+    @property
+    def accepted(self) -> bool:
+        return self.solution.feasible and self.stable
+
+    @property
+    def objective(self) -> float:
+        return self.solution.objective if self.accepted else float("inf")
+
+
+def identify(
+    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
+) -> Identification:
+    """Identify by the nonlinear programme (12); see the module for the order of work.
+
+    Args:
+        record: what was measured.
+        options: orders, delay range, ``starts``; None for the defaults.
+        progress: called with the share done, 0 to 1.
+
+    Returns:
+        Point estimates without a verdict, and in ``search`` every run with its end. Its
+        status is ``no_model`` when no run ended feasible with a stable process.
+
+    Raises:
+        InputError: a record that no model can be fitted to, or more than ``MAX_CHOICES``
+            choices of delays.
+    """
+    begun = time.perf_counter()
+    options = options or PaperOptions()
+    search = _Search(record, options, progress or (lambda share: None))
+    best = search.run()
+    accepted = best is not None and best.accepted
+    friction = best.solution.friction if best else np.zeros((len(record.valves), 2))
+    delays = best.delays if best else search.choices[0]
+    found = evaluated(record, options, friction, delays)
+    answer = Answer(
+        FitStatus.OK if accepted else FitStatus.NO_MODEL,
+        "" if accepted else "no start ended feasible with a stable process",
+        friction,
+        found.fits,
+        found.stems,
+    )
+    log = SearchLog(
+        squared_error=found.squared_error,
+        objective=best.solution.objective if best else found.squared_error,
+        output_order=search.table.orders.output,
+        input_order=search.table.orders.input,
+        first=search.table.orders.first,
+        points=sum(one.criterion.evaluations for one in search.programmes.values()),
+        delays_tried=len(search.choices),
+        starts=tuple(search.log),
+    )
+    return result(record, options, answer, log, time.perf_counter() - begun)
+
+
+class _Search:
+    def __init__(self, record: Record, options: PaperOptions, progress: Progress) -> None:
+        self.record, self.options, self.progress = record, options, progress
+        orders = check_record(record, options)
+        self.choices = delay_choices(record, options, MAX_CHOICES)
+        limits = friction_limits(record, options)
+        self.table = StemTable(record, limits, orders, options.law)
+        self.programmes = {
+            delays: ReducedProgramme(Criterion(self.table, delays)) for delays in self.choices
+        }
+        self.budget = options.starts * len(self.choices)
+        self.log: list[SolvedStart] = []
+        self.ends: list[_End] = []
+        self._tried: dict[Delays, list[FloatArray]] = {delays: [] for delays in self.choices}
+        self._ranked = self._rank()
+
+    def run(self) -> _End | None:
+        """Return the best end, or None where no run ended feasible."""
+        each = max(1, self.budget // OPENING // len(self.choices))
+        for delays in self.choices:
+            for _ in range(each):
+                self._open(delays)
+        onward: Iterator[tuple[Start, Delays, float]] = iter(())
+        begun_from: _End | None = None
+        while len(self.log) < self.budget:
+            best = self._best()
+            if best is None:
+                self._open(self.choices[len(self.log) % len(self.choices)])
+                continue
+            if best is not begun_from:
+                onward, begun_from = self._onward(best), best
+            step = next(onward, None)
+            if step is not None:
+                self._solve(*step)
+            if len(self.log) < self.budget:
+                self._open(best.delays)
+        self.progress(1.0)
+        return self._best()
+
+    def _rank(self) -> dict[Delays, list[Start]]:
+        """Return all candidates, the best first, for each choice of delays."""
+        found = [entry.stiction for entry in apparent_stiction(self.record)]
+        stictions = np.minimum(np.array(found), self.table.limits)
+        points = candidates(self.table.limits, stictions, POINTS)
+        ranked = {}
+        for delays, programme in self.programmes.items():
+            values = [programme.criterion(point.friction)[0] for point in points]
+            ranked[delays] = [points[k] for k in np.argsort(values, kind="stable")]
+        return ranked
+
+    def _open(self, delays: Delays) -> None:
+        """Solve from the best candidate that is not near a place tried before."""
+        for start in self._ranked[delays]:
+            if not self._near(start.friction, self._tried[delays]):
+                self._solve(start, delays, WIDTH)
+                return
+        self._solve(self._ranked[delays][0], delays, NARROW)
+
+    def _near(self, friction: FloatArray, places: list[FloatArray]) -> bool:
+        reach = APART * self.table.limits
+        return any((np.abs(place - friction).max(axis=1) < reach).all() for place in places)
+
+    def _onward(self, best: _End) -> Iterator[tuple[Start, Delays, float]]:
+        """Yield ways to go on from an end: nearer, a valve released, farther, other delays."""
+        friction, criterion = best.solution.friction, self.programmes[best.delays].criterion
+        for reach in (AROUND, NEARER * AROUND):
+            near = [friction, *around(friction, self.table.limits, reach, POINTS_AROUND)]
+            first = min(near, key=lambda point: criterion(point)[0])
+            yield Start(StartKind.RESTART, first), best.delays, NARROW
+        for j in range(len(friction)):
+            if friction[j].max() > 0.0 and len(friction) > 1:
+                released = friction.copy()
+                released[j] = 0.0
+                yield Start(StartKind.RESTART, released), best.delays, NARROW
+        yield Start(StartKind.RESTART, friction), best.delays, 4.0 * WIDTH
+        value = {delays: self.programmes[delays].criterion(friction)[0] for delays in self.choices}
+        for delays in sorted(self.choices, key=lambda delays: value[delays]):
+            if delays != best.delays:
+                yield Start(StartKind.DELAY, friction), delays, NARROW
+
+    def _solve(self, start: Start, delays: Delays, width: float) -> None:
+        start = self._released(start, self.programmes[delays].criterion)
+        solution = self.programmes[delays].solve(start.friction, width)
+        fits = evaluated(self.record, self.options, solution.friction, delays).fits
+        stable = max(fit.largest_root for fit in fits) < 1.0
+        self._tried[delays] += [start.friction, solution.friction]
+        self.ends.append(_End(delays, solution, stable))
+        self.log.append(
+            SolvedStart(
+                kind=start.kind.value,
+                delays=delays,
+                start=pairs(start.friction),
+                end=pairs(solution.friction),
+                objective=solution.objective,
+                status=solution.status,
+                iterations=solution.iterations,
+                feasible=solution.feasible,
+                stable=stable,
+            )
+        )
+        self.progress(min(1.0, len(self.log) / self.budget))
+
+    def _released(self, start: Start, criterion: Criterion) -> Start:
+        """Return the start, or the same with valves released as long as that lowers (12a)."""
+        friction = start.friction
+        for j in range(len(friction) if len(friction) > 1 else 0):
+            released = friction.copy()
+            released[j] = 0.0
+            if criterion(released)[0] < criterion(friction)[0]:
+                friction = released
+        return Start(start.kind, friction)
+
+    def _best(self) -> _End | None:
+        accepted = [end for end in self.ends if end.accepted]
+        return min(accepted, key=lambda end: end.objective) if accepted else None
+
+
+def pairs(friction: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Return frictions of shape (m, 2) as plain numbers."""
+    return tuple((float(static), float(dynamic)) for static, dynamic in friction)

@@ -1,0 +1,94 @@
+"""The paper's method to the letter: the programme (12) from M printed starts, for T delays.
+
+M × T runs of IPOPT at τ = 10⁴, each over frictions and coefficients together with exact
+derivatives, from the border of the triangle, the line of S_0 and the ARX start (15). The best
+feasible, stable end wins. :mod:`.nlp` spends as many runs better.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from stiction_ros.identification.problem.equation_error import Delays
+from stiction_ros.identification.result.identification import FitStatus, Identification
+from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
+from stiction_ros.paper.one_step_result import (
+    Answer,
+    check_record,
+    delay_choices,
+    evaluated,
+    friction_limits,
+    result,
+)
+from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
+from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
+from stiction_ros.paper.programme.nlp import MAX_CHOICES, pairs
+from stiction_ros.paper.programme.programme_data import ProgrammeData
+from stiction_ros.paper.programme.starts import draw_starts
+from stiction_ros.paper.smoothed.stems import final_smoothing
+from stiction_ros.records import Record
+
+Progress = Callable[[float], None]
+
+
+def identify(
+    record: Record, options: PaperOptions | None = None, progress: Progress | None = None
+) -> Identification:
+    """Identify as :func:`stiction_ros.paper.programme.nlp.identify`, by the printed method."""
+    begun = time.perf_counter()
+    options = options or PaperOptions(method="nlp_printed")
+    orders = check_record(record, options)
+    choices = delay_choices(record, options, MAX_CHOICES)
+    limits = friction_limits(record, options)
+    stictions = np.array([entry.stiction for entry in apparent_stiction(record)])
+    starts = draw_starts(limits, np.minimum(stictions, limits), options.starts)
+    smoothing = final_smoothing(limits)
+    data = ProgrammeData.of(record.op, record.pv, limits, orders, options.law)
+    ends: list[tuple[Delays, Solution]] = []
+    log: list[SolvedStart] = []
+    for delays in choices:
+        programme = FrictionProgramme(data, delays)
+        for start in starts:
+            end = programme.solve(programme.start(start.friction), smoothing)
+            ends.append((delays, end))
+            log.append(
+                SolvedStart(
+                    kind=start.kind.value,
+                    delays=delays,
+                    start=pairs(start.friction),
+                    end=pairs(end.friction),
+                    objective=end.objective,
+                    status=end.status,
+                    iterations=end.iterations,
+                    feasible=end.feasible,
+                    stable=end.stable,
+                )
+            )
+            if progress is not None:
+                progress(len(ends) / (len(choices) * len(starts)))
+    accepted = [one for one in ends if one[1].accepted]
+    delays, best = min(accepted or ends, key=lambda one: one[1].objective)
+    friction = best.friction if accepted else np.zeros((len(limits), 2))
+    found = evaluated(record, options, np.maximum(friction, 0.0), delays)
+    answer = Answer(
+        FitStatus.OK if accepted else FitStatus.NO_MODEL,
+        "" if accepted else "no start ended feasible with a stable process",
+        friction,
+        found.fits,
+        found.stems,
+    )
+    search = SearchLog(
+        squared_error=found.squared_error,
+        objective=best.objective,
+        output_order=orders.output,
+        input_order=orders.input,
+        first=orders.first,
+        points=len(ends),
+        delays_tried=len(choices),
+        starts=tuple(log),
+    )
+    return result(record, options, answer, search, time.perf_counter() - begun)

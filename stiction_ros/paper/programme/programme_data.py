@@ -1,0 +1,147 @@
+"""Scaled data of the nonlinear programme (12), and the frame of one choice of delays."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.problem.equation_error import (
+    ArxFit,
+    ArxOrders,
+    BoolArray,
+    Delays,
+    regressors,
+    stable_arx,
+)
+from stiction_ros.paper.programme.stem_sensitivities import StemSensitivities
+from stiction_ros.paper.smoothed.laws import smooth_law
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgrammeData:
+    """What all delays share.
+
+    Attributes:
+        op: OP about its mean over its span, shape (m, N).
+        pv: PV about its mean, engineering units, shape (p, N).
+        op_mean, op_span: shape (m,), %.
+        pv_mean: shape (p,).
+        limit: f_max = Δu of every valve, shape (m,), %.
+        orders: n_a, n_b, ε.
+        stems: sensitivities for N samples.
+    """
+
+    op: FloatArray
+    pv: FloatArray
+    op_mean: FloatArray
+    op_span: FloatArray
+    pv_mean: FloatArray
+    limit: FloatArray
+    orders: ArxOrders
+    stems: StemSensitivities
+
+    @classmethod
+    def of(
+        cls, op: FloatArray, pv: FloatArray, limit: FloatArray, orders: ArxOrders, law: str = "he"
+    ) -> ProgrammeData:
+        """Scale OP, shape (N, m), and centre PV, shape (N, p)."""
+        mean, span, level = op.mean(axis=0), np.ptp(op, axis=0), pv.mean(axis=0)
+        scaled, centred = ((op - mean) / span).T.copy(), (pv - level).T.copy()
+        stems = StemSensitivities(len(op), smooth_law(law))
+        return cls(scaled, centred, mean, span, level, limit, orders, stems)
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """Start and scaling of the ARX part for one choice of delays.
+
+    The unknowns are f_S and f_D of every valve over the span of OP, then for every output z
+    with θ = θ_0 + T z, where θ_0 is the ARX start (15) and T whitens its regressors. Coefficients
+    beyond the orders of their channel are 0 in θ_0 and T, and their entries of z are held.
+
+    Attributes:
+        data: what all delays share.
+        delays: for each output the t_d of each valve, samples.
+        theta: θ_0 per output, (a, b, c), shape (n_a + m n_b + 1,).
+        basis: T per output.
+        past: columns −y_{k−1} … −y_{k−n_a} per output, shape (N − ε, n_a).
+        start_error: (12a) at θ_0 with χ = u, squared engineering units.
+    """
+
+    data: ProgrammeData
+    delays: Delays
+    theta: tuple[FloatArray, ...]
+    basis: tuple[FloatArray, ...]
+    past: tuple[FloatArray, ...]
+    start_error: float
+
+    @classmethod
+    def of(cls, data: ProgrammeData, delays: Delays) -> Frame:
+        """Compute the ARX start (15)-(16) between OP and PV, made stable, and its whitening."""
+        orders = data.orders
+        masks = [orders.kept(i, len(data.op)) for i in range(len(data.pv))]
+        fits = [
+            stable_arx(y, data.op, row, orders, kept)
+            for y, row, kept in zip(data.pv, delays, masks, strict=True)
+        ]
+        error = float(np.mean([fit.squared_error for fit in fits]))
+        past, basis = [], []
+        for y, row, kept in zip(data.pv, delays, masks, strict=True):
+            phi = regressors(y, data.op, row, orders)
+            free = np.flatnonzero(np.append(kept, True))
+            whole = np.column_stack([phi, np.ones(len(phi))])[:, free]
+            norm = np.linalg.norm(whole, axis=0) + 1e-300
+            factor = np.linalg.qr(whole / norm, mode="r")
+            signs = np.where(np.diag(factor) < 0.0, -1.0, 1.0)
+            factor = factor + 1e-10 * np.diag(signs)
+            inverse = np.linalg.solve(factor, np.eye(len(factor)))
+            past.append(phi[:, : orders.output])
+            whitened = np.zeros((len(kept) + 1, len(kept) + 1))
+            whitened[np.ix_(free, free)] = inverse / norm[:, None] * np.sqrt(error)
+            basis.append(whitened)
+        theta = tuple(np.concatenate([fit.a, fit.b.ravel(), [fit.constant]]) for fit in fits)
+        return cls(data, delays, theta, tuple(basis), tuple(past), error)
+
+    @property
+    def valves(self) -> int:
+        """Number of valves m."""
+        return len(self.data.op)
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return len(self.data.pv)
+
+    @property
+    def width(self) -> int:
+        """Unknowns of one output, n_a + m n_b + 1."""
+        return self.data.orders.output + self.valves * self.data.orders.input + 1
+
+    @property
+    def held(self) -> BoolArray:
+        """Which unknowns have no effect, as their coefficients are none, shape (size,)."""
+        parts = [np.zeros(2 * self.valves, bool)]
+        for i in range(self.outputs):
+            parts += [~self.data.orders.kept(i, self.valves), np.zeros(1, bool)]
+        return np.concatenate(parts)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return 2 * self.valves + self.outputs * self.width
+
+    def models(self, x: FloatArray) -> tuple[ArxFit, ...]:
+        """Return the ARX models of unknowns ``x`` in engineering units, SE left at NaN."""
+        data, orders, made = self.data, self.data.orders, []
+        for i, row in enumerate(self.delays):
+            place = 2 * self.valves + i * self.width
+            theta = self.theta[i] + self.basis[i] @ x[place : place + self.width]
+            a = theta[: orders.output]
+            b = theta[orders.output : -1].reshape(self.valves, orders.input)
+            b = b / data.op_span[:, None]
+            constant = float(theta[-1] + data.pv_mean[i] * (1.0 + a.sum()))
+            constant -= float(b.sum(axis=1) @ data.op_mean)
+            made.append(ArxFit(row, a, b, constant, float("nan"), np.empty(0)))
+        return tuple(made)

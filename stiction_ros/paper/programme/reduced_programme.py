@@ -1,0 +1,206 @@
+r"""The programme (12) in the frictions alone, solved by IPOPT with slopes over a width.
+
+.. math::
+    \min_{f} V(f) \quad \text{s.t.} \quad f_S \ge f_D, \quad
+    0 \le f_S, f_D \le \Delta u, \quad \sigma^2(\hat\chi) \ge \alpha \, \sigma^2(u)
+
+V is piecewise constant in f_S at τ = 10⁴, so its derivative says nothing. IPOPT is given the
+difference quotient over a width instead, which is the slope of V averaged over that width; the
+width shrinks from one gradient to the next. The line search sees V itself, and the best point that
+was evaluated is the answer, wherever IPOPT ends.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.paper.programme.criterion import Criterion
+
+ALPHA = 0.1
+MAX_ITERATIONS = 60
+SHRINK = 0.92  # of the width, from one gradient to the next
+NARROWEST = 0.005  # of f_max
+FEASIBILITY = 1e-9
+IPOPT = {
+    "print_level": 0,
+    "sb": "yes",
+    "hessian_approximation": "limited-memory",
+    # V is about 1 at the start and f_max is 1: a first step of some hundredths.
+    "limited_memory_initialization": "constant",
+    "limited_memory_init_val": 100.0,
+    "max_iter": MAX_ITERATIONS,
+    "tol": 1e-4,
+    "mu_init": 1e-6,
+    "nlp_scaling_method": "none",
+    "bound_push": 1e-8,
+    "bound_frac": 1e-8,
+    "slack_bound_push": 1e-8,
+    "slack_bound_frac": 1e-8,
+    # Both would let a step go through that raises V.
+    "watchdog_shortened_iter_trigger": 0,
+    "max_soft_resto_iters": 0,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class ReducedSolution:
+    """Where one run of IPOPT came to.
+
+    Attributes:
+        friction: rows (f_S, f_D), shape (m, 2), %; the best feasible point evaluated, or the
+            start where none was feasible.
+        objective: V there, squared engineering units; inf where nothing was feasible.
+        status: IPOPT's own word.
+        iterations: of IPOPT.
+    """
+
+    friction: FloatArray
+    objective: float
+    status: str
+    iterations: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether any point was feasible."""
+        return bool(np.isfinite(self.objective))
+
+
+class ReducedProgramme:
+    """The programme for one choice of delays; one solver serves every start."""
+
+    def __init__(self, criterion: Criterion) -> None:
+        self.criterion = criterion
+        self.limits = criterion.table.limits
+        self._size = 2 * len(self.limits)
+        self._scale, self._width = 1.0, 0.1
+        self._best: tuple[float, FloatArray] | None = None
+        self._callbacks: list[_Called] = []
+        self._solver = self._build()
+
+    def solve(self, friction: FloatArray, width: float) -> ReducedSolution:
+        """Run IPOPT once.
+
+        Args:
+            friction: start, rows (f_S, f_D), shape (m, 2), %.
+            width: of the first difference quotients, share of f_max.
+        """
+        static, dynamic = np.asarray(friction, dtype=float).T / self.limits
+        x = np.column_stack([static - dynamic, static + dynamic]).ravel()
+        self._scale, self._width, self._best = 1.0, width, None
+        self._scale = max(self._value(x), 1e-300)
+        high = np.tile([1.0, 2.0], len(self.limits))
+        self._solver(x0=x, lbx=0.0, ubx=high, lbg=0.0, ubg=np.inf)
+        stats = self._solver.stats()
+        status, iterations = str(stats["return_status"]), int(stats["iter_count"])
+        if self._best is None:
+            return ReducedSolution(np.asarray(friction), float("inf"), status, iterations)
+        return ReducedSolution(self._best[1], self._best[0], status, iterations)
+
+    def _friction(self, x: FloatArray) -> FloatArray:
+        """Return rows (f_S, f_D), shape (m, 2), %, of (J, S) of every valve over f_max."""
+        jump, band = x.reshape(-1, 2).T
+        static, dynamic = 0.5 * (band + jump), 0.5 * (band - jump)
+        return np.column_stack([static, dynamic]) * self.limits[:, None]
+
+    def _value(self, x: FloatArray) -> float:
+        friction = self._friction(x)
+        value, moving = self.criterion(friction)
+        static, dynamic = friction.T / self.limits
+        room = min((static - dynamic).min(), dynamic.min(), (1.0 - static).min())
+        feasible = room >= -FEASIBILITY and bool((moving >= ALPHA).all())
+        if feasible and (self._best is None or value < self._best[0]):
+            dynamic = np.maximum(friction[:, 1], 0.0)
+            static = np.maximum(friction[:, 0], dynamic)
+            self._best = value, np.column_stack([static, dynamic])
+        return value / self._scale
+
+    def _slopes(self, x: FloatArray) -> FloatArray:
+        """Return the difference quotients of V over the width at hand, then narrow it."""
+        ends = self._ends(x)
+        slopes = [(self._value(high) - self._value(low)) / gap for high, low, gap in ends]
+        self._width = max(NARROWEST, SHRINK * self._width)
+        return np.array(slopes)
+
+    def _ends(self, x: FloatArray) -> list[tuple[FloatArray, FloatArray, float]]:
+        ends = []
+        for place in range(self._size):
+            high, low = x.copy(), x.copy()
+            high[place] = x[place] + self._width
+            low[place] = max(0.0, x[place] - self._width)
+            ends.append((high, low, float(high[place] - low[place])))
+        return ends
+
+    def _limits(self, x: FloatArray) -> FloatArray:
+        """Return f_D, f_max − f_S (12d) and σ²(χ)/(α σ²(u)) − 1 (12f) per valve, shape (3m,)."""
+        friction = self._friction(x)
+        static, dynamic = friction.T / self.limits
+        moving = self.criterion(friction)[1]
+        return np.concatenate([dynamic, 1.0 - static, moving / ALPHA - 1.0])
+
+    def _limit_slopes(self, x: FloatArray) -> FloatArray:
+        """Return the quotients of :meth:`_limits`, shape (3m, 2m)."""
+        columns = [
+            (self._limits(high) - self._limits(low)) / gap for high, low, gap in self._ends(x)
+        ]
+        return np.stack(columns, axis=1)
+
+    def _build(self) -> Any:
+        n, rows = self._size, 3 * len(self.limits)
+        x, p = ca.MX.sym("x", n), ca.MX.sym("p", 0)
+        value = self._called(lambda at: np.atleast_2d(self._value(at)), (1, 1))
+        slopes = self._called(lambda at: self._slopes(at)[:, None], (n, 1))
+        limits = self._called(lambda at: self._limits(at)[:, None], (rows, 1))
+        limit_slopes = self._called(self._limit_slopes, (rows, n))
+        options: dict[str, Any] = {
+            "print_time": False,
+            "no_nlp_grad": True,
+            "calc_f": False,
+            "calc_g": False,
+            "calc_lam_p": False,
+            "grad_f": ca.Function(
+                "grad_f", [x, p], [value(x), slopes(x)], ["x", "p"], ["f", "grad_f_x"]
+            ),
+            "jac_g": ca.Function(
+                "jac_g", [x, p], [limits(x), limit_slopes(x)], ["x", "p"], ["g", "jac_g_x"]
+            ),
+            "ipopt": IPOPT,
+        }
+        problem = {"x": x, "p": p, "f": value(x), "g": limits(x)}
+        return ca.nlpsol("reduced", "ipopt", problem, options)
+
+    def _called(self, function: Callable[[FloatArray], FloatArray], shape: tuple[int, int]) -> Any:
+        made = _Called(function, self._size, shape)
+        self._callbacks.append(made)  # CasADi does not keep them
+        return made
+
+
+class _Called(ca.Callback):
+    """A Python function of the scaled frictions as a CasADi function."""
+
+    def __init__(
+        self, function: Callable[[FloatArray], FloatArray], size: int, shape: tuple[int, int]
+    ) -> None:
+        ca.Callback.__init__(self)
+        self._function, self._size, self._shape = function, size, shape
+        self.construct("called", {"enable_fd": False})
+
+    def get_n_in(self) -> int:
+        return 1
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, place: int) -> Any:
+        return ca.Sparsity.dense(self._size, 1)
+
+    def get_sparsity_out(self, place: int) -> Any:
+        return ca.Sparsity.dense(*self._shape)
+
+    def eval(self, arguments: Sequence[Any]) -> list[Any]:
+        return [ca.DM(self._function(np.array(arguments[0]).ravel()))]

@@ -1,0 +1,1 @@
+"""Friction laws with smooth switches, and the stems that they give."""

@@ -1,0 +1,99 @@
+"""Δu: the span of the sustained oscillation of OP, to which the paper limits friction.
+
+Section 3.2 takes f_max = Δu, "the span of sustained oscillation of the corresponding controller
+output"; the grid of Example 2 takes the maximum periodic oscillation. A set-point move throws OP
+much farther than the cycle does, so the span of a whole record is no Δu.
+
+A record is cut where a set-point moves. Of each hold the second half counts, in which OP has
+settled into its cycle, or the cycle has stopped. Δu is the largest span of these halves that
+another hold reaches by half: a span that comes once is a transient. A record without a
+set-point move is cut into eight equal parts, each taken whole. Where nothing repeats, OP has no
+sustained oscillation and its span over the record stands in.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records import Record
+
+SETTLED = 0.5  # share of a hold after which OP has settled
+REPEATED = 0.5  # of the larger of two spans that come from the same cycle
+ALIKE = 0.9
+PARTS = 8
+MIN_SAMPLES = 4  # of a part that is looked at
+
+
+@dataclasses.dataclass(frozen=True)
+class SustainedOscillation:
+    """Δu of one valve and what speaks for it.
+
+    Attributes:
+        valve: tag.
+        span: Δu, %.
+        sustained: whether another part repeats it; False where the span of OP stands in.
+        whole: span of OP over the record, %.
+        parts: first row and one past the last of every part looked at.
+        spans: of OP in each part, %.
+    """
+
+    valve: str
+    span: float
+    sustained: bool
+    whole: float
+    parts: tuple[tuple[int, int], ...]
+    spans: tuple[float, ...]
+
+    @property
+    def alike(self) -> int:
+        """Number of parts whose span is Δu within a tenth."""
+        return sum(ALIKE * self.span <= span <= self.span for span in self.spans)
+
+    def __str__(self) -> str:
+        """Return the evidence in one line."""
+        if not self.sustained:
+            return f"Δu of {self.valve} {self.span:.3g} %: no oscillation repeats, OP's whole span"
+        return (
+            f"Δu of {self.valve} {self.span:.3g} %, within a tenth in {self.alike} of "
+            f"{len(self.spans)} parts; OP spans {self.whole:.3g} %"
+        )
+
+
+def sustained_oscillations(record: Record) -> tuple[SustainedOscillation, ...]:
+    """Return Δu of every valve of a record, with its evidence."""
+    parts = _parts(record)
+    return tuple(
+        _of_valve(tag, op, parts) for tag, op in zip(record.valves, record.op.T, strict=True)
+    )
+
+
+def _parts(record: Record) -> tuple[tuple[int, int], ...]:
+    """Return the settled half of every hold, or equal parts where no set-point moves."""
+    count = len(record)
+    moved = np.zeros(0, dtype=int)
+    if record.sp is not None:
+        moved = np.flatnonzero((np.diff(record.sp, axis=0) != 0.0).any(axis=1)) + 1
+    if len(moved) == 0:
+        edges = np.linspace(0, count, PARTS + 1).astype(int).tolist()
+        rows = list(itertools.pairwise(edges))
+    else:
+        edges = [0, *moved.tolist(), count]
+        rows = [
+            (begin + int(SETTLED * (end - begin)), end) for begin, end in itertools.pairwise(edges)
+        ]
+    return tuple((begin, end) for begin, end in rows if end - begin >= MIN_SAMPLES)
+
+
+def _of_valve(tag: str, op: FloatArray, parts: tuple[tuple[int, int], ...]) -> SustainedOscillation:
+    spans = tuple(float(np.ptp(op[begin:end])) for begin, end in parts)
+    ordered = sorted(spans, reverse=True)
+    repeated = [
+        large for large, small in itertools.pairwise(ordered) if small >= REPEATED * large > 0.0
+    ]
+    whole = float(np.ptp(op))
+    span = repeated[0] if repeated else whole
+    return SustainedOscillation(tag, span, bool(repeated), whole, parts, spans)

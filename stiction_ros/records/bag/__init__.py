@@ -1,0 +1,1 @@
+"""Bags as messages: read, written, finished, mended, played."""

@@ -1,0 +1,158 @@
+"""Reads the messages of bags: rosbag2 directories, bare files, unfinished files."""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+
+from stiction_ros.errors import InputError
+from stiction_ros.records.storage.bag_metadata import BagTopic
+from stiction_ros.records.storage.files import listing_notes, storage_files
+from stiction_ros.records.storage.mcap_scan import McapScan, RawMessage
+
+__all__ = [
+    "BagMessage",
+    "MessageDecoder",
+    "last_part",
+    "read_messages",
+    "read_raw",
+    "stamp_ns",
+    "storage_files",
+]
+
+Wanted = Callable[[BagTopic], bool]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class BagMessage:
+    """One decoded message.
+
+    Attributes:
+        topic: full topic name.
+        type: ``sensor_msgs/msg/JointState``.
+        log_time: when it was received, ns.
+        publish_time: when it was sent, ns.
+        message: its fields as attributes.
+    """
+
+    topic: str
+    type: str
+    log_time: int
+    publish_time: int
+    message: Any
+
+
+def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:
+    """Yield every message of a bag as bytes, in the order it was written.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        notes: gets what was left out, one sentence each.
+
+    Raises:
+        InputError: no such bag, or damaged; complete messages before the damage come first.
+    """
+    counts: Counter[str] = Counter()
+    for file in storage_files(path):
+        scan = McapScan(file)
+        yield from scan.messages()
+        for channel, count in scan.counts.items():
+            counts[scan.topics[channel].name] += count
+        if notes is not None:
+            notes.extend(scan.notes)
+    if notes is not None:
+        notes.extend(listing_notes(path, counts))
+
+
+def read_messages(
+    path: str | Path, *, wanted: Wanted | None = None, notes: list[str] | None = None
+) -> Iterator[BagMessage]:
+    """Yield the decoded messages of a bag in the order they were written.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        wanted: which topics to decode and yield; all when not given.
+        notes: gets what was left out, one sentence each; topics that are not in CDR with
+            ``ros2msg`` definitions are among them.
+
+    Raises:
+        InputError: no such bag, damaged, or a message that does not fit its definition.
+    """
+    decoder = MessageDecoder()
+    for raw in read_raw(path, notes):
+        if wanted is None or wanted(raw.topic):
+            message = decoder.decode(raw, str(path))
+            if message is not None:
+                yield message
+    if notes is not None:
+        notes.extend(decoder.notes)
+
+
+class MessageDecoder:
+    """Decodes messages by the definitions that the bag carries.
+
+    Attributes:
+        notes: topics that could not be decoded, one sentence each.
+    """
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+        self._factory = DecoderFactory()
+        self._decoders: dict[BagTopic, Callable[[bytes], Any] | None] = {}
+
+    def decode(self, raw: RawMessage, where: str) -> BagMessage | None:
+        """Return the message; None when its topic has no definition to decode it by.
+
+        Raises:
+            InputError: its bytes do not fit the definition.
+        """
+        topic = raw.topic
+        if topic not in self._decoders:
+            self._decoders[topic] = self._decoder(topic)
+        decoder = self._decoders[topic]
+        if decoder is None:
+            return None
+        try:
+            message = decoder(raw.data)
+        except (struct.error, ValueError, IndexError, OverflowError, MemoryError, McapError) as e:
+            raise InputError(
+                f"a message of {topic.name} does not fit its definition ({e})",
+                where=where,
+                fix="the bag is damaged, record it again",
+            ) from e
+        return BagMessage(topic.name, topic.type, raw.log_time, raw.publish_time, message)
+
+    def _decoder(self, topic: BagTopic) -> Callable[[bytes], Any] | None:
+        schema = Schema(
+            id=len(self._decoders) + 1,
+            data=topic.definition.encode(),
+            encoding=topic.schema_encoding,
+            name=topic.type,
+        )
+        try:
+            decoder = self._factory.decoder_for(topic.encoding, schema)
+        except Exception:  # any text may stand there and the parser's errors share no base
+            decoder = None
+        if decoder is None:
+            self.notes.append(f"topic {topic.name} ({topic.type}) cannot be decoded, left out")
+        return decoder
+
+
+def last_part(topic: str) -> tuple[str, str]:
+    """Return namespace and last part of a topic: ``/unit1/pv`` → ``/unit1``, ``pv``."""
+    namespace, _, name = topic.rpartition("/")
+    return namespace, name
+
+
+def stamp_ns(message: Any) -> int:
+    """Return the stamp of a message with a header, ns."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)

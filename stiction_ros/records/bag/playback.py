@@ -1,0 +1,287 @@
+"""Which messages of a bag are due: rate, start, loop, pause and step, on a clock given to it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import yaml
+
+from stiction_ros.errors import InputError
+from stiction_ros.records.bag.messages import read_raw
+from stiction_ros.records.storage.bag_metadata import BagTopic, Qos
+from stiction_ros.records.storage.mcap_scan import RawMessage
+
+SECOND = 10**9
+# Numbers of rmw's enumerations, as bags before version 9 write them.
+_NUMBERED = {
+    "history": ("system_default", "keep_last", "keep_all", "unknown"),
+    "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
+    "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class BagContent:
+    """What there is to play in a bag.
+
+    Attributes:
+        topics: by name.
+        counts: messages by topic name.
+        first, last: least and largest log time, ns.
+        notes: what was left out while reading, one sentence each.
+    """
+
+    topics: Mapping[str, BagTopic]
+    counts: Mapping[str, int]
+    first: int
+    last: int
+    notes: tuple[str, ...]
+
+    @property
+    def seconds(self) -> float:
+        """Length in seconds of recorded time."""
+        return (self.last - self.first) / SECOND
+
+
+def bag_content(path: str | Path, wanted: str = ".*") -> BagContent:
+    """Read a bag once and say what is in it.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        wanted: regular expression of the full topic names that count.
+
+    Raises:
+        InputError: no such bag, damaged, no regular expression, or no message to play.
+    """
+    notes: list[str] = []
+    topics: dict[str, BagTopic] = {}
+    counts: dict[str, int] = {}
+    first = last = 0
+    for raw in _chosen(path, wanted, notes):
+        name = raw.topic.name
+        first = min(first, raw.log_time) if counts else raw.log_time
+        last = max(last, raw.log_time)
+        topics.setdefault(name, raw.topic)
+        counts[name] = counts.get(name, 0) + 1
+    if not counts:
+        raise InputError(
+            "holds no message to play", where=str(path), fix=f"its topics must match {wanted!r}"
+        )
+    return BagContent(topics, counts, first, last, tuple(notes))
+
+
+def offered_qos(topic: BagTopic) -> Qos:
+    """Return a profile that suits every reader which the recorded publishers suited.
+
+    Where several publishers offered different profiles it is reliable, or transient local, as
+    soon as one of them was, with the largest depth. Without a recorded profile it is reliable
+    and volatile. Deadlines and lifespans are not offered: a replay does not keep them.
+
+    Raises:
+        InputError: the recorded profiles cannot be read.
+    """
+    try:
+        profiles = [
+            {key: _word(key, profile.get(key, 0)) for key in _NUMBERED}
+            | {"depth": int(profile.get("depth", 0))}
+            for profile in yaml.safe_load(topic.qos_yaml or "[]") or []
+        ]
+    except (yaml.YAMLError, AttributeError, TypeError, ValueError, IndexError):
+        raise InputError(
+            f"the quality of service of {topic.name} cannot be read", where="offered_qos_profiles"
+        ) from None
+    said = {key: {str(profile[key]) for profile in profiles} for key in _NUMBERED}
+    best_effort = bool(profiles) and said["reliability"] == {"best_effort"}
+    latched = "transient_local" in said["durability"]
+    keep_all = "keep_all" in said["history"]
+    depth = max((int(profile["depth"]) for profile in profiles), default=0)
+    return Qos(
+        history="keep_all" if keep_all else "keep_last",
+        depth=depth if depth > 0 else (1 if latched else 100),
+        reliability="best_effort" if best_effort else "reliable",
+        durability="transient_local" if latched else "volatile",
+    )
+
+
+def _word(key: str, value: object) -> str:
+    return value.lower() if isinstance(value, str) else _NUMBERED[key][int(str(value))]
+
+
+def _chosen(path: str | Path, wanted: str, notes: list[str] | None = None) -> Iterator[RawMessage]:
+    try:
+        pattern = re.compile(wanted)
+    except re.error as error:
+        raise InputError(f"no regular expression ({error})", where="topics") from None
+    matches: dict[str, bool] = {}
+    for raw in read_raw(path, notes):
+        name = raw.topic.name
+        if name not in matches:
+            matches[name] = bool(pattern.fullmatch(name))
+        if matches[name]:
+            yield raw
+
+
+@dataclasses.dataclass(frozen=True)
+class PlaybackOptions:
+    """How a bag is played.
+
+    Attributes:
+        rate: recorded seconds per second of the clock, above 0.
+        start: seconds of recorded time that are passed over at the beginning.
+        loop: whether to begin again at the end.
+    """
+
+    rate: float = 1.0
+    start: float = 0.0
+    loop: bool = False
+
+
+class Playback:
+    """Plays the messages of a bag in their order, each when its log time has come.
+
+    It is paused until :meth:`resume`. What was latched (transient local) before the start is
+    given out first, so that late topics such as a loop model are there from the beginning.
+
+    Args:
+        path: the bag.
+        content: of the bag, from :func:`bag_content` with the same ``wanted``.
+        clock: a steady clock, ns.
+        options: rate, start, loop.
+        wanted: regular expression of the full topic names to play.
+
+    Raises:
+        InputError: a rate that is not positive, or a start beyond the end.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        content: BagContent,
+        clock: Callable[[], int],
+        options: PlaybackOptions = PlaybackOptions(),
+        wanted: str = ".*",
+    ) -> None:
+        if not 0.0 < options.rate < float("inf"):
+            raise InputError(f"{options.rate:g} is no rate", where="rate", fix="use one above 0")
+        if not 0.0 <= options.start <= content.seconds:
+            raise InputError(
+                f"{options.start:g} s is not within the bag, which lasts {content.seconds:g} s",
+                where="start",
+            )
+        self._path, self._wanted, self._clock, self._options = path, wanted, clock, options
+        self._bag_time = self._since = 0
+        self._begin = content.first + round(options.start * SECOND)
+        self._latched = {
+            name: offered_qos(topic).depth
+            for name, topic in content.topics.items()
+            if offered_qos(topic).durability == "transient_local"
+        }
+        self._rate = options.rate
+        self.paused = True
+        self.finished = False
+        self.rounds = 0
+        self.played = 0
+        self._next: RawMessage | None = None
+        self._messages: Iterator[RawMessage] = iter(())
+        self._rewind()
+
+    @property
+    def time(self) -> int:
+        """Recorded time that is being played, ns."""
+        if self.paused or self.finished:
+            return self._bag_time
+        return self._bag_time + round((self._clock() - self._since) * self._rate)
+
+    @property
+    def rate(self) -> float:
+        """Recorded seconds per second of the clock; may be set at any time."""
+        return self._rate
+
+    @rate.setter
+    def rate(self, rate: float) -> None:
+        self._anchor()
+        self._rate = rate
+
+    def pause(self) -> None:
+        """Stop the recorded time."""
+        self._anchor()
+        self.paused = True
+
+    def resume(self) -> None:
+        """Let the recorded time go on from where it stopped."""
+        self._anchor()
+        self.paused = False
+
+    def step(self) -> list[RawMessage]:
+        """Return every message of the next log time.
+
+        Only a paused playback steps; a running one returns nothing.
+        """
+        found: list[RawMessage] = []
+        if not self.paused:
+            return found
+        round_before = self.rounds
+        while self._next is not None and self.rounds == round_before:
+            if found and self._next.log_time != found[0].log_time:
+                break
+            self._bag_time = max(self._bag_time, self._next.log_time)
+            found.append(self._take())
+        return found
+
+    def due(self, most: int) -> list[RawMessage]:
+        """Return up to ``most`` messages whose time has come, in the order of the bag."""
+        found: list[RawMessage] = []
+        if self.paused:
+            return found
+        now, round_before = self.time, self.rounds
+        while self._next is not None and self.rounds == round_before and len(found) < most:
+            if self._next.log_time > now:
+                break
+            found.append(self._take())
+        return found
+
+    def _take(self) -> RawMessage:
+        assert self._next is not None
+        message, self._next = self._next, next(self._messages, None)
+        self.played += 1
+        if self._next is None:
+            if self._options.loop:
+                self.rounds += 1
+                self._rewind()
+            else:
+                self._bag_time, self.finished = max(self.time, message.log_time), True
+        return message
+
+    def _rewind(self) -> None:
+        self._bag_time, self._since = self._begin, self._clock()
+        messages = _chosen(self._path, self._wanted)
+        held: dict[str, deque[RawMessage]] = {}
+        self._next = next(messages, None)
+        while self._next is not None and self._next.log_time < self._begin:
+            name = self._next.topic.name
+            if name in self._latched:
+                held.setdefault(name, deque(maxlen=self._latched[name])).append(self._next)
+            self._next = next(messages, None)
+        self._messages = _joined(held, self._next, messages)
+        self._next = next(self._messages, None)
+
+    def _anchor(self) -> None:
+        self._bag_time, self._since = self.time, self._clock()
+
+
+def _joined(
+    held: Mapping[str, deque[RawMessage]], first: RawMessage | None, rest: Iterator[RawMessage]
+) -> Iterator[RawMessage]:
+    """Yield what is latched, in the order it was recorded, and then what follows."""
+    yield from sorted((m for messages in held.values() for m in messages), key=_log_time)
+    if first is not None:
+        yield first
+    yield from rest
+
+
+def _log_time(message: RawMessage) -> int:
+    return message.log_time

@@ -1,0 +1,134 @@
+"""Makes a bag whole again whose writer was killed, or whose files are damaged."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import shutil
+from collections import Counter
+from pathlib import Path
+
+from stiction_ros.errors import InputError
+from stiction_ros.records.bag.finish import (
+    FileContent,
+    Packing,
+    content_of,
+    log_time_caps,
+    rewrite,
+    write_listing,
+)
+from stiction_ros.records.storage.bag_metadata import BagFile
+from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
+from stiction_ros.records.storage.mcap_scan import McapScan
+
+
+class RepairStatus(enum.StrEnum):
+    """What there was to do."""
+
+    WHOLE = "whole"
+    FINISHED = "finished"
+    SALVAGED = "salvaged"
+
+
+@dataclasses.dataclass(frozen=True)
+class Repair:
+    """What a repair found and did.
+
+    Attributes:
+        status: ``whole``: nothing was wrong; ``finished``: files that their writer had not
+            closed were finished, or ``metadata.yaml`` was made anew; ``salvaged``: damaged
+            records were left out.
+        files: names of the storage files, in order.
+        rewritten: those that were rewritten.
+        messages: messages by topic in the bag as it is now.
+        notes: what was wrong, one sentence each.
+    """
+
+    status: RepairStatus
+    files: tuple[str, ...]
+    rewritten: tuple[str, ...]
+    messages: dict[str, int]
+    notes: tuple[str, ...]
+
+
+def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noqa: B008 (frozen)
+    """Repair a bag in its place.
+
+    A file that was damaged is kept beside the new one, as ``….mcap.damaged``. What the bag
+    says of its run is kept. A whole bag is left as it is.
+
+    Args:
+        path: a rosbag2 directory, or one ``.mcap`` file.
+        packing: of files that are rewritten.
+
+    Raises:
+        InputError: no such bag, one of another kind, or a file that is no MCAP file at all.
+        OSError: the storage refuses.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("no such bag", where=str(path), fix="check the path")
+    if path.is_dir():
+        refuse_foreign(path)
+    files = found_files(path) if path.is_dir() else (path,)
+    contents = [_look(file) for file in files]
+    notes = [note for content in contents for note in content.notes]
+    ill = [content.damaged or not content.finished for content in contents]
+    caps = log_time_caps(files) if any(ill) else [None] * len(files)
+    for number, file in enumerate(files):
+        if ill[number]:
+            contents[number] = _mend(file, contents[number], packing, caps[number])
+    listing = _listing_faults(path, contents)
+    if path.is_dir() and (any(ill) or listing):
+        write_listing(path, contents)
+    status = RepairStatus.FINISHED if any(ill) or listing else RepairStatus.WHOLE
+    if any(content.damaged for content in contents):
+        status = RepairStatus.SALVAGED
+    return Repair(
+        status,
+        tuple(file.name for file in files),
+        tuple(file.name for file, bad in zip(files, ill, strict=True) if bad),
+        dict(_counts(contents)),
+        (*notes, *listing),
+    )
+
+
+def _look(path: Path) -> FileContent:
+    """Return what a file holds, damaged or not."""
+    scan = McapScan(path, salvage=True)
+    first: int | None = None
+    last: int | None = None
+    for message in scan.messages():
+        time = message.log_time
+        first = time if first is None else min(first, time)
+        last = time if last is None else max(last, time)
+    counts: Counter[str] = Counter()
+    for channel, topic in scan.topics.items():
+        counts[topic.name] += scan.counts[channel]
+    return content_of(BagFile(path.name, dict(counts), first, last), scan)
+
+
+def _mend(path: Path, content: FileContent, packing: Packing, cap: int | None) -> FileContent:
+    """Rewrite one file; a damaged one stays beside the new one under another name."""
+    if content.damaged:
+        shutil.copy2(path, path.with_suffix(".mcap.damaged"))
+    return rewrite(path, packing, cap=cap, salvage=True)
+
+
+def _listing_faults(path: Path, contents: list[FileContent]) -> list[str]:
+    """Return what is wrong with ``metadata.yaml``; nothing for a single file."""
+    if not path.is_dir():
+        return []
+    if not (path / METADATA).is_file():
+        return [f"{METADATA} is missing"]
+    try:
+        return listing_notes(path, _counts(contents))
+    except InputError as error:
+        return [str(error)]
+
+
+def _counts(contents: list[FileContent]) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    for content in contents:
+        counts.update(content.file.counts)
+    return counts

@@ -1,0 +1,106 @@
+"""What a bag says of the run that it holds: configurations, loop model, seed, versions.
+
+The recorder keeps it in MCAP metadata records named ``stiction_run``, so that it survives
+splitting, cutting and conversion, where the first messages of a topic may be gone. While
+the bag grows each record tells what is new; a finished file has one with everything.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from stiction_ros.records.storage.files import storage_files
+from stiction_ros.records.storage.mcap_scan import McapScan
+
+RUN = "stiction_run"
+"""Name of the metadata records."""
+
+_LENGTH = struct.Struct("<I")
+_HEAD = 4  # bytes of the CDR encapsulation
+
+
+def run_metadata(path: str | Path) -> dict[str, str]:
+    """Return what the bag at ``path`` says of its run; empty when it says nothing.
+
+    Keys: ``config:/plant`` and so on with the text on ``~/config``; ``loop_model:/loop_model``
+    with the last text there; ``seed`` and ``version`` as the configurations give them;
+    ``recorder`` with the version that wrote the bag.
+
+    Raises:
+        InputError: no such bag, or damaged.
+    """
+    found: list[tuple[str, dict[str, str]]] = []
+    for file in storage_files(path):
+        scan = McapScan(file)
+        for _ in scan.messages():
+            pass
+        found += scan.metadata
+    return merged(found)
+
+
+def merged(records: Iterable[tuple[str, Mapping[str, str]]]) -> dict[str, str]:
+    """Return the records of the run as one, the last text of each key."""
+    run: dict[str, str] = {}
+    for name, mapping in records:
+        if name == RUN:
+            run.update(mapping)
+    return run
+
+
+def may_tell(topic: str, type_name: str) -> bool:
+    """Tell whether messages of a topic are a configuration or a loop model."""
+    name = topic.rpartition("/")[2]
+    return type_name == "std_msgs/msg/String" and name in ("config", "loop_model")
+
+
+def news(topic: str, type_name: str, data: bytes) -> dict[str, str]:
+    """Return what a message tells of the run; empty for all but configurations and models.
+
+    Args:
+        topic: full name.
+        type_name: ``std_msgs/msg/String`` is looked at.
+        data: the serialised message (CDR).
+    """
+    text = string_of(data) if may_tell(topic, type_name) else None
+    if text is None:
+        return {}
+    node, _, name = topic.rpartition("/")
+    if name == "loop_model":
+        return {f"loop_model:{topic}": text}
+    return {f"config:{node}": text} | _short(text)
+
+
+def custom_data(run: Mapping[str, str]) -> dict[str, str]:
+    """Return the short texts of ``run`` that ``metadata.yaml`` repeats."""
+    return {key: text for key, text in run.items() if ":" not in key}
+
+
+def string_of(data: bytes) -> str | None:
+    """Return the text of a serialised ``std_msgs/msg/String``; None when it is none."""
+    order = "<I" if len(data) > 1 and data[1] & 1 else ">I"
+    try:
+        (length,) = struct.unpack_from(order, data, _HEAD)
+        raw = data[_HEAD + _LENGTH.size : _HEAD + _LENGTH.size + length]
+        return raw.decode().rstrip("\0") if len(raw) == length else None
+    except (struct.error, UnicodeDecodeError):
+        return None
+
+
+def mapping_of(text: str) -> dict[str, Any]:
+    """Return the mapping that a published YAML text holds; empty when it holds none."""
+    try:
+        document = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError):  # a date such as 2026-13-45, 1000 brackets
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def _short(text: str) -> dict[str, str]:
+    """Return seed and version of a configuration."""
+    document = mapping_of(text)
+    return {key: str(document[key]) for key in ("seed", "version") if key in document}

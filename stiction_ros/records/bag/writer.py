@@ -1,0 +1,299 @@
+"""Writes a rosbag2 directory that survives the death of its writer.
+
+While it runs, ``<dir>_0.mcap`` is a journal: every message is one unchunked record, handed
+to the operating system before :meth:`BagWriter.write` returns, so that a killed process
+loses nothing that it had written. At the limits that :class:`Splitting` sets the next file,
+``<dir>_1.mcap``, begins. :meth:`BagWriter.close` lets :func:`finish_bag` rewrite the
+journals chunked, compressed and indexed and adds ``metadata.yaml``; the same function
+repairs the bag of a writer that was killed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import TracebackType
+
+from mcap.records import Channel, Metadata, Schema
+
+from stiction_ros import __version__
+from stiction_ros.errors import InputError
+from stiction_ros.records.bag.finish import ROSBAG2, Packing, finish_bag, storage_path
+from stiction_ros.records.bag.run_metadata import RUN, may_tell, news
+from stiction_ros.records.storage.bag_metadata import (
+    BagFile,
+    BagTopic,
+    Qos,
+    bag_information,
+    metadata_record,
+    qos_yaml,
+)
+from stiction_ros.records.storage.mcap_chunked import COMPRESSIONS
+from stiction_ros.records.storage.mcap_format import MESSAGE, MESSAGE_HEAD, MESSAGE_RECORD
+from stiction_ros.records.storage.mcap_journal import Journal
+
+__all__ = ["BagWriter", "Packing", "Qos", "Splitting"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Splitting:
+    """When a bag goes on in its next file; 0 for never.
+
+    Attributes:
+        size: bytes of messages in one file, before compression.
+        duration: log time in one file, ns.
+    """
+
+    size: int = 0
+    duration: int = 0
+
+
+class _Entry:
+    """What :meth:`BagWriter.write` needs of a topic."""
+
+    __slots__ = ("channel", "count", "tells", "topic")
+
+    def __init__(self, channel: int, topic: BagTopic) -> None:
+        self.channel = channel
+        self.topic = topic
+        self.count = 0
+        self.tells = may_tell(topic.name, topic.type)
+
+
+class BagWriter:
+    """A rosbag2 bag (MCAP storage) being written; also a context manager.
+
+    Args:
+        directory: the bag; made with its parents, must not hold anything yet.
+        packing: of the finished bag.
+        splitting: when the next file begins.
+
+    What ``~/config`` and ``loop_model`` say is kept as metadata of the run too, see
+    :mod:`stiction_ros.records.bag.run_metadata`. One thread writes. Times are integers in
+    nanoseconds.
+
+    Raises:
+        InputError: the directory holds something already; an unknown compression.
+    """
+
+    def __init__(
+        self,
+        directory: str | Path,
+        packing: Packing = Packing(),  # noqa: B008 (frozen)
+        splitting: Splitting = Splitting(),
+    ) -> None:
+        if packing.compression not in COMPRESSIONS:
+            raise InputError(
+                f"compression {packing.compression!r} is not known",
+                fix=f"use {', '.join(COMPRESSIONS)}",
+            )
+        self.directory = Path(directory)
+        self._packing = packing
+        self._splitting = splitting
+        self._limited = splitting.size > 0 or splitting.duration > 0
+        self._entries: dict[str, _Entry] = {}
+        self._schemas: dict[tuple[str, str], int] = {}
+        self._run = {"recorder": f"stiction_ros {__version__}"}
+        self._number = 0
+        self._gone: set[int] = set()
+        self._first: int | None = None
+        self._closed = False
+        _make_empty(self.directory)
+        self._journal: Journal
+        self._begin_file(0)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages written so far, by topic."""
+        return {name: entry.count for name, entry in self._entries.items()}
+
+    def add_topic(
+        self,
+        name: str,
+        type: str,
+        definition_text: str,
+        type_hash: str,
+        qos: Qos | Iterable[Qos] = Qos(),  # noqa: B008 (frozen)
+    ) -> None:
+        """Announce a topic before its first message.
+
+        Args:
+            name: full topic name.
+            type: ``sensor_msgs/msg/JointState``.
+            definition_text: definition with dependencies, see :func:`definition`.
+            type_hash: ``RIHS01_…`` or empty.
+            qos: what its publishers offer, one profile or one for each.
+
+        Raises:
+            InputError: the topic is there already with another type.
+        """
+        self._open()
+        profiles = (qos,) if isinstance(qos, Qos) else tuple(qos)
+        topic = BagTopic(name, type, definition_text, type_hash, qos_yaml(profiles))
+        if name in self._entries:
+            known = self._entries[name].topic
+            if known.type == type:
+                return
+            raise InputError(
+                f"topic {name} is recorded as {known.type} and cannot also be {type}",
+                where=str(self.directory),
+            )
+        entry = _Entry(len(self._entries) + 1, topic)
+        self._announce(entry)
+        self._entries[name] = entry
+
+    def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
+        """Write one serialised message (CDR); it is safe from a kill when this returns.
+
+        Args:
+            topic: a name given to :meth:`add_topic`.
+            data: the bytes of a raw subscription.
+            log_time: when it was received, ns; simulated time when there is a clock.
+            publish_time: when it was sent, ns.
+
+        Raises:
+            InputError: a topic that was not announced.
+            OSError: the storage refuses, a full disk for example.
+        """
+        try:
+            entry = self._entries[topic]
+        except KeyError:
+            raise InputError(f"topic {topic} was not added", where=str(self.directory)) from None
+        if self._limited and self._is_full(log_time):
+            self._go_on()
+        head = MESSAGE_RECORD.pack(
+            MESSAGE,
+            MESSAGE_HEAD.size + len(data),
+            entry.channel,
+            entry.count & 0xFFFFFFFF,
+            log_time,
+            publish_time,
+        )
+        self._journal.append(head + data)
+        entry.count += 1
+        if entry.tells:
+            self._learn(news(topic, entry.topic.type, data))
+
+    def add_metadata(self, name: str, mapping: Mapping[str, str]) -> None:
+        """Add a metadata record; those of the run the writer keeps by itself."""
+        self._open()
+        self._journal.put(Metadata(metadata=dict(mapping), name=name))
+
+    def put_back(self) -> str:
+        """Write again what somebody has removed while it was being recorded.
+
+        Of the present file nothing is lost; files that were complete cannot be written again.
+
+        Returns:
+            What was found and done, one sentence; empty when everything is there.
+
+        Raises:
+            OSError: the storage refuses, or another file stands in the way.
+        """
+        if self._journal.is_there:
+            return ""
+        self.directory.mkdir(parents=True, exist_ok=True)
+        self._journal.put_back()
+        gone = [
+            number
+            for number in range(self._number)
+            if number not in self._gone and not storage_path(self.directory, number).exists()
+        ]
+        self._gone.update(gone)
+        said = f"{self._journal.path} was removed and is written again"
+        return f"{said}; {len(gone)} files before it are lost" if gone else said
+
+    def close(self) -> None:
+        """Finish the bag; a second call does nothing.
+
+        Raises:
+            OSError: the storage refuses; the journals stay, and can be read.
+        """
+        if self._closed:
+            return
+        self.put_back()
+        self._closed = True
+        self._journal.close()
+        finish_bag(self.directory, self._packing)
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _open(self) -> None:
+        if self._closed:
+            raise InputError("the bag is closed", where=str(self.directory))
+
+    def _is_full(self, log_time: int) -> bool:
+        """Tell whether a message of ``log_time`` belongs into the next file."""
+        limits = self._splitting
+        if self._first is None or log_time < self._first:  # simulated time follows wall time
+            self._first = log_time
+        elif limits.duration and log_time - self._first >= limits.duration:
+            return True
+        return bool(limits.size) and self._journal.size >= limits.size
+
+    def _go_on(self) -> None:
+        """Begin the next file; where the storage refuses the present one stays in use."""
+        before = self._journal, self._schemas, self._first
+        try:
+            self._begin_file(self._number + 1)
+        except OSError:
+            if self._journal is not before[0]:
+                self._journal.discard()
+            self._journal, self._schemas, self._first = before
+            raise
+        before[0].close()
+
+    def _begin_file(self, number: int) -> None:
+        """Open the journal of a file and tell it what is known."""
+        path = storage_path(self.directory, number)
+        self._journal = Journal(path)
+        self._first = None
+        self._schemas = {}
+        start = bag_information([BagFile(path.name, {}, None, None)], [])
+        self._journal.put(Metadata(metadata=metadata_record(start), name=ROSBAG2))
+        self._journal.put(Metadata(metadata=self._run, name=RUN))
+        for entry in self._entries.values():
+            self._announce(entry)
+        self._number = number
+
+    def _announce(self, entry: _Entry) -> None:
+        """Write the channel of a topic, and its schema when the file has not got it yet."""
+        topic = entry.topic
+        key = (topic.type, topic.definition)
+        if key not in self._schemas:
+            number = len(self._schemas) + 1
+            self._journal.put(Schema(number, topic.definition.encode(), "ros2msg", topic.type))
+            self._schemas[key] = number
+        metadata = topic.channel_metadata()
+        schema = self._schemas[key]
+        self._journal.put(Channel(entry.channel, topic.name, "cdr", metadata, schema))
+
+    def _learn(self, told: Mapping[str, str]) -> None:
+        changed = {key: text for key, text in told.items() if self._run.get(key) != text}
+        if changed:
+            self._run.update(changed)
+            self._journal.put(Metadata(metadata=changed, name=RUN))
+
+
+def _make_empty(directory: Path) -> None:
+    where = str(directory)
+    fix = "choose another place or move it away"
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        full = next(directory.iterdir(), None) is not None
+    except FileExistsError:
+        raise InputError("is a file, a bag is a directory", where=where, fix=fix) from None
+    except OSError as error:
+        raise InputError(f"cannot be made ({error.strerror})", where=where) from None
+    if full:
+        raise InputError("exists and is not empty", where=where, fix=fix)

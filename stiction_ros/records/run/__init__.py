@@ -1,0 +1,1 @@
+"""What a bag tells of a loop: its record, runs, estimates and modes."""

@@ -1,0 +1,270 @@
+"""What the nodes of a live loop said besides its signals: estimates, modes, texts."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import types
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records.bag.messages import BagMessage, last_part, stamp_ns
+from stiction_ros.records.record import Record
+from stiction_ros.records.run.loop_signals import JOINT_STATE
+from stiction_ros.records.storage.bag_metadata import BagTopic
+
+_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+_STRING = "std_msgs/msg/String"
+_CLOCK = "rosgraph_msgs/msg/Clock"
+_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """One parameter of one fit.
+
+    Attributes:
+        stamp: end of the window, ns.
+        name: ``V1.f_s``.
+        value: estimate, % of travel for friction.
+        low: lower end of its interval, NaN when not given.
+        high: upper end of its interval, NaN when not given.
+    """
+
+    stamp: int
+    name: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclasses.dataclass(frozen=True)
+class ModeChange:
+    """The controller's mode from a moment on.
+
+    Attributes:
+        stamp: of the first ``op`` of the new mode, ns.
+        mode: ``unaware``, ``embedding``, ``inversion`` or ``hold``.
+        model: of the valves that it works with, as the controller names it.
+        reason: why it changed.
+        frictions: what it takes for the friction of its valves, by ``V1.f_s``, %.
+    """
+
+    stamp: int
+    mode: str
+    model: str = ""
+    reason: str = ""
+    frictions: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """One fit of the estimator.
+
+    Attributes:
+        stamp: end of the window, ns.
+        identification: the mapping of ``identify --json`` without ``record``.
+        trusted: friction trusted after this fit, by ``V1.f_s``, %.
+    """
+
+    stamp: int
+    identification: Mapping[str, Any]
+    trusted: Mapping[str, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Text:
+    """A string that a node published: its topic, log time in ns and content."""
+
+    topic: str
+    log_time: int
+    text: str
+
+
+def of_loop(messages: Iterable[BagMessage], space: str) -> list[BagMessage]:
+    """Return the messages of the loop in the namespace ``space``, and what is global.
+
+    The diagnostics of all loops share a topic; of these the statuses of the loop's nodes
+    are kept, which begin with its namespace.
+    """
+    kept = []
+    for message in messages:
+        namespace, name = last_part(message.topic)
+        if name == "diagnostics":
+            header, every = message.message.header, message.message.status
+            own = [s for s in every if last_part("/" + node_of(s))[0] == space]
+            only = types.SimpleNamespace(header=header, status=own)
+            kept.append(dataclasses.replace(message, message=only))
+        elif (
+            name == "clock" or (last_part(namespace)[0] if name == "config" else namespace) == space
+        ):
+            kept.append(message)
+    return kept
+
+
+def node_of(status: Any) -> str:
+    """Return the node that gave a diagnostic status: what stands before the colon."""
+    return str(status.name).partition(":")[0].strip()
+
+
+def estimates(messages: Iterable[BagMessage]) -> tuple[Estimate, ...]:
+    """Return the estimates on ``stiction`` in their order."""
+    found = []
+    for message in _of(messages, JOINT_STATE, "stiction"):
+        state = message.message
+        stamp = stamp_ns(state)
+        for index, (name, value) in enumerate(zip(state.name, state.position, strict=False)):
+            low = _item(state.velocity, index)
+            high = _item(state.effort, index)
+            found.append(Estimate(stamp, str(name), float(value), low, high))
+    return tuple(found)
+
+
+def mode_changes(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
+    """Return the changes of mode, model or friction in ``/diagnostics``, with swap times."""
+    changes: list[ModeChange] = []
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            values = {item.key: item.value for item in status.values}
+            if "mode" not in values:
+                continue
+            change = ModeChange(
+                stamp_ns(message.message),
+                values["mode"],
+                values.get("model", ""),
+                values.get("reason", ""),
+                _frictions(values, "."),
+            )
+            if not changes or _force(changes[-1]) != _force(change):
+                changes.append(change)
+    return tuple(changes)
+
+
+def fits(messages: Iterable[BagMessage]) -> tuple[Fit, ...]:
+    """Return the fits that ``/diagnostics`` tells, by the end of their window."""
+    found: dict[int, Fit] = {}
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            values = {item.key: item.value for item in status.values}
+            if "identification" not in values or not values.get("window_end", "").isdecimal():
+                continue
+            try:
+                identification = json.loads(values["identification"])
+            except json.JSONDecodeError:
+                continue
+            if isinstance(identification, dict):
+                stamp = int(values["window_end"])
+                found[stamp] = Fit(stamp, identification, _frictions(values, ".trusted_"))
+    return tuple(found[stamp] for stamp in sorted(found))
+
+
+def stem_estimate(messages: Iterable[BagMessage], record: Record, start: int) -> FloatArray | None:
+    """Return the stem positions, shape (N, m), in the first points on ``prediction``.
+
+    Args:
+        messages: of the run.
+        record: without gaps; NaN stands where a sample has no prediction.
+        start: stamp of its first sample, ns.
+    """
+    found = np.full((len(record), len(record.valves)), np.nan)
+    told = False
+    for message in _of(messages, _TRAJECTORY, "prediction"):
+        plan = message.message
+        if not plan.points:
+            continue
+        told = True
+        row = round((stamp_ns(plan) - start) / 1e9 / record.sample_time)
+        first = dict(zip(plan.joint_names, plan.points[0].positions, strict=False))
+        if 0 <= row < len(record):
+            found[row] = [float(first.get(name, np.nan)) for name in record.valves]
+    return found if told else None
+
+
+def _force(change: ModeChange) -> tuple[object, ...]:
+    return change.mode, change.model, change.frictions
+
+
+def _frictions(values: Mapping[str, str], mark: str) -> dict[str, float]:
+    """Return ``V1.f_s`` → value from keys such as ``V1.f_s`` or ``V1.trusted_f_s``."""
+    found = {}
+    for key, value in values.items():
+        valve, dot, name = key.rpartition(mark)
+        if not (valve and dot and name in ("f_s", "f_d")):
+            continue
+        try:
+            found[f"{valve}.{name}"] = float(value)
+        except ValueError:
+            continue
+    return found
+
+
+def mode_texts(messages: Iterable[BagMessage]) -> tuple[ModeChange, ...]:
+    """Return the changes on ``mode``, whose messages bear no stamp: log times stand in."""
+    changes: list[ModeChange] = []
+    for text in texts(messages, "mode"):
+        if not changes or changes[-1].mode != text.text:
+            changes.append(ModeChange(text.log_time, text.text, reason="time of reception"))
+    return tuple(changes)
+
+
+def texts(messages: Iterable[BagMessage], name: str) -> tuple[Text, ...]:
+    """Return the strings on topics whose last part is ``name``."""
+    return tuple(
+        Text(message.topic, message.log_time, str(message.message.data))
+        for message in _of(messages, _STRING, name)
+    )
+
+
+def clock(messages: Iterable[BagMessage]) -> tuple[int, ...]:
+    """Return the times on ``/clock``, ns."""
+    return tuple(
+        int(message.message.clock.sec) * 10**9 + int(message.message.clock.nanosec)
+        for message in _of(messages, _CLOCK, "clock")
+    )
+
+
+def published_counts(messages: Iterable[BagMessage]) -> dict[str, int]:
+    """Return how many messages of each topic the nodes say they published.
+
+    The keys are ``published:<topic>`` (or with a space); of one node, named before the
+    colon in the status name, the last count holds; several nodes on a topic add up.
+    """
+    last: dict[tuple[str, str], int] = {}
+    for message in _of(messages, _DIAGNOSTICS, "diagnostics"):
+        for status in message.message.status:
+            node = node_of(status)
+            for item in status.values:
+                key = str(item.key)
+                if key.startswith(("published:", "published ")) and item.value.isdecimal():
+                    last[node, key[len("published:") :].strip()] = int(item.value)
+    totals: Counter[str] = Counter()
+    for (_, topic), count in last.items():
+        totals[topic] += count
+    return dict(totals)
+
+
+def tells_of_run(topic: BagTopic) -> bool:
+    """Tell whether a topic says something of the run besides its signals."""
+    name = last_part(topic.name)[1]
+    return (topic.type, name) in {
+        (JOINT_STATE, "stiction"),
+        (_DIAGNOSTICS, "diagnostics"),
+        (_CLOCK, "clock"),
+        (_TRAJECTORY, "prediction"),
+        (_STRING, "mode"),
+        (_STRING, "loop_model"),
+        (_STRING, "config"),
+    }
+
+
+def _of(messages: Iterable[BagMessage], type_name: str, name: str) -> Iterable[BagMessage]:
+    return (m for m in messages if m.type == type_name and last_part(m.topic)[1] == name)
+
+
+def _item(values: Iterable[float], index: int) -> float:
+    items = list(values)
+    return float(items[index]) if index < len(items) else float("nan")

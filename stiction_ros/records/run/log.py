@@ -1,0 +1,226 @@
+"""What a bag of the live loop tells besides its record: estimates, modes, configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records.bag.messages import BagMessage, MessageDecoder, read_raw
+from stiction_ros.records.parts import joined, span
+from stiction_ros.records.record import Record
+from stiction_ros.records.run.answer_times import answer_times
+from stiction_ros.records.run.bag_reader import bag_source
+from stiction_ros.records.run.events import (
+    Estimate,
+    Fit,
+    ModeChange,
+    Text,
+    clock,
+    estimates,
+    fits,
+    mode_changes,
+    mode_texts,
+    of_loop,
+    published_counts,
+    stem_estimate,
+    tells_of_run,
+    texts,
+)
+from stiction_ros.records.run.gap_log import GapLog, gap_log
+from stiction_ros.records.run.loop_runs import LoopRun, loop_runs
+from stiction_ros.records.run.loop_signals import LoopSignals, is_signal
+
+__all__ = [
+    "Estimate",
+    "Fit",
+    "ModeChange",
+    "RunLog",
+    "Text",
+    "fits",
+    "mode_changes",
+    "read_run",
+]
+
+
+@dataclasses.dataclass(frozen=True)
+class RunLog:
+    """A run of the live loop as its bag tells it.
+
+    Attributes:
+        record: the loop's signals, one segment; where some are missing stand bad samples.
+        start: stamp of the record's first sample, ns.
+        estimates: in the order they came.
+        modes: every change of mode, model or friction, the mode at the start first.
+        loop_models: the YAML texts on ``loop_model``.
+        configs: what the nodes published on ``~/config``.
+        clock: the simulated times on ``/clock``, ns.
+        recorded: messages in the bag by topic.
+        published: messages by topic as the nodes counted them in ``/diagnostics``.
+        notes: what was left out while reading, one sentence each.
+        fits: in the order of their windows.
+        stem_estimate: the controller's estimate of the stem positions at the record's
+            samples, shape (N, m), %, NaN where none was published; None when there is none.
+        gaps: what the monitor told.
+        pv_to_op_ms: p50, p99, p999 and max of the times from PV to OP; empty in lockstep.
+        wall_seconds: from the first to the last publication, on the publishers' clock.
+    """
+
+    record: Record
+    start: int
+    estimates: tuple[Estimate, ...]
+    modes: tuple[ModeChange, ...]
+    loop_models: tuple[Text, ...]
+    configs: tuple[Text, ...]
+    clock: tuple[int, ...]
+    recorded: Mapping[str, int]
+    published: Mapping[str, int]
+    notes: tuple[str, ...] = ()
+    fits: tuple[Fit, ...] = ()
+    stem_estimate: FloatArray | None = None
+    wall_seconds: float = float("nan")
+    gaps: GapLog = GapLog({}, {})
+    pv_to_op_ms: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+    def seconds(self, stamp: int) -> float:
+        """Return the time of a stamp in s since the first sample."""
+        return (stamp - self.start) / 1e9
+
+    @property
+    def swap(self) -> ModeChange | None:
+        """The first change from ``unaware`` to a mode that knows of the friction.
+
+        A change whose first sample is not in the record, as it was cut there, is none.
+        """
+        before = ""
+        end = self.start + round(len(self.record) * self.record.sample_time * 1e9)
+        for change in self.modes:
+            if change.stamp >= end:
+                break
+            if before == "unaware" and change.mode in ("embedding", "inversion"):
+                return change
+            before = change.mode
+        return None
+
+    @property
+    def swap_sample(self) -> int | None:
+        """Number of the record's sample at which the swap took place."""
+        if self.swap is None:
+            return None
+        return round(self.seconds(self.swap.stamp) / self.record.sample_time)
+
+    @property
+    def fit_at_swap(self) -> Fit | None:
+        """The last fit whose window ended before the swap."""
+        if self.swap is None:
+            return None
+        return max(
+            (fit for fit in self.fits if fit.stamp < self.swap.stamp),
+            key=lambda fit: fit.stamp,
+            default=None,
+        )
+
+
+def read_run(path: str | Path, *, namespace: str | None = None) -> RunLog:
+    """Read everything that a report needs from a bag, in one pass.
+
+    Of several runs the longest is told, with a note on the others.
+
+    Args:
+        path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
+        namespace: of the loop's topics; needed when the bag holds several loops.
+
+    Raises:
+        InputError: as :func:`stiction_ros.records.run.bag_reader.read_bag_parts`.
+    """
+    notes: list[str] = []
+    recorded: Counter[str] = Counter()
+    messages: list[tuple[int, BagMessage]] = []
+    signals = LoopSignals(str(path))
+    decoder = MessageDecoder()
+    sent: list[int] = []
+    for number, raw in enumerate(read_raw(path, notes)):
+        recorded[raw.topic.name] += 1
+        sent.append(raw.publish_time)
+        signal = is_signal(raw.topic)
+        if not signal and not tells_of_run(raw.topic):
+            continue
+        message = decoder.decode(raw, str(path))
+        if message is None:
+            continue
+        if signal:
+            signals.add(message, number)
+        else:
+            messages.append((number, message))
+    notes.extend(decoder.notes)
+    published = published_counts([message for _, message in messages])
+    runs = loop_runs(signals, bag_source(path), namespace, notes)
+    run = max(runs, key=len)
+    said = _said(messages, runs, run)
+    configured = [message for number, message in messages if number <= run.end or run is runs[-1]]
+    if len(signals.loops) > 1:
+        space = signals.loop(namespace)
+        said, configured = of_loop(said, space), of_loop(configured, space)
+    record = _record(run, runs)
+    start = run.start + round((record.start - run.parts[0].start) * 1e9)
+    configs = texts(configured, "config")
+    if run is not runs[0]:  # what a node said when it was started again holds
+        configs = tuple({text.topic: text for text in configs}.values())
+    return RunLog(
+        record=record,
+        start=start,
+        estimates=estimates(said),
+        modes=mode_changes(said) or mode_texts(said),
+        loop_models=texts(configured, "loop_model"),
+        configs=configs,
+        clock=clock(said),
+        recorded=dict(recorded),
+        published=published,
+        notes=record.notes,
+        fits=fits(said),
+        stem_estimate=stem_estimate(said, record, start),
+        wall_seconds=(max(sent) - min(sent)) / 1e9,
+        gaps=gap_log(said),
+        pv_to_op_ms=answer_times(said),
+    )
+
+
+def _said(
+    messages: Sequence[tuple[int, BagMessage]], runs: Sequence[LoopRun], run: LoopRun
+) -> list[BagMessage]:
+    """Return what was said between the beginning of a run and that of the next one."""
+    place = runs.index(run)
+    begin = run.begin if place else 0
+    end = runs[place + 1].begin if place + 1 < len(runs) else None
+    return [m for number, m in messages if begin <= number and (end is None or number < end)]
+
+
+def _record(run: LoopRun, runs: Sequence[LoopRun]) -> Record:
+    """Return the record of a run on one regular grid, its notes telling of gaps and other runs.
+
+    Only the longest stretch is taken of a run with a gap that is longer than all its samples.
+    """
+    total = sum(len(part) for part in run.parts)
+    stretches: list[list[Record]] = [[run.parts[0]]]
+    for before, after in itertools.pairwise(run.parts):
+        end = before.start + float(before.time[-1])
+        if after.start - end > total * after.sample_time:
+            stretches.append([])
+        stretches[-1].append(after)
+    kept = max(stretches, key=lambda parts: sum(map(len, parts)))
+    record = joined(kept)
+    notes = list(record.notes)
+    for other in runs:
+        if other is not run:
+            notes.append(f"another run, {span(*other.parts)}, {len(other)} samples, is left out")
+    if len(stretches) > 1:
+        left_out = total - sum(map(len, kept))
+        notes.append(f"{left_out} samples beyond a gap longer than the run are left out")
+    filled = record.filled()
+    missing = len(filled) - len(record)
+    if missing:
+        notes.append(f"{missing} of {len(filled)} samples are missing")
+    return dataclasses.replace(filled, notes=tuple(notes))

@@ -1,0 +1,157 @@
+"""Collects the signals of the loops in a bag, and skips messages that nobody can use."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import NamedTuple
+
+from stiction_ros.errors import InputError
+from stiction_ros.records.bag.messages import BagMessage, last_part, stamp_ns
+from stiction_ros.records.storage.bag_metadata import BagTopic
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+SIGNALS = ("pv", "sp", "op", "op_applied", "stem")
+
+
+class Given(NamedTuple):
+    """One usable message of a signal.
+
+    Attributes:
+        number: its place in the log.
+        stamp: ns.
+        values: tag to value.
+    """
+
+    number: int
+    stamp: int
+    values: dict[str, float]
+
+
+def is_signal(topic: BagTopic) -> bool:
+    """Tell whether a topic is one of the loop's signals."""
+    return topic.type == JOINT_STATE and last_part(topic.name)[1] in SIGNALS
+
+
+class LoopSignals:
+    """The signals of every loop in a bag, in the order of the log.
+
+    Args:
+        where: the bag, for errors.
+    """
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+        self._given: dict[tuple[str, str], list[Given]] = {}
+        self._tags: dict[tuple[str, str], Counter[tuple[str, ...]]] = {}
+        self._bad: dict[tuple[str, str], Counter[str]] = {}
+
+    def add(self, message: BagMessage, number: int) -> None:
+        """Take one message of a signal; what is wrong with it is counted.
+
+        Args:
+            message: of a topic that :func:`is_signal`.
+            number: its place in the log.
+        """
+        key = last_part(message.topic)
+        names, values = message.message.name, message.message.position
+        self._given.setdefault(key, [])
+        wrong = _wrong(names, values)
+        if wrong:
+            self._bad.setdefault(key, Counter())[wrong] += 1
+            return
+        tags = tuple(str(name) for name in names)
+        self._tags.setdefault(key, Counter())[tags] += 1
+        given = Given(number, stamp_ns(message.message), dict(zip(tags, values, strict=True)))
+        self._given[key].append(given)
+
+    def tags(self, space: str, signal: str) -> tuple[str, ...]:
+        """Return the tags that most messages of a signal bear; empty without a usable one."""
+        found = self._tags.get((space, signal))
+        return found.most_common(1)[0][0] if found else ()
+
+    def given(self, space: str, signal: str, tags: tuple[str, ...]) -> list[Given]:
+        """Return the messages of a signal that have a value for each of ``tags``."""
+        wanted = set(tags)
+        return [g for g in self._given.get((space, signal), ()) if g.values.keys() >= wanted]
+
+    def skipped(self, space: str, signal: str, tags: tuple[str, ...]) -> str:
+        """Return a sentence on the messages of a signal that are left out; empty for none."""
+        key = (space, signal)
+        wrong = Counter(self._bad.get(key, Counter()))
+        lacking = len(self._given.get(key, ())) - len(self.given(space, signal, tags))
+        if lacking:
+            wrong["without a value for every tag"] = lacking
+        if not wrong:
+            return ""
+        count = sum(wrong.values())
+        reasons = ", ".join(f"{number} {what}" for what, number in sorted(wrong.items()))
+        return f"{count} bad message{'s' * (count > 1)} of {signal} left out: {reasons}"
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Namespaces that have ``pv`` and an OP, such as ``/unit1``, empty for ``/``."""
+        spaces = dict.fromkeys(space for space, _ in self._given)
+        ops = {s for s in spaces for op in ("op", "op_applied") if (s, op) in self._given}
+        return tuple(s for s in spaces if s in ops and (s, "pv") in self._given)
+
+    def op(self, space: str) -> str:
+        """Return the signal whose tags are the valves: ``op``, else ``op_applied``."""
+        return "op" if (space, "op") in self._given else "op_applied"
+
+    def loop(self, namespace: str | None) -> str:
+        """Return the namespace of the loop that is meant.
+
+        Where none is chosen a loop with an ``op`` comes before those that were only listened to.
+
+        Raises:
+            InputError: there is no such loop, or there are several and none was chosen.
+        """
+        loops = list(self.loops)
+        if namespace is not None:
+            wanted = "/" + namespace.strip("/") if namespace.strip("/") else ""
+            loops = [space for space in loops if space == wanted]
+        else:
+            loops = [space for space in loops if (space, "op") in self._given] or loops
+        if not loops:
+            raise self._no_loop(namespace)
+        if len(loops) > 1:
+            raise InputError(
+                f"holds {len(loops)} loops ({', '.join(space or '/' for space in sorted(loops))})",
+                where=self._where,
+                fix="choose one with --namespace",
+            )
+        return loops[0]
+
+    def _no_loop(self, namespace: str | None) -> InputError:
+        loops = sorted(space or "/" for space in self.loops)
+        if namespace is not None and loops:
+            return InputError(
+                f"holds no loop in the namespace {namespace}",
+                where=self._where,
+                fix=f"its loops are {', '.join(loops)}",
+            )
+        signals = {signal for _, signal in self._given}
+        lacks = [
+            topic
+            for topic, there in (
+                ("pv", "pv" in signals),
+                ("op (or op_applied)", bool({"op", "op_applied"} & signals)),
+            )
+            if not there
+        ]
+        what = f"no topic {' and no topic '.join(lacks)} of {JOINT_STATE}"
+        if not lacks:
+            what = f"pv and op of {JOINT_STATE}, but never in one namespace"
+        return InputError(f"holds {what}", where=self._where, fix="record pv and op of a loop")
+
+
+def _wrong(names: list[str], values: list[float]) -> str:
+    """Return what is wrong with a message; empty when nothing is."""
+    if not len(names) and not len(values):
+        return "empty"
+    if len(names) != len(values):
+        return "with another number of positions than names"
+    if len(set(names)) != len(names):
+        return "that name a tag twice"
+    return "" if all(map(math.isfinite, values)) else "not finite"

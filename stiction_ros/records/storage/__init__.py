@@ -1,0 +1,1 @@
+"""The files of a bag: MCAP record by record, and what says of them what they hold."""

@@ -1,0 +1,107 @@
+"""The words of the gap page: places, effects, figures and states for people."""
+
+from __future__ import annotations
+
+import re
+
+from stiction_ros.discrepancy import Discrepancy, FoundEffect
+from stiction_ros.discrepancy.data.controller_check import ControllerStatus
+from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.effects import behaviours
+from stiction_ros.report.page import number
+
+CONTROLLER = {
+    ControllerStatus.SAME: "OP recomputed from PV and SP is the recorded one",
+    ControllerStatus.OTHER: "OP recomputed from PV and SP is another than the recorded one",
+    ControllerStatus.UNEXPLAINED: "no PI controller gives the recorded OP from PV and SP",
+    ControllerStatus.NOT_ASKED: "OP was not recomputed: that takes one valve, one output and SP",
+}
+_PLACES = {
+    "valve": "in valve {tag}",
+    "load": "load that enters at valve {tag}",
+    "process": "in the process to {tag}",
+    "disturbance": "disturbance on {tag}",
+    "sensor": "in the sensor of {tag}",
+    "data": "in the record",
+}
+_SHORT = {
+    "valve": "valve {tag}",
+    "load": "the load at {tag}",
+    "process": "the process to {tag}",
+    "disturbance": "the output {tag}",
+    "sensor": "the sensor of {tag}",
+}
+_PLACE = re.compile(rf"\b({'|'.join(_SHORT)}):(\w+)")
+_WORDS = {
+    "pole": "slower process",
+    "bias_step": "step of the calibration",
+    "random_walk": "random walk",
+    "quantisation": "rounding",
+    "time_shift": "shifted clock",
+    "coloured": "slow noise",
+    "delay": "longer dead time",
+    "gain": "other gain",
+    "tuning": "other tuning",
+}
+
+
+def place_of(place: str) -> str:
+    """Return where an effect acts, such as ``in valve V1``."""
+    kind, _, tag = place.partition(":")
+    return _PLACES.get(kind, kind).format(tag=tag)
+
+
+def word_of(effect: str) -> str:
+    """Return an effect for people."""
+    return _WORDS.get(effect, effect.replace("_", " "))
+
+
+def plain(sentence: str) -> str:
+    """Return a sentence with the places of loop models, such as ``valve:V1``, in words."""
+    return _PLACE.sub(lambda found: _SHORT[found[1]].format(tag=found[2]), sentence)
+
+
+def called(place: str, effect: str) -> str:
+    """Return an effect and its place, such as ``stiction in valve V1``."""
+    joint = "," if place.startswith(("load:", "disturbance:")) else ""
+    return f"{word_of(effect)}{joint} {place_of(place)}"
+
+
+def figures_with_units(effect: FoundEffect) -> list[str]:
+    """Return one line per figure: name, value, unit, interval and what it means."""
+    meanings = {
+        p.key: p.description
+        for kind in behaviours()
+        if (kind.effect, kind.law) == (effect.effect, effect.law)
+        for p in kind.parameters()
+    }
+    lines = []
+    for key, value in effect.parameters.items():
+        unit = effect.units.get(key, "")
+        shown = "" if unit in ("", "1") else f" {unit}"
+        ends = effect.intervals.get(key)
+        between = ""
+        if ends is not None:
+            between = f", 95 % between {number(ends[0])} and {number(ends[1])}"
+        meaning = meanings.get(key, "")
+        lines.append(f"{key} = {number(value)}{shown}{between}" + (f": {meaning}" * bool(meaning)))
+    return lines
+
+
+def candidate_of(fit: CandidateFit) -> str:
+    """Return a candidate for a table, its law where an effect has several."""
+    kind = getattr(fit.candidate, "kind", None)
+    law = getattr(kind, "law", None)
+    return called(*fit.candidate.key) + (f", law {law}" if law is not None else "")
+
+
+def named_figures(found: Discrepancy, fit: CandidateFit) -> str:
+    """Return a candidate's figures by their names; nothing outside the catalogue."""
+    behaviour = fit.behaviour(found.base_before.run)
+    if behaviour is None:
+        return ""
+    parts = []
+    for entry in behaviour.parameters():
+        unit = "" if entry.unit == "1" or "signal" in entry.unit else f" {entry.unit}"
+        parts.append(f"{entry.key} {number(float(getattr(behaviour, entry.attribute)))}{unit}")
+    return ", ".join(parts)

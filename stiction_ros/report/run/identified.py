@@ -1,0 +1,137 @@
+"""What identification found, as parts of a page: verdicts, frictions, the process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from stiction_ros.effects import Stiction, behaviours
+from stiction_ros.identification import VerdictKind
+from stiction_ros.report.page import (
+    Cell,
+    card,
+    duration,
+    interval,
+    number,
+    percent,
+    table,
+)
+from stiction_ros.report.run.story import Story
+
+KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}
+"""Class of a box by its verdict; the others are open."""
+
+
+def verdict_line(valves: Sequence[Mapping[str, Any]]) -> str:
+    """Return the verdicts on all valves in a few words."""
+    if not valves:
+        return "No fit of the valves"
+    said = {
+        kind: [valve["name"] for valve in valves if valve["verdict"] == kind]
+        for kind in ("sticky", "backlash")
+    }
+    told = []
+    if names := said["sticky"]:
+        told.append(f"{_listed(names)} {'sticks' if len(names) == 1 else 'stick'}")
+    if names := said["backlash"]:
+        listed = _listed(names) if not told else ", ".join(names)
+        told.append(f"{listed} {'has' if len(names) == 1 else 'have'} backlash")
+    if told:
+        return ", ".join(told)
+    one = len(valves) == 1
+    if all(valve["verdict"] == "healthy" for valve in valves):
+        return f"{_listed([v['name'] for v in valves])} {'is' if one else 'are'} healthy"
+    return "No valve is shown to stick"
+
+
+def has_friction(valve: Mapping[str, Any]) -> bool:
+    """Tell whether an entry of ``valves`` of ``identify --json`` finds friction."""
+    return VerdictKind(valve["verdict"]).has_friction
+
+
+def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None) -> str:
+    """Return one box a valve: verdict, friction with intervals, and the truth where known.
+
+    Args:
+        valves: entries of ``identify --json``.
+        story: of the run, where there is one.
+    """
+    boxes = []
+    for valve in valves:
+        more = (
+            f"f_S {percent(valve['f_s'])} % ({interval(valve['f_s_interval'])}), "
+            f"f_D {percent(valve['f_d'])} % ({interval(valve['f_d_interval'])})"
+        )
+        more += "".join(f"\n{said}" for said in _further(valve))
+        if valve["verdict"] == "healthy":
+            more = f"f_S at most {percent(valve['f_s_interval'][1])} % of travel"
+        truth = None if story is None else story.true_friction(valve["name"])
+        if truth is not None:
+            more += f"\nsimulated with f_S = {truth[0]:g} %, f_D = {truth[1]:g} %"
+        kind = KINDS.get(valve["verdict"], "open")
+        boxes.append(card(kind, valve["name"], valve["verdict"], more))
+    return f'<div class="cards">{"".join(boxes)}</div>' if boxes else ""
+
+
+def _further(valve: Mapping[str, Any]) -> list[str]:
+    """Return the parameters of a law behind its first two, one sentence each."""
+    said = []
+    for kind in behaviours():
+        if kind.effect != Stiction.effect or kind.law != valve.get("law"):
+            continue
+        for entry in kind.parameters()[2:]:
+            if valve.get(entry.key) is None:
+                continue
+            unit = "" if entry.unit == "1" else f" {entry.unit}"
+            ends = valve.get(f"{entry.key}_interval")
+            between = "held" if ends is None else f"{number(ends[0])} … {number(ends[1])}"
+            value = number(valve[entry.key])
+            said.append(f"{entry.key} {value}{unit} ({between}): {entry.description}")
+    return said
+
+
+def process_table(outputs: Sequence[Mapping[str, Any]], sample_time: float) -> str:
+    """Return the identified linear part of each output."""
+    if not outputs:
+        return ""
+    rows: list[list[Cell]] = []
+    for output in outputs:
+        for valve, b in output["b"].items():
+            delay = output["delay"].get(valve, 0)
+            gain = sum(b) / (1.0 + sum(output["a"])) if 1.0 + sum(output["a"]) else float("nan")
+            rows.append(
+                [
+                    output["name"],
+                    valve,
+                    ", ".join(number(v, 4) for v in output["a"]),
+                    ", ".join(number(v, 4) for v in b),
+                    f"{delay} ({duration(delay * sample_time)})" if delay else "0",
+                    number(gain),
+                    number(output["noise_std"]),
+                    number(output["fit_one_step"]),
+                    number(output["fit_free_run"]),
+                ]
+            )
+    head = (
+        "PV",
+        "valve",
+        "a₁ …",
+        "b₁ …",
+        "delay, samples",
+        "gain, per %",
+        "noise std",
+        "one-step fit, %",
+        "free-run fit, %",
+    )
+    return (
+        "<h2>Process identified</h2>"
+        "<p>y<sub>k</sub> = −Σ a<sub>i</sub> y<sub>k−i</sub> + Σ b<sub>i</sub> "
+        "χ<sub>k−i−delay</sub> + bias, driven by the stems. Fits are "
+        "100 (1 − ‖y − ŷ‖ / ‖y − mean y‖).</p>" + table(head, rows, texts=4)
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return f"Valve {names[0]}"
+    return f"Valves {', '.join(names[:-1])} and {names[-1]}"

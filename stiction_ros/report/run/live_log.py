@@ -1,0 +1,47 @@
+"""The log of a loop that ran without ROS, as if it had been recorded."""
+
+from __future__ import annotations
+
+from stiction_ros.online.session import LiveRun
+from stiction_ros.records.run.log import Estimate, Fit, ModeChange, RunLog
+
+
+def log_of(live: LiveRun) -> RunLog:
+    """Return the log of ``live``; without messages, so nothing was counted."""
+    record = live.run.record
+    step = round(record.sample_time * 1e9)
+    fits = tuple(
+        Fit(
+            update.end * step,
+            update.identification.to_json(),
+            {
+                f"{valve}.{key}": value
+                for valve, friction in update.trusted.items()
+                for key, value in (
+                    ("f_s", friction.static_friction),
+                    ("f_d", friction.dynamic_friction),
+                )
+            },
+        )
+        for update in live.fits
+    )
+    estimates = tuple(
+        Estimate(update.end * step, f"{valve.name}.{key}", value, *interval)
+        for update in live.fits
+        for valve in update.identification.valves
+        for key, value, interval in (
+            ("f_s", valve.static_friction, valve.static_interval),
+            ("f_d", valve.dynamic_friction, valve.dynamic_interval),
+        )
+    )
+    modes = tuple(
+        ModeChange(
+            change.sample * step,
+            change.mode.value,
+            change.model,
+            change.reason,
+            next((f.trusted for f in reversed(fits) if f.stamp < change.sample * step), {}),
+        )
+        for change in live.changes
+    )
+    return RunLog(record, 0, estimates, modes, (), (), (), {}, {}, (), fits, live.stem_estimate)

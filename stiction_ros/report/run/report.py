@@ -1,0 +1,81 @@
+"""Writes the report of a run into its folder."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.online.session import Scenario
+from stiction_ros.records.run.log import read_run
+from stiction_ros.report.run.figures import draw_run
+from stiction_ros.report.run.page import run_page
+from stiction_ros.report.run.story import Story, tell
+from stiction_ros.report.run.summary import summary, write_json
+
+
+@dataclasses.dataclass(frozen=True)
+class RunReport:
+    """What was written.
+
+    Attributes:
+        story: the run and its scores.
+        summary: the mapping in ``summary.json``.
+        page: ``report.html``.
+        files: everything that was written.
+    """
+
+    story: Story
+    summary: dict[str, Any]
+    page: Path
+    files: tuple[Path, ...]
+
+
+def report_run(
+    bag: str | Path,
+    out: str | Path,
+    *,
+    scenario: Scenario | None = None,
+    name: str | None = None,
+    seconds: float | None = None,
+    load: float | None = None,
+    namespace: str | None = None,
+) -> RunReport:
+    """Read a bag of a live loop and write ``summary.json``, ``report.html`` and the figures.
+
+    Args:
+        bag: a rosbag2 directory or a ``.mcap`` file.
+        out: folder, made when missing; or the ``.html`` file alone.
+        scenario: that was run, for the comparison with a loop without friction.
+        name: of the loop in the report; the scenario's or the bag's when not given.
+        seconds: wall time of the run, when measured better than by the bag.
+        load: of the machine before the run, processes that want a core, where known.
+        namespace: of the loop's topics, for a bag that holds several loops.
+
+    Raises:
+        InputError: as :func:`stiction_ros.records.run.log.read_run`.
+    """
+    log = read_run(bag, namespace=namespace)
+    return write_run(tell(log, scenario=scenario, name=name), out, seconds, load)
+
+
+def write_run(
+    story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
+) -> RunReport:
+    """Write what :func:`report_run` writes of a run that has been scored."""
+    out = Path(out)
+    alone = out.suffix.lower() == ".html"
+    folder = out.parent if alone else out
+    folder.mkdir(parents=True, exist_ok=True)
+    drawings = [(drawing, drawing.png()) for drawing in draw_run(story)]
+    target = out if alone else folder / "report.html"
+    target.write_text(run_page(story, drawings), encoding="utf-8")
+    figures = summary(story, seconds, load)
+    files = [target]
+    if not alone:
+        write_json(figures, folder / "summary.json")
+        files.append(folder / "summary.json")
+        for drawing, png in drawings:
+            files.append(folder / f"{drawing.name}.png")
+            files[-1].write_bytes(png)
+    return RunReport(story, figures, target, tuple(files))

@@ -1,0 +1,257 @@
+"""How well a loop keeps its set-points, and what a swap of controllers changed.
+
+Everything is computed from the error e = PV − SP inside the *holds*: the stretches of samples
+between two moves of any set-point.
+
+- *Dominant period* T of the phase `before` and *amplitude* of an output, √2 × RMS of the
+  spectral line at T: see :mod:`stiction_ros.identification.closed_loop.oscillation`.
+- *Offset*: mean over the holds of |mean e| over their last 50 samples. Holds of fewer than
+  100 samples have not settled by then and do not count, unless all are shorter.
+- *Work* of each valve per hour, and the largest move of its OP from one sample to the next: see
+  :mod:`stiction_ros.records.valve_work`.
+- *IAE per hour*: ∫|e|dt over all samples of the phase, per hour, minus the share of white
+  measurement noise, E|v| = √(2/π) σ ≈ 0.798 σ. With time in hours on both sides that is
+  mean |e| − 0.798 σ, in PV units × h per h.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.oscillation import (
+    LEAST_LINE,
+    NEEDED_CYCLES,
+    Cycle,
+    amplitude,
+    dominant_cycle,
+)
+from stiction_ros.loop.set_points import holds
+from stiction_ros.records import Record
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.valve_work import ValveWork, largest_op_step, work_per_hour
+
+OFFSET_SAMPLES = 50
+NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1
+MOST_MISSING = 0.5  # share of the samples of a phase that may be missing in the record
+
+
+class PhaseStatus(enum.StrEnum):
+    """Whether the phases could be compared."""
+
+    OK = "ok"
+    NO_SWAP = "no_swap"
+    NO_ROUND = "no_round"
+    NO_CYCLE = "no_cycle"
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """How one output behaved during one phase, in its engineering units.
+
+    Attributes:
+        amplitude: of the spectral line at the dominant period; None when no hold is long
+            enough to measure it or there is no period.
+        offset: |mean error| at the end of the holds.
+        iae_per_hour: mean |error| less the share of known noise, PV units × h per h.
+    """
+
+    amplitude: float | None
+    offset: float
+    iae_per_hour: float
+
+    def to_json(self) -> dict[str, float | None]:
+        """Return the mapping of ``summary.json``."""
+        return dataclasses.asdict(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Phase:
+    """A stretch of samples, and what it is measured by.
+
+    Attributes:
+        first, last: its samples, the last one not included.
+        scores: by output.
+        work: of each valve per hour; empty where the stems are unknown.
+        op_step: largest move of each OP from one sample to the next, by valve, %.
+    """
+
+    first: int
+    last: int
+    scores: Mapping[str, Score]
+    work: Mapping[str, ValveWork]
+    op_step: Mapping[str, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Phases:
+    """The rounds of the schedule before and after the swap, scored alike.
+
+    Attributes:
+        status: ok, or why the two cannot be compared.
+        reason: one sentence; empty when ok.
+        cycle: of ``before``, None when it could not be looked for.
+        before, after: None where there is no whole round.
+    """
+
+    status: PhaseStatus
+    reason: str
+    cycle: Cycle | None
+    before: Phase | None
+    after: Phase | None
+
+
+def round_length(sp: FloatArray) -> int | None:
+    """Return the samples after which the moves of ``sp``, shape (N, p), repeat exactly.
+
+    None when they do not repeat, or when nothing moves.
+    """
+    moves = [first for first, _ in holds(sp)[1:]]
+    for length in moves:
+        if 2 * length <= len(sp) and np.array_equal(sp[length:], sp[:-length]):
+            return int(length)
+    return None
+
+
+def offset(error: FloatArray, stretches: Sequence[tuple[int, int]]) -> float:
+    """Return the mean over holds of |mean error| over the last 50 samples of each."""
+    long_enough = [(a, b) for a, b in stretches if b - a >= 2 * OFFSET_SAMPLES]
+    ends = [error[max(b - OFFSET_SAMPLES, a) : b] for a, b in long_enough or stretches]
+    return float(np.mean([abs(float(end.mean())) for end in ends]))
+
+
+def iae_per_hour(error: FloatArray, noise_std: float = 0.0) -> float:
+    """Return ∫|e|dt per hour less the share 0.798 σ of white measurement noise."""
+    return float(np.abs(error).mean()) - NOISE_SHARE * noise_std
+
+
+def score(
+    record: Record, first: int, last: int, period: float | None, noise_std: Sequence[float]
+) -> Phase:
+    """Score every output over samples ``first`` up to, not including, ``last``.
+
+    Args:
+        record: with set-points; without them the mean of each PV stands in.
+        period: dominant period, samples; None leaves amplitudes out.
+        noise_std: σ of the measurement noise of each output where known, else 0.
+    """
+    part = record.part(first, last)
+    there = part.quality != Quality.BAD
+    error, stretches = errors(part)
+    return Phase(
+        first,
+        last,
+        {
+            name: Score(
+                None if period is None else amplitude(error[:, j], stretches, period),
+                offset(error[:, j], stretches),
+                iae_per_hour(error[there, j], noise_std[j]),
+            )
+            for j, name in enumerate(record.outputs)
+        },
+        work_per_hour(part),
+        largest_op_step(part),
+    )
+
+
+def errors(record: Record) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Return PV − SP, shape (N, p), and the holds; without SP deviations from the mean.
+
+    A sample that is missing in the record has the error 0 and is in no hold.
+    """
+    there = record.quality != Quality.BAD
+    error = record.pv - (record.pv[there].mean(axis=0) if record.sp is None else record.sp)
+    error[~there] = 0.0
+    stretches = record.usable_rows(set(Quality) - {Quality.BAD})
+    if record.sp is None:
+        return error, stretches
+    return error, [(a + f, a + b) for a, z in stretches for f, b in holds(record.sp[a:z])]
+
+
+def phases(
+    record: Record,
+    swap: int | None,
+    round_samples: int | None,
+    noise_std: Sequence[float] | None = None,
+) -> Phases:
+    """Score the last whole round before the swap and the first whole one after it.
+
+    Rounds are counted from the first sample. Without a repeating schedule everything before
+    the swap is set against everything after it, which the caller should say.
+
+    Args:
+        record: of the whole run.
+        swap: first sample of the new controller; None when there was none.
+        round_samples: length of one round of the set-point schedule.
+        noise_std: σ of the measurement noise of each output where known.
+    """
+    sigma = [0.0] * len(record.outputs) if noise_std is None else list(noise_std)
+    if swap is None or not 0 < swap < len(record):
+        return _unswapped(record, round_samples, sigma)
+    if round_samples is None:
+        spans: tuple[int, int, int, int] = (0, swap, swap, len(record))
+    else:
+        ended = swap // round_samples
+        begun = -(-swap // round_samples)
+        spans = (
+            (ended - 1) * round_samples,
+            ended * round_samples,
+            begun * round_samples,
+            (begun + 1) * round_samples,
+        )
+        if ended < 1:
+            reason = f"the swap at sample {swap} came before the first round of set-points ended"
+            return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
+    if _gap(record, *spans[:2]):
+        reason = "the record has a gap in the last round of set-points before the swap"
+        return Phases(PhaseStatus.NO_ROUND, reason, None, None, None)
+    cycle = dominant_cycle(*errors(record.part(spans[0], spans[1])))
+    period = None if cycle is None else cycle.period
+    before = score(record, spans[0], spans[1], period, sigma)
+    if spans[3] > len(record):
+        reason = "the record ends before one whole round of set-points after the swap"
+        return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
+    if _gap(record, *spans[2:]):
+        reason = "the record has a gap in the first round of set-points after the swap"
+        return Phases(PhaseStatus.NO_ROUND, reason, cycle, before, None)
+    after = score(record, spans[2], spans[3], period, sigma)
+    reason = _no_cycle(cycle)
+    status = PhaseStatus.NO_CYCLE if reason else PhaseStatus.OK
+    return Phases(status, reason, cycle, before, after)
+
+
+def _unswapped(record: Record, round_samples: int | None, sigma: Sequence[float]) -> Phases:
+    """Score the last whole round of a run without a swap, or all of it."""
+    first, last = 0, len(record)
+    if round_samples is not None and last >= round_samples:
+        last -= last % round_samples
+        first = last - round_samples
+    reason = "the controller was never swapped"
+    if _gap(record, first, last):
+        reason += ", and most of its last round of set-points is missing in the record"
+        return Phases(PhaseStatus.NO_SWAP, reason, None, None, None)
+    cycle = dominant_cycle(*errors(record.part(first, last)))
+    before = score(record, first, last, None if cycle is None else cycle.period, sigma)
+    return Phases(PhaseStatus.NO_SWAP, reason, cycle, before, None)
+
+
+def _gap(record: Record, first: int, last: int) -> bool:
+    """Tell whether too much is missing in a phase to score it."""
+    missing = record.quality[first:last] == Quality.BAD
+    return bool(missing.mean() > MOST_MISSING)
+
+
+def _no_cycle(cycle: Cycle | None) -> str:
+    """Return why there is no limit cycle to judge by; empty when there is one."""
+    if cycle is None or cycle.share < LEAST_LINE:
+        return "the loop did not cycle in the last round of set-points before the swap"
+    if cycle.count < NEEDED_CYCLES:
+        return (
+            f"the loop made {cycle.count} whole cycles in the last round of set-points before "
+            f"the swap, at least {NEEDED_CYCLES} are needed"
+        )
+    return ""

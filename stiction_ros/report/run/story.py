@@ -1,0 +1,171 @@
+"""What a report tells: the run, what is known of the truth, and the scores."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from stiction_ros.effects import Behaviour, FrictionPair, SlipJumpPair, Stiction
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.session import Scenario, run_live
+from stiction_ros.processes.process import NoiseEntry
+from stiction_ros.records.bag.run_metadata import mapping_of
+from stiction_ros.records.record import Record
+from stiction_ros.records.run.log import RunLog
+from stiction_ros.report.run.scoring import Phase, Phases, phases, round_length, score
+
+TANK_UNITS = {"C": "kg/m³", "T": "°C"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Story:
+    """A run of the live loop, ready to be told.
+
+    Attributes:
+        name: of the scenario or the bag.
+        log: what the bag holds.
+        phases: before and after the swap.
+        stiction_free: the same moves with ideal valves, None when not simulated.
+        free_record: record of that run.
+        truth: the loop that the plant node simulated; None for a real plant.
+        seed: of the plant's noise, None when unknown.
+        round_samples: samples of one round of the set-points, None when they do not repeat.
+        units: engineering unit of each PV where known.
+    """
+
+    name: str
+    log: RunLog
+    phases: Phases
+    stiction_free: Phase | None
+    free_record: Record | None
+    truth: LoopModel | None
+    seed: int | None
+    round_samples: int | None
+    units: Mapping[str, str]
+
+    @property
+    def record(self) -> Record:
+        """The loop's signals."""
+        return self.log.record
+
+    @property
+    def swap_time(self) -> float | None:
+        """Seconds from the first sample to the first one of the new controller."""
+        return None if self.log.swap is None else self.log.seconds(self.log.swap.stamp)
+
+    @property
+    def identified(self) -> Mapping[str, Any]:
+        """The fit that caused the swap, or the last one; empty when there is none."""
+        fit = self.log.fit_at_swap or (self.log.fits[-1] if self.log.fits else None)
+        return {} if fit is None else fit.identification
+
+    @property
+    def latest(self) -> Mapping[str, Any]:
+        """The last fit, empty when there is none."""
+        return self.log.fits[-1].identification if self.log.fits else {}
+
+    def true_friction(self, valve: str) -> tuple[float, float] | None:
+        """Return f_S and f_D in the simulated plant, (0, 0) for a valve without friction.
+
+        None where they are not known: of a real plant, and of a law that has no such figures.
+        """
+        if self.truth is None:
+            return None
+        for entry in self.truth.valves:
+            if entry.name == valve:
+                laws = [e for e in entry.effects if e.effect == Stiction.effect]
+                return _frictions(laws[0]) if laws else (0.0, 0.0)
+        return None
+
+
+def _frictions(law: Behaviour) -> tuple[float, float] | None:
+    """Return f_S and f_D of a law of stiction; None of one that has no such figures."""
+    if isinstance(law, FrictionPair | SlipJumpPair):
+        return law.static_friction, law.dynamic_friction
+    return None
+
+
+def tell(log: RunLog, *, scenario: Scenario | None = None, name: str | None = None) -> Story:
+    """Score a run.
+
+    Args:
+        log: of the run, from a bag or from :func:`log_of`.
+        scenario: that was run; with it the stiction-free loop is simulated for comparison.
+        name: for headings; the scenario's or the record's when not given.
+    """
+    record = log.record
+    truth, seed = simulated_plant(log)
+    if scenario is not None:
+        truth, seed = truth or scenario.plant, scenario.seed if seed is None else seed
+    sigma = [0.0] * len(record.outputs)
+    if truth is not None and truth.outputs == record.outputs:
+        sigma = truth.process.noise_std(NoiseEntry.MEASUREMENT).tolist()
+    repeat = round_of(log, scenario)
+    found = phases(record, log.swap_sample, repeat, sigma)
+    free = free_phase = None
+    if scenario is not None and found.after is not None:
+        last = found.after.last
+        run = run_live(scenario, seed=seed, samples=last, ideal_valves=True, identify=False)
+        free = run.run.record
+        period = None if found.cycle is None else found.cycle.period
+        free_phase = score(free, found.after.first, last, period, sigma)
+    tank = truth is not None and truth.process.kind == "stirred_tank"
+    return Story(
+        name or (record.name if scenario is None else scenario.name),
+        log,
+        found,
+        free_phase,
+        free,
+        truth,
+        seed,
+        repeat,
+        TANK_UNITS if tank else {},
+    )
+
+
+def round_of(log: RunLog, scenario: Scenario | None) -> int | None:
+    """Return the samples of one round of the set-point schedule.
+
+    It is the scenario's, or else what the node ``plant`` said; only when neither tells it
+    the recorded moves are looked at, which show no repetition in a run that was cut.
+    """
+    record = log.record
+    length = math.inf
+    if scenario is not None:
+        length = scenario.set_points.repeat
+    else:
+        schedule = plant_configuration(log).get("set_points")
+        repeat = schedule.get("repeat") if isinstance(schedule, dict) else None
+        if isinstance(repeat, int | float) and repeat > 0:
+            length = repeat
+    if math.isfinite(length):
+        return round(length / record.sample_time)
+    return None if record.sp is None else round_length(record.sp)
+
+
+def simulated_plant(log: RunLog) -> tuple[LoopModel | None, int | None]:
+    """Return the loop and the seed that the node ``plant`` published in its configuration."""
+    document = plant_configuration(log)
+    if not document:
+        return None, None
+    seed = document.get("seed")
+    try:
+        model = LoopModel.from_mapping(
+            document.get("model"), f"configuration of {document['node']}"
+        )
+    except InputError:
+        model = None
+    return model, seed if isinstance(seed, int) else None
+
+
+def plant_configuration(log: RunLog) -> Mapping[str, Any]:
+    """Return what the node ``plant`` said on ``~/config``; empty when it was not there."""
+    for config in log.configs:
+        document = mapping_of(config.text)
+        node = document.get("node")
+        if isinstance(node, str) and node.rpartition("/")[2] == "plant":
+            return document
+    return {}

@@ -1,0 +1,82 @@
+"""``summary.json`` of a run: the figures that acceptance looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.json_values import finite, json_text
+from stiction_ros.report.run.scoring import Phase
+from stiction_ros.report.run.story import Story
+
+
+def summary(
+    story: Story, seconds: float | None = None, load: float | None = None
+) -> dict[str, Any]:
+    """Return the mapping of ``summary.json``; numbers that do not exist are null.
+
+    Args:
+        story: of the run.
+        seconds: wall time of the run; without it the time between the first and the last
+            publication in the bag.
+        load: of the machine before the run, where known.
+    """
+    log, record, free = story.log, story.record, story.stiction_free
+    seconds = log.wall_seconds if seconds is None else seconds
+    found = story.phases
+    mapping = {
+        "scenario": story.name,
+        "status": found.status.value,
+        "reason": found.reason,
+        "seed": story.seed,
+        "samples": len(record),
+        "sample_time": record.sample_time,
+        "seconds": seconds,
+        "load_before": load,
+        "samples_per_second": len(record) / seconds if seconds > 0 else None,
+        "swap_time": story.swap_time,
+        "delay": {o["name"]: dict(o["delay"]) for o in story.identified.get("outputs", [])},
+        "valves": list(story.identified.get("valves", [])),
+        "valves_latest": list(story.latest.get("valves", [])),
+        "period": None if found.cycle is None else found.cycle.period * record.sample_time,
+        "cycles": None if found.cycle is None else found.cycle.count,
+        **measured({"before": found.before, "after": found.after, "stiction_free": free}),
+        "pv_to_op_ms": dict(log.pv_to_op_ms) or None,
+        "messages": messages(log.published, log.recorded),
+        "notes": list(log.notes),
+    }
+    return dict(finite(mapping))
+
+
+def measured(phases: Mapping[str, Phase | None]) -> dict[str, dict[str, Any]]:
+    """Return ``phases``, ``valve_work`` and ``largest_op_step`` of those that there are."""
+    there = {name: phase for name, phase in phases.items() if phase is not None}
+    return {
+        "phases": {name: scores(phase) for name, phase in there.items()},
+        "valve_work": {
+            name: {valve: work.to_json() for valve, work in phase.work.items()}
+            for name, phase in there.items()
+        },
+        "largest_op_step": {name: dict(phase.op_step) for name, phase in there.items()},
+    }
+
+
+def scores(phase: Phase) -> dict[str, dict[str, float | None]]:
+    """Return ``{PV: {amplitude, offset, iae_per_hour}}``."""
+    return {name: score.to_json() for name, score in phase.scores.items()}
+
+
+def messages(
+    published: Mapping[str, int], recorded: Mapping[str, int]
+) -> dict[str, dict[str, int | None]]:
+    """Return ``{topic: {published, recorded}}``; published is None where nobody counts."""
+    return {
+        topic: {"published": published.get(topic), "recorded": recorded.get(topic, 0)}
+        for topic in sorted(published.keys() | recorded.keys())
+    }
+
+
+def write_json(value: Mapping[str, Any], path: str | Path) -> None:
+    """Write ``value`` as JSON that every reader takes."""
+    Path(path).write_text(json_text(value) + "\n", encoding="utf-8")

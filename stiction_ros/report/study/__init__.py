@@ -1,0 +1,1 @@
+"""Pages of studies: controllers side by side, an example beside its truth."""

@@ -1,0 +1,1 @@
+"""Where the loops of a survey are judged."""

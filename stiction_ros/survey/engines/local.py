@@ -1,0 +1,180 @@
+"""Worker processes of this machine: the engine that needs nothing else.
+
+A process that is killed is replaced and its loop tried once more. One loop is with each worker at
+a time and one more is drawn when it comes back, so memory does not grow with the plant.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import multiprocessing
+import signal
+import time
+from collections.abc import Iterable, Iterator
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+
+from stiction_ros.intake.loop import Loop
+from stiction_ros.survey.assess import Assessed, assess
+from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
+from stiction_ros.survey.options import SurveyOptions
+
+LONGEST = 600.0
+"""Seconds that one loop may take; a usual one takes a second or two."""
+
+ENDS_WITHIN = 2.0
+"""Seconds that a worker is given to end by itself."""
+
+
+@dataclasses.dataclass
+class _Worker:
+    process: SpawnProcess
+    pipe: Connection
+    task: Task | None = None
+    since: float = 0.0
+    attempt: int = 1
+
+
+class LocalEngine:
+    """Processes of this machine."""
+
+    name = "local"
+
+    def __init__(self, jobs: int, longest: float = LONGEST) -> None:
+        """Start no process yet.
+
+        Args:
+            jobs: processes, one at least.
+            longest: seconds that a loop may take.
+        """
+        self._jobs, self._longest = max(jobs, 1), longest
+        self._workers: list[_Worker] = []
+
+    @property
+    def workers(self) -> int:
+        """How many processes work."""
+        return self._jobs
+
+    @property
+    def processes(self) -> tuple[int, ...]:
+        """Ids of the processes that are there."""
+        return tuple(worker.process.pid or 0 for worker in self._workers)
+
+    def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
+        """Yield what is said of each loop as it comes."""
+        waiting = iter(tasks)
+        exhausted = False
+        try:
+            while True:
+                while not exhausted and len(self._busy) < self._jobs:
+                    task = next(waiting, None)
+                    if task is None:
+                        exhausted = True
+                        break
+                    self._give(self._free(options), task, 1)
+                if not self._busy:
+                    return
+                yield from self._gathered(options)
+        finally:
+            self.close()
+
+    @property
+    def _busy(self) -> list[_Worker]:
+        return [worker for worker in self._workers if worker.task is not None]
+
+    def _free(self, options: SurveyOptions) -> _Worker:
+        for worker in [one for one in self._workers if one.task is None]:
+            if worker.process.is_alive():
+                return worker
+            self._drop(worker)  # killed while it had nothing to do: no loop's fault
+        context = multiprocessing.get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=_work, args=(there, options), daemon=True)
+        process.start()
+        there.close()
+        worker = _Worker(process, here)
+        self._workers.append(worker)
+        return worker
+
+    def _give(self, worker: _Worker, task: Task, attempt: int) -> None:
+        worker.task, worker.since, worker.attempt = task, time.monotonic(), attempt
+        try:
+            worker.pipe.send(task.loop)
+        except (BrokenPipeError, OSError):  # it has died; that shows when it is waited for
+            return
+
+    def _gathered(self, options: SurveyOptions) -> Iterator[Done]:
+        """Wait for a worker to answer, to die or to take too long."""
+        busy = self._busy
+        ends = [worker.since + self._longest for worker in busy]
+        room = max(min(ends) - time.monotonic(), 0.0)
+        ready = wait([worker.pipe for worker in busy], timeout=room)
+        for worker in busy:
+            task = worker.task
+            assert task is not None
+            if worker.pipe in ready:
+                answer = _answer(worker.pipe)
+                if answer is not None:
+                    worker.task = None
+                    yield Done(task, answer)
+                    continue
+                code = self._drop(worker)
+                if worker.attempt < ATTEMPTS:
+                    self._give(self._free(options), task, worker.attempt + 1)
+                else:
+                    yield lost(
+                        task, f"its worker ended {ATTEMPTS} times, the last time with {code}"
+                    )
+            elif time.monotonic() >= worker.since + self._longest:
+                self._drop(worker)
+                yield lost(task, f"it took more than {self._longest:g} s and was given up")
+
+    def _drop(self, worker: _Worker) -> str:
+        """End a worker and return how it ended."""
+        self._workers.remove(worker)
+        worker.process.join(timeout=0.2)
+        code = worker.process.exitcode
+        _end(worker)
+        return "no answer" if code is None else f"signal {-code}" if code < 0 else f"code {code}"
+
+    def close(self) -> None:
+        """End all workers."""
+        for worker in self._workers:
+            worker.pipe.close()
+        for worker in self._workers:
+            if worker.task is None:
+                worker.process.join(timeout=ENDS_WITHIN)
+            _end(worker)
+        self._workers.clear()
+
+
+def _end(worker: _Worker) -> None:
+    worker.pipe.close()
+    if worker.process.is_alive():
+        worker.process.kill()
+    worker.process.join()
+
+
+def _answer(pipe: Connection) -> Assessed | None:
+    """Return what a worker says; None where it has died."""
+    try:
+        answer = pipe.recv()
+    except (EOFError, OSError):
+        return None
+    assert isinstance(answer, Assessed)
+    return answer
+
+
+def _work(pipe: Connection, options: SurveyOptions) -> None:
+    """Judge loops until the pipe closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asked
+    while True:
+        try:
+            loop: Loop = pipe.recv()
+        except EOFError:
+            return
+        answer = assess(loop, options)
+        try:
+            pipe.send(answer)
+        except (BrokenPipeError, OSError):
+            return

@@ -1,0 +1,1 @@
+"""The ranked list: its page and its tables."""

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from stiction_ros.cli.main import main
+from stiction_ros.survey.engines import dask as dask_engine
+
+
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("exports")
+    flat = "".join(f"{k},40.0,20.0,20.0\n" for k in range(200))
+    (folder / "FIC1.csv").write_text("t,OP,PV,SP\n" + flat)
+    (folder / "FIC2.csv").write_text("nothing of use\n1\n2\n")
+    return folder
+
+
+def _code(arguments: list[str]) -> int:
+    try:
+        return main(arguments)
+    except SystemExit as ended:
+        return int(ended.code or 0)
+
+
+def test_a_folder_gives_a_list_with_a_reason_for_every_loop(
+    exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    costs = tmp_path / "cost.csv"
+    costs.write_text("loop,cost\nFIC1,3.5\n")
+    arguments = ["survey", str(exports), "--out", str(out), "--jobs", "1", "--cost", str(costs)]
+    assert _code([*arguments, "--json", str(tmp_path / "s.json")]) == 0
+    document = json.loads((tmp_path / "s.json").read_text())
+    rows = {row["name"]: row for row in document["loops"]}
+    assert rows["FIC1"]["status"] == "skipped"
+    assert "constant" in rows["FIC1"]["reason"]
+    assert rows["FIC2"]["status"] == "failed"
+    assert rows["FIC2"]["reason"]
+    assert document["engine"] == "local"
+    for name in ("survey.html", "survey.csv", "survey.xlsx", "survey.log", "loops.jsonl"):
+        assert (out / name).stat().st_size > 0
+    assert "FIC1" in capsys.readouterr().out
+    before = (out / "loops.jsonl").read_bytes()
+    assert _code([*arguments, "--resume"]) == 0
+    assert (out / "loops.jsonl").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--engine", "spark://x"], "use local, or dask://"),
+        (["--engine", "dask://127.0.0.1:1"], "no scheduler answers"),
+        (["--resume"], "add --out DIR"),
+        (["--jobs", "0"], "no number of processes"),
+        (["--cost", "none.csv"], "cannot be read"),
+        (["--previous", "none.json"], "cannot be read"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(
+    exports: Path,
+    more: list[str],
+    said: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(dask_engine, "PATIENCE", 1.0)
+    assert _code(["survey", str(exports), *more]) == 2
+    error = capsys.readouterr().err.strip()
+    assert said in error
+    assert len(error.splitlines()) == 1
+
+
+def test_a_path_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert _code(["survey", "nowhere"]) == 2
+    assert "nowhere: there is no such file or folder" in capsys.readouterr().err
+
+
+def test_gain_of_a_model_needs_its_controller(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _code(["gain", "config/example1.loop.yaml"]) == 2
+    assert "has no controller" in capsys.readouterr().err
+
+
+def test_gain_of_a_model_in_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "flow.loop.yaml"
+    text = Path("config/example1.loop.yaml").read_text()
+    model.write_text(text + "controller: {kind: pi, gain: 1.0, integral_time: 40.0}\n")
+    assert _code(["gain", str(model), "--samples", "300", "--json", "-"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert set(document["now"]) == {
+        "amplitude",
+        "iae_per_hour",
+        "travel_per_hour",
+        "moves_per_hour",
+        "reversals_per_hour",
+    }
+    whats = [option["what"] for option in document["options"]]
+    assert whats == ["service", "embedding", "retune", "leave"]
+    for option in document["options"]:
+        assert set(option) >= {*document["now"], "what", "interval", "note"}

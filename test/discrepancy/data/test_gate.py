@@ -1,0 +1,173 @@
+"""What the recorded values show before any model is asked."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gap_loops import loop, record, without_controller, without_set_points
+
+from stiction_ros.blind.loops.generator import blind_loop
+from stiction_ros.discrepancy import GapOptions, find_discrepancy
+from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
+from stiction_ros.discrepancy.data.gate import Gate, look_at_data, quantum_of
+from stiction_ros.discrepancy.simulation.free_run import join_records
+from stiction_ros.effects import Behaviour, Clip, Freeze, Quantisation, TimeShift, Tuning
+from stiction_ros.loop import PiTuning
+
+
+def gate_of(effect: Behaviour | None) -> Gate:
+    model = loop()
+    true = model if effect is None else model.with_effect("sensor:PV1", effect)
+    return look_at_data(model, join_records(model, [record(true)]))
+
+
+def test_sound_data_show_nothing() -> None:
+    assert gate_of(None).findings == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "name"),
+    [
+        (Freeze(300.0, 60.0), "freeze"),
+        (Clip(44.0, 56.0), "clip"),
+        (Quantisation(0.5), "quantisation"),
+    ],
+)
+def test_sensor_effects_are_seen_in_the_values(effect: Behaviour, name: str) -> None:
+    assert [finding.effect for finding in gate_of(effect).findings] == [name]
+
+
+@pytest.mark.parametrize("effect", [Freeze(300.0, 60.0), Clip(44.0, 56.0), Quantisation(0.5)])
+def test_what_the_model_has_already_is_no_finding(effect: Behaviour) -> None:
+    model = loop().with_effect("sensor:PV1", effect)
+    gate = look_at_data(model, join_records(model, [record(model)]))
+    assert gate.findings == ()
+    # Its rows stay out of the scores all the same.
+    assert gate.usable.tolist() == gate_of(effect).usable.tolist()
+    # Rounded values count as rounded, whoever named the rounding.
+    assert gate.rounding == gate_of(effect).rounding
+    assert (gate.rounding == (0.5,)) == isinstance(effect, Quantisation)
+
+
+@pytest.mark.parametrize(
+    ("known", "true"),
+    [
+        (Freeze(100.0, 60.0), Freeze(300.0, 60.0)),
+        (Clip(40.0, 60.0), Clip(44.0, 56.0)),
+        (Quantisation(0.1), Quantisation(0.5)),
+    ],
+)
+def test_what_the_model_has_with_other_figures_is_a_finding(
+    known: Behaviour, true: Behaviour
+) -> None:
+    model = loop().with_effect("sensor:PV1", known)
+    shown = record(loop().with_effect("sensor:PV1", true))
+    found = look_at_data(model, join_records(model, [shown])).findings
+    assert [finding.effect for finding in found] == [true.effect]
+
+
+def test_an_effect_of_the_gate_is_not_added_twice() -> None:
+    model = loop().with_effect("sensor:PV1", Quantisation(0.5))
+    found = find_discrepancy(model, [record(model)], GapOptions(quick=True))
+    assert "quantisation" not in [effect.effect for effect in found.effects]
+    assert found.model_after.to_mapping()["sensors"] == model.to_mapping()["sensors"]
+
+
+def test_a_frozen_while_is_timed() -> None:
+    (finding,) = gate_of(Freeze(300.0, 60.0)).findings
+    behaviour = finding.behaviour
+    assert isinstance(behaviour, Freeze)
+    assert (behaviour.onset, behaviour.duration) == pytest.approx((300.0, 60.0), abs=1.0)
+
+
+def test_frozen_rows_are_not_scored() -> None:
+    usable = gate_of(Freeze(300.0, 60.0)).usable
+    assert not usable[0, 302:358].any()
+
+
+def test_ends_of_a_sensor_are_found() -> None:
+    (finding,) = gate_of(Clip(44.0, 56.0)).findings
+    assert isinstance(finding.behaviour, Clip)
+    assert finding.behaviour.high == 56.0
+
+
+def test_a_quantum_is_the_least_distance() -> None:
+    assert quantum_of(0.25 * np.round(np.random.default_rng(1).normal(0, 5, 300))) == 0.25
+
+
+def test_continuous_values_have_no_quantum() -> None:
+    assert quantum_of(np.random.default_rng(1).normal(0, 5, 300)) == 0.0
+
+
+def test_the_recorded_tuning_is_recognised() -> None:
+    check = check_controller(loop(), join_records(loop(), [record(loop())]))
+    assert check.status is ControllerStatus.SAME
+
+
+def test_another_tuning_is_named_with_its_figures() -> None:
+    model = loop()
+    other = dataclasses.replace(model, controller=PiTuning(1.1, 9.0))
+    check = check_controller(model, join_records(model, [record(other)]))
+    assert check.finding is not None
+    assert isinstance(check.finding.behaviour, Tuning)
+    assert check.finding.behaviour.gain == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_late_shortof_pv_is_named(known: bool) -> None:
+    model = loop() if known else without_controller(loop())
+    recorded = record(loop())
+    late = TimeShift(4.0).simulate(recorded.pv[:, 0])[:, None]
+    check = check_controller(model, join_records(model, [dataclasses.replace(recorded, pv=late)]))
+    assert check.finding is not None
+    assert check.finding.behaviour == TimeShift(4.0)
+
+
+def test_without_set_points_the_controller_is_not_asked() -> None:
+    check = check_controller(loop(), join_records(loop(), [without_set_points(record(loop()))]))
+    assert check.status is ControllerStatus.NOT_ASKED
+
+
+def test_op_of_an_operator_is_left_unexplained() -> None:
+    recorded = record(loop())
+    op = 50.0 + np.cumsum(np.random.default_rng(1).normal(0, 0.3, recorded.op.shape), axis=0)
+    other = dataclasses.replace(recorded, op=np.clip(op, 5.0, 95.0))
+    check = check_controller(loop(), join_records(loop(), [other]))
+    assert check.status is ControllerStatus.UNEXPLAINED
+
+
+@pytest.mark.parametrize("kind", ["still", "two levels", "frozen", "at its ends"])
+def test_a_pv_that_shows_next_to_nothing_is_answered(kind: str) -> None:
+    seen, _ = blind_loop(1)
+    short = seen.record.part(0, 600)
+    pv = short.pv.copy()
+    if kind == "still":
+        pv[:] = pv[0]
+    elif kind == "two levels":
+        pv = np.where(pv > np.median(pv), pv.max(), pv.min())
+    elif kind == "frozen":
+        pv[20:-20] = pv[20]
+    else:
+        pv = np.clip(pv, *np.quantile(pv, [0.45, 0.55]))
+    answer = find_discrepancy(
+        seen.model, [dataclasses.replace(short, pv=pv)], GapOptions(quick=True)
+    )
+    assert all(effect.place != "process:PV1" for effect in answer.effects)
+
+
+def test_samples_that_stand_alone_are_listed_as_not_searched() -> None:
+    sound = record(loop(), seed=4)
+    pv = sound.pv.copy()
+    pv[100:600:50, 0] += 10.0
+    answer = find_discrepancy(loop(), [dataclasses.replace(sound, pv=pv)], GapOptions(quick=True))
+    assert answer.gate.alone == (10,)
+    (told,) = [entry for entry in answer.not_considered if entry.effect == "spikes"]
+    assert told.place == "sensor"
+    assert told.reason.startswith("samples of PV1 that stand alone, 10 of them, were left out")
+    assert told.to_json() in answer.to_json()["not_considered"]
+    assert "spikes" not in {
+        entry.effect
+        for entry in find_discrepancy(loop(), [sound], GapOptions(quick=True)).not_considered
+    }

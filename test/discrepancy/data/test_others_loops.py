@@ -1,0 +1,74 @@
+"""Loops of the world of others that were answered wrongly once; the principle that answers them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
+from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.field.hidden import hidden_loop
+from stiction_ros.loop import LoopModel
+from stiction_ros.loop.model import PiTuning
+
+QUICK = GapOptions(quick=True)
+
+
+def answered(seed: int, stem: bool = True) -> Discrepancy:
+    loop = hidden_loop(seed)
+    record = loop.record if stem else dataclasses.replace(loop.record, stem=None)
+    return find_discrepancy(LoopModel.from_mapping(loop.given), [record], QUICK)
+
+
+def names(answer: Discrepancy) -> list[tuple[str, str]]:
+    return [(each.place, each.effect) for each in answer.effects]
+
+
+def test_noise_of_the_equation_does_not_hide_what_an_effect_closes() -> None:
+    answer = answered(601)  # a pole; the declared noise wanders farther than the pole moves PV
+    (found,) = answer.effects
+    assert {(found.place, found.effect), *found.alternatives} == {
+        ("process:PV1", "pole"),
+        ("sensor:PV1", "lag"),
+        ("valve:V1", "lag"),
+    }
+    assert found.closed > 0.9
+    assert answer.closed < found.closed
+
+
+def test_a_recorded_stem_tells_a_lag_of_the_valve_from_those_behind_it() -> None:
+    told = answered(629)
+    assert names(told) == [("valve:V1", "lag")]
+    assert told.verdict is GapVerdict.NAMED
+    (untold,) = answered(629, stem=False).effects
+    assert untold.verdict is GapVerdict.AMBIGUOUS
+    assert ("process:PV1", "pole") in {(untold.place, untold.effect), *untold.alternatives}
+
+
+def test_a_named_effect_of_the_process_is_no_correction_of_the_model() -> None:
+    answer = answered(638)  # one sample more of dead time
+    assert names(answer) == [("process:PV1", "delay")]
+    assert answer.effects[0].parameters["extra"] == pytest.approx(1.0, abs=0.3)
+    assert answer.process_changes == ()
+
+
+@pytest.mark.parametrize(("factor", "other"), [(0.97, False), (0.8, True)])
+def test_a_tuning_is_another_one_by_a_size_that_matters(factor: float, other: bool) -> None:
+    loop = hidden_loop(600)  # its controller scans twice in a sample of the record
+    model = LoopModel.from_mapping(loop.given)
+    assert isinstance(model.controller, PiTuning)
+    runs, _ = open_gate(model, [loop.record])
+    assert check_controller(model, runs).finding is None
+    error = runs.records[0].sp[:, 0] - runs.pv[:, 0]
+    gain, time = model.controller.gain, model.controller.integral_time / factor
+    moves = gain * np.diff(error, prepend=error[0]) + gain * runs.sample_time / time * error
+    op = 50.0 + 0.2 * np.cumsum(moves - moves.mean())
+    scaled = dataclasses.replace(model, controller=PiTuning(0.2 * gain, 0.0 + time * factor))
+    record = dataclasses.replace(loop.record, op=op[:, None])
+    again, _ = open_gate(scaled, [record])
+    check = check_controller(scaled, again)
+    assert (check.finding is not None) is other
+    assert check.status is (ControllerStatus.OTHER if other else ControllerStatus.SAME)

@@ -1,0 +1,29 @@
+"""Scores of chance, stored and drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stiction_ros.blind.calibration import chance_scores
+from stiction_ros.discrepancy.decision.chance import FEW, SCORE_OF_FEW, stored_threshold
+
+
+def test_the_stored_threshold_grows_with_the_logarithm_of_the_candidates() -> None:
+    steps = np.diff([stored_threshold(FEW * factor) for factor in (1, 2, 4, 8)])
+    np.testing.assert_allclose(steps, steps[0])
+    assert steps[0] > 0.0
+
+
+def test_the_stored_threshold_of_one_loop_is_what_was_calibrated() -> None:
+    assert stored_threshold(FEW) == pytest.approx(SCORE_OF_FEW)
+
+
+def test_scores_of_noise_alone_stay_below_the_margin() -> None:
+    scores = list(chance_scores([1, 2], 3))
+    assert len(scores) == 6
+    assert max(each.evidence for each in scores) < 10.0
+
+
+def test_scores_of_noise_are_drawn_from_the_seed() -> None:
+    assert list(chance_scores([3], 2)) == list(chance_scores([3], 2))

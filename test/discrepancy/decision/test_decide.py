@@ -1,0 +1,133 @@
+"""What scores allow to say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, borne_out, decide
+from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.effects import Axis, Behaviour, FloatArray
+
+MARGIN = 10.0
+
+
+class Named(Candidate):
+    """A candidate that is only a name."""
+
+    axes = (Axis(0.0, 10.0, 5),)
+
+    def __init__(self, place: str, effect: str, inside: bool = True) -> None:
+        self.place, self.effect, self.inside = place, effect, inside
+        self.twins = (("sensor:PV1", "bias_step"),) if effect == "step" else ()
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        raise NotImplementedError
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+        raise NotImplementedError
+
+
+def fit(
+    place: str, effect: str, delta_bic: float, held: float = 5.0, inside: bool = True
+) -> CandidateFit:
+    factors = np.array([0.5])
+    candidate = Named(place, effect, inside)
+    return CandidateFit(candidate, np.array([3.0]), factors, {}, delta_bic, held)
+
+
+def said(*fits: CandidateFit, departures: int = 100) -> Decision:
+    return decide(fits, MARGIN, MARGIN, lambda fit: departures)
+
+
+def test_a_clear_winner_is_named() -> None:
+    answer = said(fit("valve:V1", "slew", 80.0), fit("process:PV1", "gain", 60.0))
+    assert answer.verdict is GapVerdict.NAMED
+
+
+def test_a_rival_within_the_margin_leaves_doubt() -> None:
+    answer = said(fit("valve:V1", "slew", 80.0), fit("process:PV1", "gain", 72.0))
+    assert (answer.verdict, answer.inseparable) == (GapVerdict.AMBIGUOUS, False)
+
+
+def test_a_twin_leaves_doubt_that_one_addition_serves() -> None:
+    answer = said(fit("disturbance:PV1", "step", 80.0))
+    assert (answer.verdict, answer.inseparable) == (GapVerdict.AMBIGUOUS, True)
+
+
+def test_less_than_the_margin_is_nothing() -> None:
+    assert said(fit("valve:V1", "slew", 9.0, held=0.5)).verdict is GapVerdict.NONE
+
+
+def test_held_out_rows_veto() -> None:
+    assert said(fit("valve:V1", "slew", 24.0, held=-9.5)).verdict is GapVerdict.NONE
+
+
+def test_a_small_loss_of_a_weak_effect_on_held_out_rows_is_chance() -> None:
+    assert said(fit("valve:V1", "slew", 24.0, held=-2.0)).verdict is GapVerdict.NAMED
+
+
+def test_a_large_gap_that_held_out_rows_refuse_is_unknown() -> None:
+    assert said(fit("valve:V1", "slew", 200.0, held=-1.0)).verdict is GapVerdict.UNKNOWN
+
+
+def test_held_out_rows_count_between_rivals() -> None:
+    answer = said(
+        fit("disturbance:PV1", "drift", 22.0, 90.0), fit("process:PV1", "gain", 20.0, 2.0)
+    )
+    assert answer.verdict is GapVerdict.NAMED
+
+
+def test_a_rival_below_the_threshold_leaves_doubt() -> None:
+    answer = said(fit("valve:V1", "slew", 11.0, 1.0), fit("process:PV1", "delay", 5.0, 0.5))
+    assert answer.alternatives == (("process:PV1", "delay"),)
+
+
+def test_a_valve_that_hardly_ever_moves_does_not_show_that_there_is_no_jump() -> None:
+    answer = said(
+        fit("valve:V1", "stiction", 84.0), fit("valve:V1", "backlash", 90.0), departures=3
+    )
+    assert answer.alternatives == (("valve:V1", "stiction"),)
+
+
+def test_a_better_rival_outside_the_catalogue_is_unknown() -> None:
+    answer = said(
+        fit("valve:V1", "slew", 80.0), fit("process:PV1", "other dynamics", 90.0, inside=False)
+    )
+    assert answer.verdict is GapVerdict.UNKNOWN
+
+
+def test_a_clear_jump_is_stiction() -> None:
+    answer = said(fit("valve:V1", "stiction", 91.0), fit("valve:V1", "backlash", 80.0))
+    assert answer.chosen is not None
+    assert (answer.verdict, answer.chosen.candidate.effect) == (GapVerdict.NAMED, "stiction")
+
+
+def test_no_jump_is_backlash() -> None:
+    answer = said(fit("valve:V1", "stiction", 84.0), fit("valve:V1", "backlash", 90.0))
+    assert answer.chosen is not None
+    assert (answer.verdict, answer.chosen.candidate.effect) == (GapVerdict.NAMED, "backlash")
+
+
+def test_a_doubtful_jump_names_the_family() -> None:
+    answer = said(fit("valve:V1", "stiction", 90.0), fit("valve:V1", "backlash", 89.0))
+    assert answer.alternatives == (("valve:V1", "backlash"),)
+
+
+def test_weak_friction_names_the_family() -> None:
+    answer = said(fit("valve:V1", "backlash", 20.0), fit("valve:V1", "stiction", 14.0))
+    assert answer.alternatives == (("valve:V1", "stiction"),)
+
+
+def test_a_step_is_looked_at_before_a_change_that_contains_it() -> None:
+    step = fit("disturbance:PV1", "step", 80.0)
+    change = fit("process:PV1", "gain that changes", 90.0, inside=False)
+    change.candidate.contains = (("disturbance:PV1", "step"),)
+    answer = said(step, change)
+    assert answer.chosen is step
+
+
+def test_what_comes_at_one_moment_need_not_show_on_held_out_rows() -> None:
+    assert not borne_out(700.0, -5.0, dated=False)
+    assert borne_out(700.0, -5.0, dated=True)

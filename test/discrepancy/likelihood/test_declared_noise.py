@@ -1,0 +1,127 @@
+"""The declared noise as a form of its own, and what is larger than it as a named effect."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gap_loops import loop, record
+from scipy.signal import lfilter
+
+from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
+from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag, declared_noise
+from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms, whiten
+from stiction_ros.effects import (
+    Behaviour,
+    ColouredDisturbance,
+    ExtraPole,
+    FloatArray,
+    RandomWalkDisturbance,
+)
+from stiction_ros.loop import LoopModel
+
+QUICK = GapOptions(quick=True)
+
+
+def with_equation_noise() -> LoopModel:
+    document = loop().to_mapping()
+    document["process"]["outputs"][0]["noise"] = {"std": 0.05, "enters": "equation"}
+    return LoopModel.from_mapping(document)
+
+
+def answer(model: LoopModel, place: str, effect: Behaviour) -> Discrepancy:
+    return find_discrepancy(model, [record(model.with_effect(place, effect), seed=3)], QUICK)
+
+
+def test_noise_of_the_measurement_is_white() -> None:
+    (declared,) = declared_noise(loop(0.2))
+    assert declared is not None
+    assert (declared.std, len(declared.ar)) == (0.2, 0)
+
+
+def test_noise_of_the_equation_has_the_poles_of_the_process() -> None:
+    (declared,) = declared_noise(with_equation_noise())
+    assert declared is not None
+    assert declared.ar == pytest.approx([1.6, -0.64])
+
+
+def test_a_model_without_noise_declares_none() -> None:
+    assert declared_noise(loop(0.0)) == (None,)
+
+
+def test_noise_beside_a_coloured_disturbance_is_whitened() -> None:
+    model = loop(0.3).with_effect("disturbance:PV1", ColouredDisturbance(0.5, 20.0))
+    (declared,) = declared_noise(model)
+    assert declared is not None
+    random, keep = np.random.default_rng(1), np.exp(-1.0 / 20.0)
+    slow = lfilter([0.5 * np.sqrt(1.0 - keep**2)], [1.0, -keep], random.standard_normal(40_000))
+    white = whiten(slow + 0.3 * random.standard_normal(40_000), declared.ar)[100:]
+    assert float(np.std(white)) == pytest.approx(declared.std, rel=0.02)
+    assert float(np.corrcoef(white[1:], white[:-1])[0, 1]) == pytest.approx(0.0, abs=0.02)
+
+
+def test_behind_a_lag_noise_has_one_more_pole() -> None:
+    poles = np.roots(np.concatenate([[1.0], -behind_lag(np.array([0.9]), 0.5)]))
+    assert sorted(poles.tolist()) == pytest.approx([0.5, 0.9])
+
+
+def blocks(count: int) -> Blocks:
+    train = np.ones(count, dtype=bool)
+    train[:6] = False
+    return Blocks(train, np.zeros(count, dtype=bool))
+
+
+def test_another_noise_than_declared_has_its_price() -> None:
+    white = np.random.default_rng(2).standard_normal(2000)
+    forms = noise_forms(white, np.zeros((2000, 0)), blocks(2000), (None,), (np.zeros(0),))
+    assert [form.enlarged for form in sorted(forms, key=lambda form: form.bic(0))] == [False, True]
+
+
+def test_what_whitening_takes_away_does_not_grow() -> None:
+    """The start of a settled equation is invisible to its own noise, yet shown by a free run."""
+    ar, count = np.array([1.6, -0.64]), 600
+    starts = lfilter([1.0], np.concatenate([[1.0], -ar]), np.eye(count, 1), axis=0)
+    columns: FloatArray = np.hstack([starts, np.ones((count, 1))])
+    target = lfilter(
+        [1.0], np.concatenate([[1.0], -ar]), np.random.default_rng(3).normal(size=count)
+    )
+    fit = given_noise(target + 2.0, columns, blocks(count), ar)
+    assert float(np.abs(fit.residual).max()) < 2.0 * float(np.abs(target).max())
+
+
+@pytest.mark.parametrize("model", [loop(0.1), with_equation_noise()], ids=["white", "equation"])
+def test_the_noise_of_a_healthy_loop_agrees(model: LoopModel) -> None:
+    found = find_discrepancy(model, [record(model, seed=4)], QUICK)
+    assert found.verdict is GapVerdict.NONE
+    assert not any(noise.disagrees for noise in found.noise)
+    assert found.noise[0].found == pytest.approx(found.noise[0].declared, rel=0.1)
+
+
+def test_slow_noise_is_named_although_an_autoregression_describes_it() -> None:
+    found = answer(loop(0.1), "disturbance:PV1", ColouredDisturbance(1.0, 25.0))
+    names = {(e.place, e.effect) for e in found.effects} | set(found.alternatives)
+    assert ("disturbance:PV1", "coloured") in names
+    assert found.noise[0].disagrees
+    assert any("the model declares" in sentence for sentence in found.where)
+
+
+def test_a_load_that_wanders_is_told_where_it_enters() -> None:
+    found = answer(loop(0.05), "load:V1", RandomWalkDisturbance(0.4))
+    (effect,) = found.effects
+    assert (effect.place, effect.effect) == ("load:V1", "random_walk")
+    low, high = effect.intervals["rate"]
+    assert low <= 0.4 <= high
+
+
+def test_a_model_that_declares_no_noise_is_not_contradicted() -> None:
+    model = loop(0.0)
+    noisy = dataclasses.replace(record(loop(0.1), seed=4))
+    found = find_discrepancy(model, [noisy], QUICK)
+    assert not any(noise.disagrees for noise in found.noise)
+
+
+def test_noise_that_passes_the_lag_is_no_second_effect() -> None:
+    model = with_equation_noise()
+    found = answer(model, "process:PV1", ExtraPole(8.0))
+    assert {e.effect for e in found.effects} <= {"lag", "pole"}

@@ -1,0 +1,80 @@
+"""Loads where they enter, and their shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gap_loops import loop, record
+
+from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
+from stiction_ros.discrepancy.candidate.wave import LoadCandidate, disturbance_candidates
+from stiction_ros.discrepancy.candidate.waves import StepWave
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.effects import (
+    Behaviour,
+    SineDisturbance,
+    SquareDisturbance,
+    StepDisturbance,
+    TriangleDisturbance,
+)
+
+QUICK = GapOptions(quick=True)
+
+
+def found(place: str, effect: Behaviour) -> Discrepancy:
+    model = loop(0.05)
+    return find_discrepancy(model, [record(model.with_effect(place, effect), seed=2)], QUICK)
+
+
+def test_a_step_of_the_load_is_told_from_one_of_the_output() -> None:
+    answer = found("load:V1", StepDisturbance(430.0, 3.0))
+    (effect,) = answer.effects
+    assert (effect.place, effect.effect) == ("load:V1", "step")
+    assert effect.alternatives == (("valve:V1", "offset"),)
+    assert effect.parameters["time"] == pytest.approx(430.0, abs=2.0)
+    low, high = effect.intervals["size"]
+    assert low <= 3.0 <= high
+    assert effect.closed > 0.9
+    assert effect.units["size"] == "%"
+
+
+@pytest.mark.parametrize(
+    ("place", "effect"),
+    [
+        ("load:V1", SquareDisturbance(3.0, 83.0, 0.7)),
+        ("disturbance:PV1", SquareDisturbance(0.8, 61.0, 2.0)),
+        ("load:V1", TriangleDisturbance(4.0, 71.0, -1.0)),
+    ],
+)
+def test_a_wave_is_named_by_shape_and_place(place: str, effect: Behaviour) -> None:
+    answer = found(place, effect)
+    assert [(e.place, e.effect) for e in answer.effects] == [(place, effect.effect)]
+    own = effect.to_mapping()
+    assert answer.effects[0].parameters["period"] == pytest.approx(own["period"], rel=0.01)
+    assert answer.effects[0].parameters["amplitude"] == pytest.approx(own["amplitude"], rel=0.1)
+
+
+def test_a_sine_is_the_same_wherever_it_enters() -> None:
+    answer = found("load:V1", SineDisturbance(3.0, 57.0))
+    (effect,) = answer.effects
+    names = {(effect.place, effect.effect), *effect.alternatives}
+    assert names == {("disturbance:PV1", "sine"), ("load:V1", "sine")}
+
+
+def test_the_response_to_a_load_is_that_of_its_stem() -> None:
+    run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
+    candidate = LoadCandidate(run, 0, StepWave(run, np.zeros(0)))
+    response = candidate.respond(run, np.array([[120.0]]))
+    moved = FreeRun(loop().with_effect("load:V1", StepDisturbance(120.0, 2.5)), run.runs)
+    assert 2.5 * response.sizes[0][:, 0, 0] == pytest.approx(
+        moved.forced[:, 0] - run.forced[:, 0], abs=1e-9
+    )
+
+
+def test_every_place_has_its_shapes() -> None:
+    run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
+    gap = np.random.default_rng(0).normal(size=(300, 1))
+    names = {key for c in disturbance_candidates(run, gap, [gap[:, 0]]) for key in c.keys}
+    shapes = ("step", "drift", "sine", "square", "triangle")
+    assert {(place, shape) for place in ("load:V1", "disturbance:PV1") for shape in shapes} <= names

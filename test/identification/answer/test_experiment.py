@@ -1,0 +1,153 @@
+"""What an undecided answer says would decide."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+from stiction_ros.identification import IdentificationOptions, VerdictKind
+from stiction_ros.identification.answer.advice import advised
+from stiction_ros.identification.answer.experiment import experiment_for
+from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.result.identification import (
+    FitStatus,
+    Identification,
+    OutputModel,
+    ValveEstimate,
+)
+from stiction_ros.records.record import Record
+
+CLEAR = {"delta_bic": 30.0, "half_1": 20.0, "half_2": 20.0, "moves": 40.0}
+
+
+def undecided(**evidence: float) -> ValveEstimate:
+    return ValveEstimate(
+        name="V1",
+        verdict=VerdictKind.UNDECIDED,
+        law="he",
+        static_friction=1.0,
+        static_interval=(0.0, 1.4),
+        dynamic_friction=0.5,
+        dynamic_interval=(0.0, 0.6),
+        jump=0.5,
+        stem_start=50.0,
+        moves=40,
+        evidence=CLEAR | evidence,
+    )
+
+
+@pytest.fixture
+def record() -> Record:
+    random = np.random.default_rng(1)
+    op = 60.0 + 4.0 * np.sin(np.arange(400) / 9.0)
+    op *= 8.0 / np.ptp(op)
+    pv = random.standard_normal(400)
+    return Record("loop", 2.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
+
+
+def answer(
+    valve: ValveEstimate, a: float = -0.9, noise: float = 0.01, method: str = "exact"
+) -> Identification:
+    model = OutputModel("PV1", (a,), {"V1": (0.1,)}, {"V1": 3}, 0.0, noise, 90.0, 80.0)
+    return Identification(
+        FitStatus.OK, "", method, 400, 2.0, 0.1, (valve,), (model,), np.zeros((400, 1))
+    )
+
+
+OPTIONS = IdentificationOptions()
+
+
+@pytest.mark.parametrize(
+    ("evidence", "said"),
+    [
+        ({"moves": 3.0}, "the stem moves 3 times only"),
+        ({"line_rivalry": 0.9, "outside_line": 40.0}, "wave from outside explains"),
+        ({"alike": 0.0}, "no two rates that see all"),
+        ({"half_1": -2.0}, "One half of the record only"),
+        ({"loop_gone": 0.01}, "move nearly as much without f_S 1 %"),
+        ({}, "hardly matters"),
+        ({"delta_bic": 12.0}, "but not clearly"),
+        (
+            {"delta_bic": -8.0, "half_1": -1.0},
+            "f_S up to 1.4 %, 18 % of OP's range",
+        ),
+    ],
+)
+def test_the_reason_is_that_of_the_evidence(
+    record: Record, evidence: dict[str, float], said: str
+) -> None:
+    span = float(np.ptp(record.op))
+    assert span == pytest.approx(8.0)
+    text = experiment_for(record, answer(undecided(**evidence)), 0, OPTIONS)
+    assert said in text
+
+
+def test_the_travel_test_is_sized_by_band_noise_and_process(record: Record) -> None:
+    text = experiment_for(record, answer(undecided(delta_bic=12.0)), 0, OPTIONS)
+    figures = re.findall(r"by ([\d.]+) %.*of ([\d.]+) % held for (\d+) s", text)
+    way, step, hold = map(float, figures[0])
+    assert way == pytest.approx(2.0)  # largest f_S + f_D that is not rejected
+    assert step == pytest.approx(0.5)
+    assert hold == pytest.approx(2.0 * 4 + 3.0 * 18.0, abs=4.0)  # dead time and three lags
+
+
+@pytest.mark.parametrize(
+    ("noise", "step", "averaged", "times"),
+    [
+        (0.1, 0.5, 1, 1),
+        (0.5, 0.5, 18, 1),  # four sigma over the answer of .95 × .5, squared
+        (1.0, 1.0, 18, 1),
+        (3.0, 2.0, 40, 1),
+        (5.0, 2.0, 60, 2),
+    ],
+)
+def test_noise_asks_for_longer_holds_then_larger_steps_then_repeats(
+    record: Record, noise: float, step: float, averaged: int, times: int
+) -> None:
+    text = experiment_for(record, answer(undecided(delta_bic=12.0), noise=noise), 0, OPTIONS)
+    found, hold = map(float, re.findall(r"steps of ([\d.]+) % held for (\d+) s", text)[0])
+    assert found == pytest.approx(step)
+    assert hold == pytest.approx(2.0 * 4 + 3.0 * 18.0 + 2.0 * (averaged - 1), abs=5.0)
+    assert (f", {times} times over" in text) is (times > 1)
+
+
+def test_an_integrator_is_told_by_its_slope(record: Record) -> None:
+    text = experiment_for(record, answer(undecided(delta_bic=12.0), a=-1.0), 0, OPTIONS)
+    assert "PV1 changes its slope at every step" in text
+
+
+def test_more_of_the_record_is_advised_as_far_as_it_would_do(record: Record) -> None:
+    text = experiment_for(record, answer(undecided(delta_bic=0.0)), 0, OPTIONS)
+    assert "record 1.5 times as long, 1200 s" in text  # 20 more of what 40 are gained
+    none = experiment_for(record, answer(undecided(delta_bic=-400.0, half_1=0.5)), 0, OPTIONS)
+    assert "times as long" not in none
+    sure = experiment_for(record, answer(undecided()), 0, OPTIONS)
+    assert "times as long" not in sure
+
+
+def test_only_undecided_valves_get_an_experiment(record: Record) -> None:
+    for kind in VerdictKind:
+        valve = dataclasses.replace(undecided(), verdict=kind)
+        (told,) = advised(record, answer(valve), OPTIONS).valves
+        assert bool(told.experiment) is (kind is VerdictKind.UNDECIDED)
+        assert (told.to_json()["experiment"] is None) is (kind is not VerdictKind.UNDECIDED)
+
+
+def test_a_method_without_evidence_says_so(record: Record) -> None:
+    valve = dataclasses.replace(undecided(), evidence={"share": 0.1, "moves": 4.0})
+    assert "does not weigh friction" in experiment_for(record, answer(valve), 0, OPTIONS)
+
+
+@pytest.mark.parametrize(
+    ("a", "lag"), [((-0.9,), 2.0 * 9), ((), 0.0), ((-1.0,), None), ((-1.05,), None)]
+)
+def test_the_answer_to_a_step(a: tuple[float, ...], lag: float | None) -> None:
+    model = OutputModel("PV1", a, {"V1": (-0.2,)}, {"V1": 3}, 0.0, 0.1, 90.0, 80.0)
+    found = StepAnswer.of(model, "V1", 400, 2.0)
+    assert found.dead_time == 8.0
+    assert found.lag == (None if lag is None else pytest.approx(lag, abs=2.0))
+    assert found.after(6.0) == 0.0
+    assert found.after(8.0) == pytest.approx(0.2)

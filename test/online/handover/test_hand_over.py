@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from stiction_ros.config_files import find_config
+from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.effects import HeStiction
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.handover.background import AtOnce, Beside
+from stiction_ros.online.handover.hand_over import HandOver
+from stiction_ros.online.handover.past import Past
+
+PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
+DESIGN = ControlSettings(hand_over_samples=60).design(PROCESS)
+AWARE = functools.partial(
+    MpcController, DESIGN, ControlMode.EMBEDDING, (HeStiction(5.0, 2.0),), (None,)
+)
+
+
+def past_of(samples: int) -> Past:
+    """A loop whose OP swings far enough to slip, its PV missing at times."""
+    past, random = Past(500, 1, 1, 0), np.random.default_rng(3)
+    for k in range(samples):
+        pv = 50.0 + 5.0 * np.sin(k / 20.0 - 1.0) + 0.01 * random.normal()
+        missing = k % 17 == 5
+        past.add(
+            np.array([50.0 + 8.0 * np.sin(k / 20.0)]),
+            np.array([np.nan if missing else pv]),
+            np.zeros(0),
+        )
+    return past
+
+
+def test_what_is_made_ready_early_is_brought_up_to_the_present() -> None:
+    early = HandOver(0, "test", PROCESS, AWARE)
+    early.prepare(AtOnce(), past_of(200))
+    found = early.take(past_of(240)).controller
+    now = AWARE()
+    now.take_over(past_of(240).history(), samples=100)
+    assert found is not None
+    assert found.stem.tolist() == now.stem.tolist()
+    assert found.observer.state.tolist() == now.observer.state.tolist()
+    assert found.observer.disturbance.tolist() == now.observer.disturbance.tolist()
+
+
+def test_what_cannot_be_built_says_so_when_it_is_taken() -> None:
+    def refuse() -> MpcController:
+        raise InputError("cannot be built")
+
+    change = HandOver(0, "test", PROCESS, refuse)
+    change.prepare(AtOnce(), past_of(10))
+    with pytest.raises(InputError, match="cannot be built"):
+        change.take(past_of(10))
+
+
+def test_a_thread_does_the_same_as_the_call() -> None:
+    background = Beside()
+    changes = [HandOver(0, "test", PROCESS, AWARE) for _ in range(2)]
+    for change, where in zip(changes, (AtOnce(), background), strict=True):
+        change.prepare(where, past_of(150))
+    background.close()
+    one, other = (change.take(past_of(150)).controller for change in changes)
+    assert one is not None
+    assert other is not None
+    assert one.observer.state.tolist() == other.observer.state.tolist()
+
+
+def test_a_past_without_any_measurement_can_be_taken_over() -> None:
+    past = Past(10, 1, 1, 0)
+    past.add(np.array([50.0]), np.array([np.nan]), np.zeros(0))
+    change = HandOver(0, "test", PROCESS, AWARE)
+    change.prepare(AtOnce(), past)
+    found = change.take(past).controller
+    assert found is not None
+    assert np.isfinite(found.observer.state).all()

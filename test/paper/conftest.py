@@ -1,0 +1,6 @@
+"""Make the simulated loops of the identification tests importable."""
+
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "identification"))

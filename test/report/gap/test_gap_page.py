@@ -1,0 +1,72 @@
+"""The page of a discrepancy, for someone who has not read the paper."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiction_ros.config_files import find_config
+from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
+from stiction_ros.effects import from_mapping
+from stiction_ros.loop import LoopModel, SetPoints, simulate
+from stiction_ros.report.gap.report import report_gap
+
+
+def discrepancy(place: str, **effect: object) -> Discrepancy:
+    model = LoopModel.load(find_config("flow.loop.yaml")).with_ideal_valves()
+    schedule = SetPoints.load(find_config("flow.set_points.yaml"), model.outputs)
+    record = simulate(model.with_effect(place, from_mapping(effect)), schedule, samples=800)
+    return find_discrepancy(model, [record], GapOptions(quick=True))
+
+
+@pytest.fixture(scope="module")
+def lagging() -> Discrepancy:
+    return discrepancy("process:PV1", effect="pole", tau=6.0)
+
+
+def words(folder: Path, found: Discrepancy) -> str:
+    page = report_gap(found, folder).read_text(encoding="utf-8")
+    body = re.sub(r"<details>.*?</details>", "", page, flags=re.DOTALL)
+    return re.sub(r"<style>.*?</style>|<[^>]*>", " ", body, flags=re.DOTALL)
+
+
+def test_every_figure_has_a_name_and_a_unit(tmp_path: Path, lagging: Discrepancy) -> None:
+    said = words(tmp_path, lagging)
+    for effect in lagging.effects:
+        for key in effect.parameters:
+            assert re.search(rf"{key} = [-\d.e]+ s, 95 % between", said)
+
+
+def test_no_internal_words(tmp_path: Path, lagging: Discrepancy) -> None:
+    said = words(tmp_path, lagging)
+    for word in ("not_asked", "bias_step", "time_shift", "valve:V1", "process:PV1"):
+        assert word not in said
+
+
+def test_it_shows_what_the_effect_does_and_what_would_decide(
+    tmp_path: Path, lagging: Discrepancy
+) -> None:
+    said = words(tmp_path, lagging)
+    assert "What it does" in said
+    assert "What would decide" in said
+    assert (tmp_path / "effect_1.png").stat().st_size > 1000
+    assert (tmp_path / "preview.png").stat().st_size > 1000
+
+
+def test_an_effect_is_listed_once_in_each_look(tmp_path: Path, lagging: Discrepancy) -> None:
+    report_gap(lagging, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for look in page.split("the candidates</h2>")[1:]:
+        names = re.findall(r'<tr><td class="text">([^<]*)</td>', look.split("</table>")[0])
+        assert len(names) > 5
+        assert len(set(names)) == len(names)
+
+
+def test_moves_of_an_effect_are_what_it_adds(lagging: Discrepancy) -> None:
+    moves = lagging.effects[0].moves
+    assert moves is not None
+    assert moves.shape == lagging.runs.pv.shape
+    assert np.ptp(moves) > 0.0

@@ -1,0 +1,150 @@
+"""The window of four cycles and the sections of words, from answers that are made up."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from stiction_ros.identification import VerdictKind
+from stiction_ros.identification.result.cause import Cause, CauseKind
+from stiction_ros.identification.result.identification import (
+    FitStatus,
+    Identification,
+    OutputModel,
+    ValveEstimate,
+)
+from stiction_ros.identification.result.stability import Look, Stability
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Record
+from stiction_ros.report.drawing import style
+from stiction_ros.report.record.cycles import CYCLES, UNCYCLED, Window, draw_plane, draw_window
+from stiction_ros.report.record.sections import lead, stability_table, work_table
+
+PERIOD, SAMPLES, STEP = 40.0, 1000, 2.0
+
+
+@pytest.fixture
+def record() -> Record:
+    """Two valves; OP of the first is a sine, that of the second rests but for ten moves."""
+    turn = 2.0 * np.pi * STEP * np.arange(SAMPLES) / PERIOD
+    rare = 50.0 + np.repeat([0.0, 1.0] * 5, SAMPLES // 10)
+    op = np.column_stack([50.0 + 4.0 * np.sin(turn), rare])
+    pv = np.column_stack([10.0 + np.sin(turn - 1.0), 20.0 + np.cos(turn)])
+    return Record("loop", STEP, ("V1", "V2"), ("PV1", "PV2"), op, pv)
+
+
+def valve(name: str, share: float) -> ValveEstimate:
+    looks = (Look("rows of 2 s", 40.0, True, (3.0, 4.0)), Look("first half", -1.0, False))
+    return ValveEstimate(
+        name=name,
+        verdict=VerdictKind.STICKY,
+        law="he",
+        static_friction=3.0,
+        static_interval=(2.8, 3.2),
+        dynamic_friction=1.0,
+        dynamic_interval=(0.9, 1.1),
+        jump=2.0,
+        stem_start=50.0,
+        moves=40,
+        evidence={"loop_gone": 0.8},
+        band_share=share,
+        stability=Stability(looks),
+    )
+
+
+def answer(record: Record, period: float | None = PERIOD) -> Identification:
+    cause = Cause(CauseKind.VALVE, period, 3.0, 0.5, "Its friction does it.")
+    b = {"V1": (0.1,), "V2": (0.1,)}
+    delay = {"V1": 0, "V2": 0}
+    models = [
+        OutputModel(name, (-0.9,), b, delay, 0.0, 0.1, 90.0, 80.0, made)
+        for name, made in (("PV1", None), ("PV2", cause))
+    ]
+    return Identification(
+        FitStatus.OK,
+        "",
+        "exact",
+        len(record),
+        STEP,
+        0.1,
+        (valve("V1", 0.4), valve("V2", 0.1)),
+        tuple(models),
+        record.op.copy(),
+    )
+
+
+def test_four_cycles_are_shown_of_the_widest_band_and_its_output(record: Record) -> None:
+    window = Window.of(record, answer(record))
+    assert (window.valve, window.output, window.period) == (0, 1, PERIOD)
+    assert (window.last - window.first - 1) * STEP == CYCLES * PERIOD
+    assert window.first + window.last == pytest.approx(SAMPLES, abs=1)
+    assert window.named(STEP) == "four cycles of 40 s"
+
+
+def test_without_a_cycle_some_samples_are_shown(record: Record) -> None:
+    window = Window.of(record, answer(record, None))
+    assert window.last - window.first == UNCYCLED
+    assert "without a regular cycle" in window.named(STEP)
+    failed = dataclasses.replace(answer(record), valves=(), outputs=(), status=FitStatus.NO_MODEL)
+    assert Window.of(record, failed).period is None
+
+
+def test_a_window_stays_within_a_good_part(record: Record) -> None:
+    mask = np.zeros(SAMPLES, dtype=np.uint8)
+    mask[300:900] = Quality.BAD
+    window = Window.of(dataclasses.replace(record, mask=mask), answer(record))
+    assert 0 <= window.first < window.last <= 300
+    slow = Window.of(record, answer(record, 900.0))
+    assert (slow.first, slow.last) == (0, SAMPLES)
+    assert slow.named(STEP) == "2.2 cycles of 900 s"
+
+
+def test_both_figures_show_the_window(record: Record) -> None:
+    found = answer(record)
+    window = Window.of(record, found)
+    with style():
+        close, plane = draw_window(record, found, window), draw_plane(record, window)
+    pv = close.figure.axes[0].get_lines()[0].get_ydata()
+    assert pv == pytest.approx(record.pv[window.rows, 1])
+    shown = plane.figure.axes[0].get_lines()[1]
+    assert shown.get_xdata() == pytest.approx(record.op[window.rows, 0])
+    assert shown.get_ydata() == pytest.approx(record.pv[window.rows, 1])
+    assert close.caption.startswith("Four cycles of 40 s")
+
+
+def test_the_work_of_the_valve_is_that_of_an_hour(record: Record) -> None:
+    found = answer(record)
+    page = work_table(record, found)
+    hours = SAMPLES * STEP / 3600.0
+    travel = float(np.abs(np.diff(record.op[:, 0])).sum()) / hours
+    assert f">{travel:.0f}<" in page
+    assert "stem of V2, estimated: moves per hour" in page
+    assert f">{9 / hours:.1f}<" in page  # moves of V2
+    assert "period of PV2" in page
+    assert "40.0 s" in page
+    assert "period of PV1" not in page
+    without = dataclasses.replace(found, stem=np.empty((0, 2)))
+    assert "estimated" not in work_table(record, without)
+
+
+def test_every_valve_is_told_why_and_what_next(record: Record) -> None:
+    page = lead(answer(record))
+    assert page.count("What to do next:") == 2
+    assert "rests until OP has gone back by 4 %" in page
+    assert "Its friction does it." not in page  # said with its share already
+    calm = answer(record)
+    cause = Cause(CauseKind.DISTURBANCE, PERIOD, 3.0, 0.5, "It comes from outside.")
+    models = tuple(dataclasses.replace(model, cause=cause) for model in calm.outputs)
+    assert lead(dataclasses.replace(calm, outputs=models)).count("It comes from outside.") == 2
+
+
+def test_looks_that_agree_are_told_from_those_that_do_not(record: Record) -> None:
+    page = stability_table(answer(record))
+    assert page.count("agrees") == 2
+    assert page.count("does not") == 2
+    assert "3.00 … 4.00" in page
+    assert "Rows of 2 s from samples of 2 s." in page
+    none = [dataclasses.replace(one, stability=None) for one in answer(record).valves]
+    assert stability_table(dataclasses.replace(answer(record), valves=tuple(none))) == ""

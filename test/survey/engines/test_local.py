@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import os
+import signal
+import time
+from typing import Any
+
+import pytest
+from made import unreadable
+
+from stiction_ros.intake.loop import Loop
+from stiction_ros.survey.engines.engine import Task
+from stiction_ros.survey.engines.local import LocalEngine
+from stiction_ros.survey.entry import Status
+from stiction_ros.survey.options import SurveyOptions
+
+OPTIONS = SurveyOptions(pages=False)
+
+
+class _Then:
+    """What does something to the process that receives it."""
+
+    def __init__(self, function: Any, *arguments: Any) -> None:
+        self._does = function, arguments
+
+    def __reduce__(self) -> Any:
+        return self._does
+
+
+def _bad(then: _Then) -> Task:
+    return Task("bad", Loop("BAD", (), (then,)))  # type: ignore[arg-type]
+
+
+def _tasks(count: int) -> list[Task]:
+    return [Task(str(k), unreadable(k)) for k in range(count)]
+
+
+def test_every_loop_comes_back_with_its_reason() -> None:
+    done = list(LocalEngine(2).run(_tasks(20), OPTIONS))
+    assert sorted(d.task.key for d in done) == sorted(str(k) for k in range(20))
+    assert {d.assessed.entry.status for d in done} == {Status.FAILED}
+    assert {d.assessed.entry.reason for d in done} == {"has no column OP"}
+
+
+def test_killed_workers_are_replaced_and_no_loop_is_lost() -> None:
+    engine = LocalEngine(2)
+    keys, killed = [], 0
+    for done in engine.run(_tasks(30), OPTIONS):
+        keys.append(done.task.key)
+        assert done.assessed.entry.reason == "has no column OP"
+        if len(keys) in (1, 10):
+            for process in engine.processes:
+                os.kill(process, signal.SIGKILL)
+                killed += 1
+    assert killed >= 2
+    assert sorted(keys) == sorted(str(k) for k in range(30))
+
+
+def test_a_loop_that_kills_its_workers_fails_alone() -> None:
+    tasks = [_bad(_Then(os._exit, 9)), *_tasks(5)]
+    done = {d.task.key: d.assessed.entry for d in LocalEngine(1).run(tasks, OPTIONS)}
+    assert len(done) == 6
+    assert "worker ended 3 times" in done["bad"].reason
+    assert done["4"].reason == "has no column OP"
+
+
+def test_a_loop_that_takes_too_long_is_given_up() -> None:
+    tasks = [_bad(_Then(time.sleep, 300.0)), *_tasks(2)]
+    begun = time.monotonic()
+    done = {d.task.key: d.assessed.entry for d in LocalEngine(1, longest=3.0).run(tasks, OPTIONS)}
+    assert "more than 3 s" in done["bad"].reason
+    assert done["1"].reason == "has no column OP"
+    assert time.monotonic() - begun < 100.0
+
+
+def test_tasks_are_drawn_no_faster_than_they_are_done() -> None:
+    drawn = 0
+
+    def tasks() -> Any:
+        nonlocal drawn
+        for task in _tasks(40):
+            drawn += 1
+            yield task
+
+    for count, _ in enumerate(LocalEngine(2).run(tasks(), OPTIONS), start=1):
+        assert drawn <= count + 2
+    assert drawn == 40
+
+
+def test_workers_end_when_the_survey_is_broken_off() -> None:
+    engine = LocalEngine(2)
+    run = engine.run(_tasks(50), OPTIONS)
+    next(run)
+    processes = engine.processes
+    assert processes
+    run.close()  # type: ignore[attr-defined]
+    assert engine.processes == ()
+    for process in processes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from stiction_ros import HeStiction
+from stiction_ros.checks import LONGEST, number, shown
+from stiction_ros.control import ControlSettings
+from stiction_ros.errors import InputError
+from stiction_ros.loop.yaml.reading import Section
+from stiction_ros.settings import from_mapping
+
+WRONG: dict[str, tuple[Any, dict[str, Any], str]] = {
+    "text": ("1e-3", {}, "place: '1e-3' is no number; write 0.001"),
+    "word": ("much", {}, "place: 'much' is no number"),
+    "true": (True, {}, "place: True is no number"),
+    "part": (1.5, {"whole": True}, "place: 1.5 is no whole number"),
+    "infinite": (math.inf, {}, "place: inf is not finite; give a finite number"),
+    "no number": (math.nan, {"unlimited": True}, "place: nan is out of range; use ≥ -inf"),
+    "low": (-1, {"low": 0.0}, "place: -1 is out of range; use ≥ 0"),
+    "high": (7, {"low": 0.0, "high": 5.0, "unit": "%"}, "place: 7 is out of range; use [0, 5] %"),
+    "above": (0.0, {"above": 0.0}, "place: 0 is out of range; use > 0"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said_with_its_place_and_its_fix(name: str) -> None:
+    value, limits, said = WRONG[name]
+    with pytest.raises(InputError) as error:
+        number(value, "place", **limits)
+    assert str(error.value) == said
+
+
+def test_a_whole_number_of_any_size_is_told_not_to_fit() -> None:
+    with pytest.raises(InputError, match="is not finite"):
+        number(10**400, "place", whole=True)
+    assert len(shown(10**400)) == LONGEST
+
+
+def test_numbers_come_back_in_their_type() -> None:
+    assert (type(number(2, "place")), type(number(2, "place", whole=True))) == (float, int)
+    assert number(-math.inf, "place", unlimited=True) == -math.inf
+
+
+def test_settings_files_and_behaviours_say_the_same_of_the_same_mistake() -> None:
+    said = []
+    for make in (
+        lambda: HeStiction(-1.0, 0.0),
+        lambda: Section({"f_s": -1.0}, "f_s").number("f_s", low=0.0),
+        lambda: from_mapping(ControlSettings, {"jump_price": -1.0}, "file"),
+    ):
+        with pytest.raises(InputError) as error:
+            make()
+        said.append(error.value.what)
+    assert set(said) == {"-1 is out of range"}
