@@ -79,7 +79,21 @@ class FitWorker:
 def _settle() -> None:
     """Prepare the worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(POLITE)
+    stand_back()
     parent = multiprocessing.parent_process()
     if parent is not None and parent.pid is not None:
         die_with_parent(signal.SIGKILL, parent.pid)
+
+
+def stand_back() -> None:
+    """Let the loop go before this process.
+
+    A real-time policy that was given to the node (``chrt``) is inherited and would let a fit of
+    seconds stand before every sample of the loop; it is given back, and what is left is nice.
+    """
+    real_time = {getattr(os, name, None) for name in ("SCHED_FIFO", "SCHED_RR")} - {None}
+    if real_time:  # known on Linux
+        policy = os.sched_getscheduler(0) & ~getattr(os, "SCHED_RESET_ON_FORK", 0)
+        if policy in real_time:
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.nice(POLITE)
