@@ -222,6 +222,58 @@ def own_products(signal: FloatArray, begun: FloatArray, edges: IntArray) -> Floa
     return out
 
 
+class Products(NamedTuple):
+    """What the groups of lags of some stems have in common with each other and with signals.
+
+    Attributes:
+        past: the last M + n + 1 samples of each stem, those before the record included, whitened,
+            shape (m, M + n + 1).
+        first: :func:`step_products` with the first lag of each, shape (m, N + M + 8).
+        beside: products with the signals, shape (c, m r).
+        shared: with each other, shape (m r, m r).
+    """
+
+    past: FloatArray
+    first: FloatArray
+    beside: FloatArray
+    shared: FloatArray
+
+
+@compiled_fused
+def products_of(
+    noise: FloatArray, stems: FloatArray, signals: FloatArray, edges: IntArray
+) -> Products:
+    """Return the products of stems, scaled, shape (m, N), with signals, shape (c, n).
+
+    Args:
+        noise: monic polynomial D, shape (d + 1,).
+        stems: not whitened.
+        signals: whitened.
+        edges: of the groups, as in :func:`grouped`.
+    """
+    valves, rows = stems.shape
+    taps, size, count = edges[-1], len(edges) - 1, signals.shape[1]
+    past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps + EIGHT))
+    whole = valves * size
+    beside, shared = np.empty((len(signals), whole)), np.empty((whole, whole))
+    for i in range(valves):
+        moves, at = moves_of(stems[i]), i * size
+        past[i] = with_past(whitened(noise, stems[i], stems[i, 0]), taps)[-(taps + count + 1) :]
+        first[i] = step_products(noise, past[i, -1 - count : -1], rows, taps)
+        for row in range(len(signals)):
+            lags = lag_products(moves, step_products(noise, signals[row], rows, taps), taps)
+            beside[row, at : at + size] = grouped(lags, edges)
+        for j in range(i):
+            along, theirs = j * size, moves_of(stems[j])
+            begun = (lag_products(moves, first[j], taps), lag_products(theirs, first[i], taps))
+            found = lagged_products(past[i], past[j], begun, edges)
+            shared[at : at + size, along : along + size] = found
+            shared[along : along + size, at : at + size] = found.T
+        own = own_products(past[i], lag_products(moves, first[i], taps), edges)
+        shared[at : at + size, at : at + size] = own
+    return Products(past, first, beside, shared)
+
+
 @compiled_fused
 def factorised(matrix: FloatArray) -> float:
     """Replace the lower triangle by its Cholesky factor; return the log determinant."""

@@ -17,22 +17,17 @@ from scipy.linalg import solve_triangular
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
-    EIGHT,
     LEAST,
     Given,
+    Products,
     answered,
     evidence,
     evidences,
     factorised,
-    grouped,
-    lag_products,
-    lagged_products,
-    moves_of,
-    own_products,
+    products_of,
     solved,
     step_products,
     whitened,
-    with_past,
 )
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.response_prior import ResponsePrior
@@ -99,8 +94,7 @@ class Whitened:
         seen: the output, shape (n,).
         known: a constant, shape (1, n).
         stems: scaled, shape (m, N).
-        past: their last M + n + 1 samples, those before the record included, whitened.
-        first: :func:`.kernels.step_products` with the first lag of each, shape (m, N + M + 8).
+        found: their products.
         products: of ``known`` and of the lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
         edges: of the groups of taps.
@@ -110,8 +104,7 @@ class Whitened:
     seen: FloatArray
     known: FloatArray
     stems: FloatArray
-    past: FloatArray
-    first: FloatArray
+    found: Products
     products: FloatArray
     seen_products: FloatArray
     edges: IntArray
@@ -119,38 +112,18 @@ class Whitened:
     @classmethod
     def of(cls, problem: Problem, output: int, stems: FloatArray, noise: FloatArray) -> Whitened:
         """Whiten an output and ``stems``, scaled, shape (m, N); m may be 0."""
-        edges, taps, rows = problem.edges, problem.taps, problem.rows
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[problem.first :]
         known = np.full((1, len(seen)), 1.0 / np.sqrt(len(seen)))
-        beside = [step_products(noise, row, rows, taps) for row in (*known, seen)]
-        past = np.empty((len(stems), taps + len(seen) + 1))
-        first = np.empty((len(stems), rows + taps + EIGHT))
-        moves = [moves_of(stem) for stem in stems]
-        count, size = len(known), len(edges) - 1
-        products = np.empty((count + len(stems) * size,) * 2)
+        found = products_of(noise, stems, np.vstack([known, seen]), problem.edges)
+        count = len(known)
+        products = np.empty((count + len(found.shared),) * 2)
         products[:count, :count] = known @ known.T
-        with_seen = [known @ seen]
-        for i, stem in enumerate(stems):
-            past[i] = with_past(whitened(noise, stem, float(stem[0])), taps)[-past.shape[1] :]
-            first[i] = step_products(noise, past[i, -1 - len(seen) : -1], rows, taps)
-            down = slice(count + i * size, count + (i + 1) * size)
-            lags = [grouped(lag_products(moves[i], one, taps), edges) for one in beside]
-            for row, one in enumerate(lags[:-1]):
-                products[row, down] = products[down, row] = one
-            with_seen.append(lags[-1])
-            for j in range(i):
-                along = slice(count + j * size, count + (j + 1) * size)
-                begun = (
-                    lag_products(moves[i], first[j], taps),
-                    lag_products(moves[j], first[i], taps),
-                )
-                products[down, along] = lagged_products(past[i], past[j], begun, edges)
-                products[along, down] = products[down, along].T
-            own = lag_products(moves[i], first[i], taps)
-            products[down, down] = own_products(past[i], own, edges)
-        seen_products = np.concatenate(with_seen)
-        return cls(noise, seen, known, stems, past, first, products, seen_products, edges)
+        products[:count, count:] = found.beside[:count]
+        products[count:, :count] = found.beside[:count].T
+        products[count:, count:] = found.shared
+        seen_products = np.concatenate([known @ seen, found.beside[count]])
+        return cls(noise, seen, known, stems, found, products, seen_products, problem.edges)
 
     def with_precision(self, prior: ResponsePrior) -> FloatArray:
         """Return the products and what is known before the record, shape (q, q)."""
@@ -181,7 +154,7 @@ class Whitened:
         weights = root.T @ half
         target = self.seen - weights[: len(self.known)] @ self.known
         levels = weights[len(self.known) :].reshape(len(self.stems), len(self.edges) - 1)
-        for past, level in zip(self.past, levels, strict=True):
+        for past, level in zip(self.found.past, levels, strict=True):
             target -= answered(past, np.repeat(level, np.diff(self.edges)))[-len(target) :]
         energy = float(self.seen @ self.seen) - float(half @ half)
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
@@ -194,8 +167,8 @@ class Whitened:
                 judged=count,
                 known=known,
                 others=self.stems,
-                beside=self.past,
-                others_first=self.first,
+                beside=self.found.past,
+                others_first=self.found.first,
                 root=root,
                 target=step_products(noise, target, rows, taps),
                 energy=energy,
