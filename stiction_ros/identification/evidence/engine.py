@@ -20,7 +20,6 @@ from stiction_ros.identification.closed_loop.explanation import (
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.further import with_further
-from stiction_ros.identification.evidence.kernels import whitened
 from stiction_ros.identification.evidence.output_fit import OutputFit, noise_of
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.rates import (
@@ -34,6 +33,7 @@ from stiction_ros.identification.evidence.rates import (
 )
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import half_gains, is_deadband, kind_of
+from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
     Data,

@@ -19,18 +19,20 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     LEAST,
     Given,
-    Products,
-    answered,
     evidence,
     evidences,
     factorised,
-    products_of,
     solved,
-    step_products,
-    whitened,
 )
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.response_prior import ResponsePrior
+from stiction_ros.identification.kernels.lags import (
+    Products,
+    answered,
+    products_of,
+    step_products,
+    whitened,
+)
 
 ROUNDS = 6
 SETTLED = 0.2  # of −2 log likelihood: a round that gains less is the last
@@ -94,7 +96,7 @@ class Whitened:
         seen: the output, shape (n,).
         known: a constant, shape (1, n).
         stems: scaled, shape (m, N).
-        found: their products.
+        lags: of the stems, with each other and with ``known`` and the output.
         products: of ``known`` and of the lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
         edges: of the groups of taps.
@@ -104,7 +106,7 @@ class Whitened:
     seen: FloatArray
     known: FloatArray
     stems: FloatArray
-    found: Products
+    lags: Products
     products: FloatArray
     seen_products: FloatArray
     edges: IntArray
@@ -115,15 +117,15 @@ class Whitened:
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[problem.first :]
         known = np.full((1, len(seen)), 1.0 / np.sqrt(len(seen)))
-        found = products_of(noise, stems, np.vstack([known, seen]), problem.edges)
+        lags = products_of(noise, stems, np.vstack([known, seen]), problem.edges)
         count = len(known)
-        products = np.empty((count + len(found.shared),) * 2)
+        products = np.empty((count + len(lags.shared),) * 2)
         products[:count, :count] = known @ known.T
-        products[:count, count:] = found.beside[:count]
-        products[count:, :count] = found.beside[:count].T
-        products[count:, count:] = found.shared
-        seen_products = np.concatenate([known @ seen, found.beside[count]])
-        return cls(noise, seen, known, stems, found, products, seen_products, problem.edges)
+        products[:count, count:] = lags.beside[:count]
+        products[count:, :count] = lags.beside[:count].T
+        products[count:, count:] = lags.shared
+        seen_products = np.concatenate([known @ seen, lags.beside[count]])
+        return cls(noise, seen, known, stems, lags, products, seen_products, problem.edges)
 
     def with_precision(self, prior: ResponsePrior) -> FloatArray:
         """Return the products and what is known before the record, shape (q, q)."""
@@ -154,7 +156,7 @@ class Whitened:
         weights = root.T @ half
         target = self.seen - weights[: len(self.known)] @ self.known
         levels = weights[len(self.known) :].reshape(len(self.stems), len(self.edges) - 1)
-        for past, level in zip(self.found.past, levels, strict=True):
+        for past, level in zip(self.lags.past, levels, strict=True):
             target -= answered(past, np.repeat(level, np.diff(self.edges)))[-len(target) :]
         energy = float(self.seen @ self.seen) - float(half @ half)
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
@@ -167,8 +169,8 @@ class Whitened:
                 judged=count,
                 known=known,
                 others=self.stems,
-                beside=self.found.past,
-                others_first=self.found.first,
+                beside=self.lags.past,
+                others_first=self.lags.first,
                 root=root,
                 target=step_products(noise, target, rows, taps),
                 energy=energy,

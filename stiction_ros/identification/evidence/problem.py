@@ -9,8 +9,8 @@ import numpy as np
 
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.evidence.kernels import in_rows
 from stiction_ros.identification.friction.grid import find_law, simulate
+from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.options import IdentificationOptions, limited
 from stiction_ros.records.record import Record
 

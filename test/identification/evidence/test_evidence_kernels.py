@@ -8,22 +8,24 @@ from hypothesis import strategies as st
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     Given,
-    answered,
     evidence,
     evidences,
     factorised,
+    solved,
+)
+from stiction_ros.identification.evidence.response_prior import ResponsePrior
+from stiction_ros.identification.kernels.lags import (
+    answered,
     grouped,
     in_rows,
     lag_products,
     lagged_products,
     moves_of,
     own_products,
-    solved,
     step_products,
     whitened,
     with_past,
 )
-from stiction_ros.identification.evidence.response_prior import ResponsePrior
 
 
 def _groups(signal: FloatArray, before: float, first: int, edges: IntArray) -> FloatArray:
