@@ -14,6 +14,7 @@ from stiction_ros.identification.closed_loop.explanation import (
     LINE,
     OPEN,
     RIVAL,
+    SURE,
     explained,
 )
 from stiction_ros.identification.engine import order_row
@@ -56,9 +57,6 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
-SURE = 40.0
-"""What a friction gains beyond :data:`PRICE` from which on it is not doubted for being idle, unless
-the closed loop grows without end: the linear process that is fitted at last is less certain."""
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 HARMLESS = 0.08  # of the range of OP: a valve is healthy when larger bands are rejected
 POWERFUL = 2  # rates at which larger bands must be rejected, of those that carry news

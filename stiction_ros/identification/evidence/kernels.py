@@ -10,17 +10,19 @@ from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 LEAST = 1e-12  # share of the output's energy that is always left
+EIGHT = 8  # lags that are summed up at once, stems that are turned at once: a line of the cache
 
 
 @compiled_fused
 def whitened(noise: FloatArray, signal: FloatArray, before: float) -> FloatArray:
     """Return D(q) of a signal that was ``before`` before its first sample, shape (N,)."""
-    out = np.empty(len(signal))
-    for k in range(len(signal)):
-        total = 0.0
-        for i in range(len(noise)):
-            total += noise[i] * (signal[k - i] if k >= i else before)
-        out[k] = total
+    out = np.zeros(len(signal))
+    for i in range(len(noise)):
+        by, late, source = noise[i], out[i:], signal[: max(len(signal) - i, 0)]
+        for k in range(len(source)):
+            late[k] += by * source[k]
+        for k in range(min(i, len(signal))):
+            out[k] += by * before
     return out
 
 
@@ -53,99 +55,241 @@ def with_past(signal: FloatArray, taps: int) -> FloatArray:
     return out
 
 
+class Moves(NamedTuple):
+    """A stem as what it does: it stays, and moves now and then.
+
+    Attributes:
+        begin: its first value, and that before.
+        at: rows in which it moves, shape (c,).
+        by: how far, shape (c,).
+    """
+
+    begin: float
+    at: IntArray
+    by: FloatArray
+
+
 @compiled_fused
-def lagged_with(padded: FloatArray, other: FloatArray, edges: IntArray) -> FloatArray:
-    """Return the products of the groups of lags of a signal with another, shape (r,).
+def moves_of(stem: FloatArray) -> Moves:
+    """Return the moves of a stem, shape (N,)."""
+    count, last = 0, stem[0]
+    at, by = np.empty(len(stem), dtype=np.int64), np.empty(len(stem))
+    for k in range(1, len(stem)):
+        value = stem[k]
+        if value != last:
+            at[count], by[count] = k, value - last
+            count += 1
+            last = value
+    return Moves(stem[0], at[:count], by[:count])
+
+
+@compiled_fused
+def step_products(noise: FloatArray, other: FloatArray, rows: int, taps: int) -> FloatArray:
+    """Return what D(q) of a unit step has in common with another signal, for steps at every row.
+
+    A stem is a sum of few steps, so its products with one signal cost one sum over its moves each,
+    whatever its lag: :func:`lag_products`.
 
     Args:
-        padded: the signal by :func:`with_past`.
-        other: its last samples, shape (n,).
+        noise: monic polynomial D, shape (d + 1,).
+        other: its last samples, shape (n,), n + d ≤ N.
+        rows: N.
+        taps: M.
+
+    Returns:
+        Products of ``other`` with the last n samples of D(q) of a step at row k, from N on zero,
+        shape (N + M + 8,).
+    """
+    out, first = np.zeros(rows + taps + EIGHT), rows - len(other)
+    for i in range(len(noise)):
+        by, early = noise[i], out[first - i : rows - i]
+        for k in range(len(other)):
+            early[k] += by * other[k]
+    total = 0.0
+    for k in range(rows - 1, -1, -1):
+        total += out[k]
+        out[k] = total
+    return out
+
+
+@compiled_fused
+def lag_products(moves: Moves, products: FloatArray, taps: int) -> FloatArray:
+    """Return the products of lags 1 to M of D(q) of a stem with a signal, shape (M,).
+
+    Args:
+        moves: of the stem.
+        products: of steps with that signal, by :func:`step_products`.
+        taps: M.
+    """
+    out = np.empty(taps + EIGHT)
+    at, by, begin = moves.at, moves.by, moves.begin * products[0]
+    for lag in range(0, taps, EIGHT):
+        a, b, c, d = begin, begin, begin, begin
+        e, f, g, h = begin, begin, begin, begin
+        for m in range(len(at)):
+            size, k = by[m], at[m] + 1 + lag
+            step = products[k : k + EIGHT]
+            a += size * step[0]
+            b += size * step[1]
+            c += size * step[2]
+            d += size * step[3]
+            e += size * step[4]
+            f += size * step[5]
+            g += size * step[6]
+            h += size * step[7]
+        out[lag], out[lag + 1], out[lag + 2], out[lag + 3] = a, b, c, d
+        out[lag + 4], out[lag + 5], out[lag + 6], out[lag + 7] = e, f, g, h
+    return out[:taps]
+
+
+@compiled_fused
+def grouped(lags: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the sums over groups of lags, shape (r,).
+
+    Args:
+        lags: one figure for each lag, shape (M,).
         edges: group g sums lags ``edges[g] + 1`` to ``edges[g + 1]``, shape (r + 1,).
     """
     out = np.zeros(len(edges) - 1)
     for g in range(len(out)):
         for i in range(edges[g], edges[g + 1]):
-            start = len(padded) - len(other) - 1 - i
-            out[g] += np.dot(padded[start : start + len(other)], other)
+            out[g] += lags[i]
     return out
 
 
 @compiled_fused
-def groups(edges: IntArray) -> IntArray:
-    """Return the group of every lag, shape (M,); ``edges`` as in :func:`lagged_with`."""
-    out = np.empty(edges[-1], dtype=np.int64)
-    for g in range(len(edges) - 1):
-        out[edges[g] : edges[g + 1]] = g
-    return out
-
-
-@compiled_fused
-def lagged_products(left: FloatArray, right: FloatArray, count: int, edges: IntArray) -> FloatArray:
+def lagged_products(
+    left: FloatArray, right: FloatArray, begun: tuple[FloatArray, FloatArray], edges: IntArray
+) -> FloatArray:
     """Return the products of the groups of lags of two signals, shape (r, r).
 
-    Those of two lags follow from their neighbours up and left by two samples; only one row and
-    one column are summed up.
+    Those of two lags follow from their neighbours up and left by two samples.
 
     Args:
-        left, right: by :func:`with_past`.
-        count: n, samples of a row.
-        edges: of the groups, as in :func:`lagged_with`.
+        left, right: the last M + n + 1 samples, those before the record included.
+        begun: products of every lag of ``left`` with the first lag of ``right``, and of the first
+            lag of ``left`` with every lag of ``right``, each of shape (M,).
+        edges: of the groups, as in :func:`grouped`.
     """
-    size, taps, start = len(edges) - 1, edges[-1], len(left) - 1 - count
-    out, group = np.zeros((size, size)), groups(edges)
-    row, above = np.empty(taps), np.empty(taps)
-    for j in range(taps):
-        row[j] = np.dot(right[start - j : start - j + count], left[start : start + count])
-    for i in range(taps):
-        if i > 0:
-            above, row = row, above
-            row[0] = np.dot(left[start - i : start - i + count], right[start : start + count])
-            enters, leaves = left[start - i], left[start - i + count]
-            for j in range(1, taps):
-                gone = leaves * right[start - j + count]
-                row[j] = above[j - 1] + enters * right[start - j] - gone
-        for j in range(taps):
-            out[group[i], group[j]] += row[j]
+    size, taps = len(edges) - 1, edges[-1]
+    out, end = np.zeros((size, size)), len(left) - 1
+    row, above, turned = np.empty(taps), np.empty(taps), right[::-1].copy()
+    for g in range(size):
+        for i in range(edges[g], edges[g + 1]):
+            row, above = above, row
+            if i == 0:
+                row[:] = begun[1]
+            else:
+                row[0] = begun[0][i]
+                enters, leaves = left[taps - i], left[end - i]
+                came, gone = turned[len(left) - taps :], turned[1:]
+                for j in range(1, taps):
+                    row[j] = above[j - 1] + enters * came[j - 1] - leaves * gone[j - 1]
+            for h in range(size):
+                for j in range(edges[h], edges[h + 1]):
+                    out[g, h] += row[j]
     return out
 
 
 @compiled_fused
-def own_products(signal: FloatArray, count: int, edges: IntArray) -> FloatArray:
-    """Return :func:`lagged_products` of a signal with itself, at half the work."""
-    size, taps, start = len(edges) - 1, edges[-1], len(signal) - 1 - count
-    out, group = np.zeros((size, size)), groups(edges)
-    first, row = signal[start : start + count], np.empty(taps)
-    for j in range(taps):
-        row[j] = np.dot(signal[start - j : start - j + count], first)
-    for i in range(taps):
-        if i > 0:  # row[j] holds lags i and i + j
-            enters, leaves = signal[start - i], signal[start - i + count]
-            for j in range(taps - i):
-                gone = leaves * signal[start - i - j + count]
-                row[j] += enters * signal[start - i - j] - gone
-        out[group[i], group[i]] += row[0]
-        for j in range(1, taps - i):
-            out[group[i], group[i + j]] += row[j]
-            out[group[i + j], group[i]] += row[j]
+def own_products(signal: FloatArray, begun: FloatArray, edges: IntArray) -> FloatArray:
+    """Return :func:`lagged_products` of a signal with itself, at half the work.
+
+    Args:
+        signal: the last M + n + 1 samples, those before the record included.
+        begun: products of every lag with the first, shape (M,).
+        edges: of the groups, as in :func:`grouped`.
+    """
+    size, taps = len(edges) - 1, edges[-1]
+    out, end = np.zeros((size, size)), len(signal) - 1
+    row, turned = begun.copy(), signal[::-1].copy()
+    for g in range(size):
+        for i in range(edges[g], edges[g + 1]):  # row[j] holds lags i and i + j
+            if i > 0:
+                enters, leaves = signal[taps - i], signal[end - i]
+                came, gone = turned[len(signal) - 1 - taps + i :], turned[i:]
+                for j in range(taps - i):
+                    row[j] += enters * came[j] - leaves * gone[j]
+            out[g, g] += row[0]
+            for j in range(i + 1, edges[g + 1]):
+                out[g, g] += 2.0 * row[j - i]
+            for h in range(g + 1, size):
+                for j in range(edges[h], edges[h + 1]):
+                    out[g, h] += row[j - i]
+    for g in range(size):
+        for h in range(g):
+            out[g, h] = out[h, g]
     return out
+
+
+class Products(NamedTuple):
+    """What the groups of lags of some stems have in common with each other and with signals.
+
+    Attributes:
+        past: the last M + n + 1 samples of each stem, those before the record included, whitened,
+            shape (m, M + n + 1).
+        first: :func:`step_products` with the first lag of each, shape (m, N + M + 8).
+        beside: products with the signals, shape (c, m r).
+        shared: with each other, shape (m r, m r).
+    """
+
+    past: FloatArray
+    first: FloatArray
+    beside: FloatArray
+    shared: FloatArray
+
+
+@compiled_fused
+def products_of(
+    noise: FloatArray, stems: FloatArray, signals: FloatArray, edges: IntArray
+) -> Products:
+    """Return the products of stems, scaled, shape (m, N), with signals, shape (c, n).
+
+    Args:
+        noise: monic polynomial D, shape (d + 1,).
+        stems: not whitened.
+        signals: whitened.
+        edges: of the groups, as in :func:`grouped`.
+    """
+    valves, rows = stems.shape
+    taps, size, count = edges[-1], len(edges) - 1, signals.shape[1]
+    past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps + EIGHT))
+    whole = valves * size
+    beside, shared = np.empty((len(signals), whole)), np.empty((whole, whole))
+    for i in range(valves):
+        moves, at = moves_of(stems[i]), i * size
+        past[i] = with_past(whitened(noise, stems[i], stems[i, 0]), taps)[-(taps + count + 1) :]
+        first[i] = step_products(noise, past[i, -1 - count : -1], rows, taps)
+        for row in range(len(signals)):
+            lags = lag_products(moves, step_products(noise, signals[row], rows, taps), taps)
+            beside[row, at : at + size] = grouped(lags, edges)
+        for j in range(i):
+            along, theirs = j * size, moves_of(stems[j])
+            begun = (lag_products(moves, first[j], taps), lag_products(theirs, first[i], taps))
+            found = lagged_products(past[i], past[j], begun, edges)
+            shared[at : at + size, along : along + size] = found
+            shared[along : along + size, at : at + size] = found.T
+        own = own_products(past[i], lag_products(moves, first[i], taps), edges)
+        shared[at : at + size, at : at + size] = own
+    return Products(past, first, beside, shared)
 
 
 @compiled_fused
 def factorised(matrix: FloatArray) -> float:
     """Replace the lower triangle by its Cholesky factor; return the log determinant."""
     size, total = len(matrix), 0.0
+    column = np.empty(size)
     for j in range(size):
-        pivot = matrix[j, j]
-        for k in range(j):
-            pivot -= matrix[j, k] * matrix[j, k]
-        pivot = np.sqrt(max(pivot, 1e-300))
+        pivot = np.sqrt(max(matrix[j, j], 1e-300))
         matrix[j, j] = pivot
         total += np.log(pivot)
         for i in range(j + 1, size):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = value / pivot
+            column[i] = matrix[i, j] / pivot
+            matrix[i, j] = column[i]
+        for i in range(j + 1, size):
+            by = column[i]
+            for k in range(j + 1, i + 1):
+                matrix[i, k] -= by * column[k]
     return 2.0 * total
 
 
@@ -171,18 +315,24 @@ class Given(NamedTuple):
 
     Attributes:
         noise: monic polynomial D, shape (d + 1,).
-        known: rows of any signals, shape (c, n).
-        others: stems of the other valves, by :func:`with_past`, shape (m − 1, M + N).
-        root: L^-1, with L L^T the products of ``known`` and of the lags of each of ``others``
-            with each other and what is known of them before the record, shape (q, q).
-        target: what all these leave of the output, shape (n,).
+        judged: n, rows that count.
+        known: :func:`step_products` with signals of any kind, shape (c, N + M + 8).
+        others: stems of the other valves, scaled, shape (m − 1, N).
+        beside: their last M + n + 1 samples, whitened, shape (m − 1, M + n + 1).
+        others_first: :func:`step_products` with their first lag, shape (m − 1, N + M + 8).
+        root: L^-1, with L L^T the products of the known signals and of the lags of each of
+            ``others`` with each other and what is known of them before the record, shape (q, q).
+        target: :func:`step_products` with what all these leave of the output, shape (N + M + 8,).
         energy: of that and of the prior of what explains the rest.
         edges: of the groups of lags, shape (r + 1,).
     """
 
     noise: FloatArray
+    judged: int
     known: FloatArray
     others: FloatArray
+    beside: FloatArray
+    others_first: FloatArray
     root: FloatArray
     target: FloatArray
     energy: float
@@ -203,28 +353,71 @@ def evidence(stem: FloatArray, given: Given, precision: FloatArray) -> tuple[flo
         given: everything else.
         precision: inverse of K, shape (r, r).
     """
-    size, known, count = len(precision), len(given.known), len(given.target)
-    signal = with_past(whitened(given.noise, stem, stem[0]), given.edges[-1])
-    gram = own_products(signal, count, given.edges)
+    return _evidence(stem, moves_of(stem), given, precision)
+
+
+@compiled_fused
+def _evidence(
+    stem: FloatArray, moves: Moves, given: Given, precision: FloatArray
+) -> tuple[float, FloatArray]:
+    size, known, edges = len(precision), len(given.known), given.edges
+    taps, count = edges[-1], given.judged
+    signal = with_past(whitened(given.noise, stem, stem[0]), taps)[-(taps + count + 1) :]
+    first = step_products(given.noise, signal[-1 - count : -1], len(stem), taps)
+    gram = own_products(signal, lag_products(moves, first, taps), edges)
     shared = np.empty((size, len(given.root)))
     for row in range(known):
-        shared[:, row] = lagged_with(signal, given.known[row], given.edges)
+        shared[:, row] = grouped(lag_products(moves, given.known[row], taps), edges)
     for other in range(len(given.others)):
-        at, beside = known + other * size, given.others[other]
-        shared[:, at : at + size] = lagged_products(signal, beside, count, given.edges)
+        at, theirs = known + other * size, moves_of(given.others[other])
+        begun = (
+            lag_products(moves, given.others_first[other], taps),
+            lag_products(theirs, first, taps),
+        )
+        beside = given.beside[other]
+        shared[:, at : at + size] = lagged_products(signal, beside, begun, edges)
     shared = np.dot(shared, given.root.T)
     gram -= np.dot(shared, shared.T)
     gram += precision
     determinant = factorised(gram)
-    response, explained = solved(gram, lagged_with(signal, given.target, given.edges))
+    seen = grouped(lag_products(moves, given.target, taps), edges)
+    response, explained = solved(gram, seen)
     left = max(given.energy - explained, LEAST * given.energy)
     return count * np.log(left / count) + determinant, response
 
 
 @compiled_fused
-def evidences(stems: FloatArray, given: Given, precision: FloatArray) -> FloatArray:
-    """Return :func:`evidence` of many stems, shape (G, N)."""
-    out = np.empty(len(stems))
+def evidences(
+    stems: FloatArray, given: Given, precision: FloatArray, least_moves: int
+) -> FloatArray:
+    """Return :func:`evidence` of many stems, shape (G, N); infinite where one moves less often."""
+    out = np.full(len(stems), np.inf)
     for g in range(len(stems)):
-        out[g] = evidence(stems[g], given, precision)[0]
+        moves = moves_of(stems[g])
+        if len(moves.at) >= least_moves:
+            out[g] = _evidence(stems[g], moves, given, precision)[0]
+    return out
+
+
+@compiled_fused
+def in_rows(stems: FloatArray, rate: int, skipped: int, scale: float) -> FloatArray:
+    """Return stems, shape (N, G), as means of ``rate`` samples over ``scale``, shape (G, n).
+
+    Args:
+        stems: with n · rate samples at least.
+        rate: samples a row.
+        skipped: rows of delay; the first row stands for what was before.
+        scale: divides all.
+    """
+    rows, size, by = len(stems) // rate, stems.shape[1], 1.0 / (rate * scale)
+    out = np.empty((size, rows))
+    for begin in range(0, size, EIGHT):
+        end = min(begin + EIGHT, size)
+        for k in range(rows):
+            source = max(k - skipped, 0) * rate
+            for g in range(begin, end):
+                total = stems[source, g]
+                for i in range(1, rate):
+                    total += stems[source + i, g]
+                out[g, k] = by * total
     return out
