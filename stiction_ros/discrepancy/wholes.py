@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, run_with
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.process.change import ChangedProcess, changed_process

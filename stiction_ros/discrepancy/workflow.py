@@ -45,7 +45,8 @@ from stiction_ros.discrepancy.decision.scores import (
     score_candidates,
 )
 from stiction_ros.discrepancy.decision.testable import Testable, testable_effects
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.uncertainty import (
     chance_threshold,
 )

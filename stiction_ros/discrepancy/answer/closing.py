@@ -29,7 +29,7 @@ from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, run_with
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.decision.testable import Testable
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import (
     Intervals,
     bootstrap_intervals,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect, run_with
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import left_by, projector, whiten, whitened_columns
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, with_equations
