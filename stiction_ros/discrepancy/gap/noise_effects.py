@@ -89,10 +89,24 @@ def noise_effects(
         base.known[name] = [_fitted(base, output, declared, law) for law in laws]
     found = base.known[name]
     enough = _without(base, output, declared) - least * int(base.blocks[output].train.sum())
-    return sorted(
-        (each for each in found if each is not None and each.score < enough),
-        key=lambda each: each.score,
-    )
+    better = [each for each in found if each is not None and each.score < enough]
+    lasts = float(base.run.runs.time.max())
+    return sorted(_without_walks(better, lasts), key=lambda each: each.score)
+
+
+def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
+    """Return laws without a coloured noise that may last as long as the record.
+
+    Within the record that is a random walk, which has one figure less.
+    """
+    walks = [each.score for each in laws if isinstance(each.behaviour, RandomWalkDisturbance)]
+    return [
+        each
+        for each in laws
+        if not isinstance(each.behaviour, ColouredDisturbance)
+        or each.intervals["tau"][1] < lasts * math.exp(-CLEAR)
+        or each.score < min(walks, default=math.inf) - ENLARGED
+    ]
 
 
 def _without(base: Baseline, output: int, declared: DeclaredNoise) -> float:
