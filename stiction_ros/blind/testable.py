@@ -9,7 +9,8 @@ from stiction_ros.blind.loops.truth import Hidden, Truth
 from stiction_ros.blind.scores.families import SHOWN_BY_DATA, Name
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.decision.scores import all_candidates
-from stiction_ros.discrepancy.fit.search import Baseline, fit_candidate
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import fit_candidate
 from stiction_ros.discrepancy.options import MARGIN
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 

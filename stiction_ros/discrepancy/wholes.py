@@ -8,10 +8,14 @@ import math
 from collections.abc import Sequence
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, run_with
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.process.change import ChangedProcess, changed_process
+from stiction_ros.discrepancy.process.change import (
+    ChangedProcess,
+    ProcessChange,
+    changed_process,
+)
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.loop import LoopModel
 
@@ -183,14 +187,30 @@ def best_with_process(
     parts: list[tuple[AddedEffect, ...]] = [(), *((each,) for each in (*added, *singles))]
     if len(added) > 1:
         parts.append(tuple(added))
-    found = []
-    for part in parts:
-        changed = changed_process(bare, runs, part)
-        if changed is None:
-            continue
-        effects = refit_together(changed.model, runs, part) if part else ()
-        own = whole(changed.model, runs, effects)
-        rows = max(fit.rows for fit in own.base.noise)
-        price = margin + len(changed.changes) * math.log(max(rows, 2))
-        found.append(Mended(changed, own, own.worth(margin) + price))
-    return min(found, key=lambda each: each.worth, default=None)
+    found = [with_process(bare, runs, part, margin) for part in parts]
+    return min((each for each in found if each), key=lambda each: each.worth, default=None)
+
+
+def with_process(
+    bare: LoopModel, runs: Runs, part: Sequence[AddedEffect], margin: float
+) -> Mended | None:
+    """Return the explanation by some effects behind a process that is changed for them.
+
+    Args:
+        bare: the model without any effect, its process as it was given.
+        runs: the records.
+        part: the effects.
+        margin: that the changes together have to gain.
+    """
+    changed = changed_process(bare, runs, part)
+    if changed is None:
+        return None
+    effects = refit_together(changed.model, runs, part) if part else ()
+    own = whole(changed.model, runs, effects)
+    rows = max(fit.rows for fit in own.base.noise)
+    return Mended(changed, own, own.worth(margin) + price_of(changed.changes, rows, margin))
+
+
+def price_of(changes: Sequence[ProcessChange], rows: int, margin: float) -> float:
+    """Return what changes of the process cost: the margin together, and each its price in BIC."""
+    return margin + len(changes) * math.log(max(rows, 2)) if changes else 0.0

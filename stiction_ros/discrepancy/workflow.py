@@ -45,7 +45,8 @@ from stiction_ros.discrepancy.decision.scores import (
     score_candidates,
 )
 from stiction_ros.discrepancy.decision.testable import Testable, testable_effects
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.uncertainty import (
     chance_threshold,
 )
@@ -61,10 +62,14 @@ from stiction_ros.discrepancy.process.refit import (
 )
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.discrepancy.wholes import (
+    Mended,
+    Whole,
     best_whole,
     best_with_process,
+    price_of,
     suspicious,
     whole,
+    with_process,
     without_outliers,
 )
 from stiction_ros.effects import about
@@ -147,6 +152,7 @@ class _Workflow:
         self.looks: list[Look] = []
         self.added: tuple[AddedEffect, ...] = ()
         self.base = self.base_before
+        self.given = self.bare  # its process as it was given
         self.changes: tuple[ProcessChange, ...] = ()
         self.opened = 0  # the first look at the process as it is now
 
@@ -182,17 +188,53 @@ class _Workflow:
         """
         if not suspicious(self.base):
             return False
+        margin = self.options.margin
         now = whole(self.bare, self.runs, self.added)
         behind = [] if self.added else self._singles()[:BEHIND]
-        found = best_with_process(self.bare, self.runs, self.added, behind, self.options.margin)
-        due = self.options.margin if self.added else 0.0
-        if found is None or found.worth >= now.worth(self.options.margin) - due:
+        found = best_with_process(self.given, self.runs, self.added, behind, margin)
+        due = margin if self.added else 0.0
+        if found is None or found.worth >= now.worth(margin) + self._price(now) - due:
             return False
         self.bare, self.changes = found.changed.model, found.changed.changes
         self.added = found.whole.effects if self.added else ()  # else the looks have to find it
         self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
         self.earlier, self.opened = [], len(self.looks)
         return True
+
+    def _process_first(self, scores: Scores) -> bool:
+        """Change the process before an effect is added that explains less than that.
+
+        The larger of two is found first, whichever it is: what a model that is off leaves
+        behind every move looks like steps.
+        """
+        if self.options.free_process or not suspicious(self.base):
+            return False
+        margin = self.options.margin
+        now = whole(self.bare, self.runs, self.added)
+        found = with_process(self.given, self.runs, self.added, margin)
+        best = max((fit.evidence for fit in scores.fits if fit.candidate.inside), default=0.0)
+        if found is None or found.worth >= now.worth(margin) - max(best, 0.0):
+            return False
+        self._take(found)
+        return True
+
+    def _change_again(self) -> None:
+        """Fit the changes of the process again beside what was found since."""
+        margin = self.options.margin
+        now = whole(self.bare, self.runs, self.added)
+        found = with_process(self.given, self.runs, self.added, margin)
+        if found is not None and found.worth < now.worth(margin) + self._price(now):
+            self._take(found)
+
+    def _take(self, found: Mended) -> None:
+        self.bare, self.changes = found.changed.model, found.changed.changes
+        self.added, self.base = found.whole.effects, found.whole.base
+        self.earlier = []
+
+    def _price(self, now: Whole) -> float:
+        """Return what the changes of the process cost an explanation."""
+        rows = max(fit.rows for fit in now.base.noise)
+        return price_of(self.changes, rows, self.options.margin)
 
     def _singles(self) -> list[AddedEffect]:
         """Return the effects that explain most alone, the process as it is now."""
@@ -280,6 +322,8 @@ class _Workflow:
             base, candidates, lambda done: self.report((k + 0.8 * done) * share)
         )
         base = scores.base
+        if not self.changes and self._process_first(scores):
+            return self._look(k)
         if self.options.quick:
             chance = stored_threshold(sum(each.inside for each in candidates))
         else:
@@ -309,6 +353,8 @@ class _Workflow:
             if step.kept:
                 self.earlier.append(self.bare)
                 self.added, self.base, self.bare = step.added, step.base, bare
+                if self.changes:
+                    self._change_again()
                 if models:
                     self.gains[key] = decision.chosen.delta_bic
         return Look(scores, decision, where, kept, reason), testable

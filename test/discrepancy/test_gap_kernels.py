@@ -13,9 +13,9 @@ from scipy.signal import lfilter
 
 from stiction_ros.config_files import find_config
 from stiction_ros.discrepancy.candidate.base import Response
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.fit.misfit_kernels import whitened_shifts
-from stiction_ros.discrepancy.fit.search import Baseline
 from stiction_ros.discrepancy.likelihood.kernels import least_squares, turn
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,

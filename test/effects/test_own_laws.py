@@ -22,8 +22,9 @@ from stiction_ros.discrepancy.candidate.plugged import (
     PluggedValve,
     plugged_candidates,
 )
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
-from stiction_ros.discrepancy.fit.search import Baseline, _Search, fit_candidate
+from stiction_ros.discrepancy.fit.search import _Search, fit_candidate
 from stiction_ros.discrepancy.fit.uncertainty import likelihood_intervals
 from stiction_ros.discrepancy.process.free_search import FreeSearch
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records

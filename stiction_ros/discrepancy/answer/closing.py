@@ -15,7 +15,6 @@ from stiction_ros.discrepancy.answer.found_effects import (
     moved_by,
     of_data,
     of_noise,
-    on_the_way,
     own_closed,
     units_of,
 )
@@ -29,7 +28,7 @@ from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, run_with
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.decision.testable import Testable
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import (
     Intervals,
     bootstrap_intervals,
@@ -50,7 +49,7 @@ from stiction_ros.loop import LoopModel
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
 SOME_STEPS = 3.0  # of the rounding
-CLOSES = 0.2  # of the excess that an effect on the way from OP to PV has to close by itself
+CLOSES = 0.2  # of the excess of the free run that an effect has to close by itself
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,8 +184,7 @@ def _named(ended: Ended) -> tuple[Ended, list[FoundEffect]]:
         no_name = [
             k
             for k, (shown, effect) in enumerate(zip(found, ended.added, strict=True))
-            if holds_nothing_out(effect, ended.base, shown.intervals)
-            or (on_the_way(shown.place, shown.effect) and shown.closed < CLOSES)
+            if holds_nothing_out(effect, ended.base, shown.intervals) or shown.closed < CLOSES
         ]
         if not no_name:
             return ended, found
@@ -247,11 +245,16 @@ def _louder(ended: Ended) -> list[FoundEffect]:
 
 
 def _stranger(ended: Ended) -> float:
-    """Return what an explanation that has no name gains; a noise has to be worth as much."""
+    """Return what an explanation gains that has no name, or one of a set that is left in doubt.
+
+    A noise has to be worth as much to be named.
+    """
     last = ended.looks[-1]
-    if last.decision.verdict is not GapVerdict.UNKNOWN:
-        return -NO_LAW
-    return max(fit.evidence for fit in last.scores.fits)
+    if last.decision.verdict is GapVerdict.UNKNOWN:
+        return max(fit.evidence for fit in last.scores.fits)
+    if last.decision.chosen is not None and not last.kept:
+        return last.decision.chosen.evidence
+    return -NO_LAW
 
 
 def _mended(ended: Ended) -> bool:

@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import LAGS, GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
 from stiction_ros.effects import Behaviour, FloatArray, about

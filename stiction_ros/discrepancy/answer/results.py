@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.data.gate import Gate
 from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict
 from stiction_ros.discrepancy.decision.scores import Scores
 from stiction_ros.discrepancy.decision.testable import Testable
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import OutputGap
 from stiction_ros.discrepancy.gap.noise_check import OutputNoise
 from stiction_ros.discrepancy.gap.where import Where

@@ -12,7 +12,8 @@ from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.decision.decide import FRICTION, borne_out
 from stiction_ros.discrepancy.decision.measured_stem import stem_misfit
 from stiction_ros.discrepancy.decision.scores import all_candidates
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel

@@ -13,7 +13,8 @@ from stiction_ros.discrepancy.candidate.output import output_candidates
 from stiction_ros.discrepancy.candidate.plugged import plugged_candidates
 from stiction_ros.discrepancy.candidate.valve import valve_candidates
 from stiction_ros.discrepancy.candidate.wave import disturbance_candidates
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.effects import FloatArray
 
 Progress = Callable[[float], None]

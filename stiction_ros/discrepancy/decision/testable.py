@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import left_by, projector, whiten, whitened_columns
 from stiction_ros.discrepancy.simulation.free_run import seen_of
 from stiction_ros.effects import FloatArray, Offset, ProcessGain

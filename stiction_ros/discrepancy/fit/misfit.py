@@ -9,24 +9,17 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Response
 from stiction_ros.discrepancy.fit.misfit_kernels import left_of_shifts, taken_by_sizes
-from stiction_ros.discrepancy.likelihood.noise import (
-    Blocks,
-    left_by,
-    projector,
-    whiten,
-    whitened_columns,
-)
+from stiction_ros.discrepancy.likelihood.noise import Blocks, left_by, whiten
 from stiction_ros.effects import FloatArray
 
 _TINY = 1e-300
 
 
 class Shared(Protocol):
-    """What every fit of one gap shares: a :class:`~.search.Baseline`."""
+    """What every fit of one gap shares: a :class:`~.baseline.Baseline`."""
 
-    @property
-    def columns(self) -> Sequence[FloatArray]:
-        """Return per output the columns that every fit projects out, shape (N, q)."""
+    def basis(self, output: int, ar: FloatArray) -> FloatArray:
+        """Return an orthonormal basis of the columns that every fit projects out, shape (n, r)."""
         ...
 
     @property
@@ -45,7 +38,7 @@ def misfit(
     total: FloatArray | float = 0.0
     for i in response.outputs:
         marked = base.blocks[i].train
-        basis = projector(whitened_columns(base.columns[i], ar[i], marked))
+        basis = base.basis(i, ar[i])
         rows = np.flatnonzero(marked)
         target = left_by(basis, whiten(gap[:, i], ar[i])[marked])
         shift, sizes = response.shifts.get(i), response.sizes.get(i)

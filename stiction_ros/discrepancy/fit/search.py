@@ -10,12 +10,17 @@ import numpy as np
 from scipy.stats import qmc
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.fit.settled import settled
 from stiction_ros.discrepancy.fit.shared_factors import shared_factors
-from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag, declared_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag
 from stiction_ros.discrepancy.likelihood.grouped import best_noise
-from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, given_noise, noise_forms
+from stiction_ros.discrepancy.likelihood.noise import (
+    Blocks,
+    NoiseFit,
+    noise_forms,
+)
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray
 
@@ -33,73 +38,7 @@ ROUNDS = 5
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
-_FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end in either
 _TINY = 1e-300
-
-
-@dataclasses.dataclass(frozen=True)
-class Baseline:
-    """The current model alone: its gap, its noise, and what every fit shares.
-
-    Attributes:
-        run: the free run.
-        columns: per output the columns that every fit projects out, shape (N, q).
-        blocks: per output the fitted and the held-out rows.
-        noise: per output the fit of the gap without any change.
-        plain: the same as if nothing were rounded, for the search.
-        declared: per output φ of the noise that the model declares; none where it declares none.
-    """
-
-    run: FreeRun
-    columns: tuple[FloatArray, ...]
-    blocks: tuple[Blocks, ...]
-    noise: tuple[NoiseFit, ...]
-    plain: tuple[NoiseFit, ...]
-    declared: tuple[tuple[FloatArray, ...], ...]
-
-    @classmethod
-    def of(
-        cls,
-        run: FreeRun,
-        gap: FloatArray | None = None,
-        columns: Sequence[FloatArray] | None = None,
-    ) -> Baseline:
-        """Fit the noise of the current model; ``gap``, shape (N, p), replaces the recorded one."""
-        gap = run.gap if gap is None else gap
-        shared = tuple(run.free if columns is None else columns)
-        blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
-        declared = tuple(
-            () if noise is None or thinned else (noise.ar,)
-            for noise, thinned in zip(declared_noise(run.model), run.runs.thinned, strict=True)
-        )
-        forms = [
-            noise_forms(gap[:, i], shared[i], blocks[i], _FIRST_GUESSES, declared[i])
-            for i in range(gap.shape[1])
-        ]
-        plain = tuple(best_noise(each) for each in forms)
-        noise = tuple(
-            best_noise(each, quantum, own)
-            for each, quantum, own in zip(forms, run.runs.quanta, blocks, strict=True)
-        )
-        return cls(run, shared, blocks, noise, plain, declared)
-
-    def under_declared(self, output: int) -> NoiseFit:
-        """Return the fit of an output's gap under the noise that the model declares."""
-        gap, columns, blocks = self.run.gap[:, output], self.columns[output], self.blocks[output]
-        fits = [given_noise(gap, columns, blocks, ar) for ar in self.declared[output]]
-        return best_noise(fits, self.run.runs.quanta[output], blocks)
-
-    @property
-    def bic(self) -> float:
-        """BIC of the current model, but for what every candidate shares with it."""
-        return sum(fit.bic(0) for fit in self.noise)
-
-    def held_gain(self, before: Baseline) -> float:
-        """Return −2 log likelihood that it gains on the held-out rows against another model."""
-        return sum(
-            old.held_minus_two_log - new.held_minus_two_log
-            for old, new in zip(before.noise, self.noise, strict=True)
-        )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,7 +12,7 @@ from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.effects import FloatArray
 
 if TYPE_CHECKING:
-    from stiction_ros.discrepancy.fit.search import Baseline
+    from stiction_ros.discrepancy.fit.baseline import Baseline
 
 PROBE = 0.05  # of a linear axis, at which its parabola is taken
 _TINY = 1e-300

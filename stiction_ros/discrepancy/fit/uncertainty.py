@@ -8,9 +8,10 @@ import numpy as np
 from scipy.stats import qmc
 
 from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.fit.misfit_kernels import whitened_shifts
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.settled import PROBE, settled
 from stiction_ros.discrepancy.fit.shared_factors import information, shared_factors
 from stiction_ros.discrepancy.likelihood.noise import (

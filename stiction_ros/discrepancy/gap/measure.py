@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import whiten
 from stiction_ros.effects import FloatArray
 

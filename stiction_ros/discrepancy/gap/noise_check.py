@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree

@@ -9,10 +9,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.optimize import minimize
 
-from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.gap.noise_kernels import innovations, left_by_columns, steady_gain
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
-from stiction_ros.discrepancy.likelihood.noise import ENLARGED, SURPRISE, Blocks
+from stiction_ros.discrepancy.likelihood.noise import (
+    ENLARGED,
+    SURPRISE,
+    VANISHED,
+    Blocks,
+)
 from stiction_ros.effects import (
     Behaviour,
     ColouredDisturbance,
@@ -25,7 +30,6 @@ TIMES = (5.0, 30.0, 150.0)  # samples, of the first guesses of a coloured noise'
 RATIOS = (0.03, 0.3)  # of a random walk's step to the declared noise, first guesses
 SMALLEST, LARGEST = 1e-4, 100.0  # of the declared noise, and of what is left, that is searched
 CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
-DOUBLINGS = 30
 FLOOR = 1e-6  # of the declared variance, that every measurement has
 NORMAL = 1.96
 NO_LAW = 30.0  # BIC by which a law may miss an autoregression and still be its name
@@ -79,12 +83,30 @@ def noise_effects(
     Returns:
         The laws that beat the declared noise, with its rounding; the best first.
     """
-    found = [_fitted(base, output, declared, law) for law in _laws(base, output, declared)]
+    name = ("noise effects", output, declared.std, declared.ar.tobytes())
+    if name not in base.known:
+        laws = _laws(base, output, declared)
+        base.known[name] = [_fitted(base, output, declared, law) for law in laws]
+    found = base.known[name]
     enough = _without(base, output, declared) - least * int(base.blocks[output].train.sum())
-    return sorted(
-        (each for each in found if each is not None and each.score < enough),
-        key=lambda each: each.score,
-    )
+    better = [each for each in found if each is not None and each.score < enough]
+    lasts = float(base.run.runs.time.max())
+    return sorted(_without_walks(better, lasts), key=lambda each: each.score)
+
+
+def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
+    """Return laws without a coloured noise that may last as long as the record.
+
+    Within the record that is a random walk, which has one figure less.
+    """
+    walks = [each.score for each in laws if isinstance(each.behaviour, RandomWalkDisturbance)]
+    return [
+        each
+        for each in laws
+        if not isinstance(each.behaviour, ColouredDisturbance)
+        or each.intervals["tau"][1] < lasts * math.exp(-CLEAR)
+        or each.score < min(walks, default=math.inf) - ENLARGED
+    ]
 
 
 def _without(base: Baseline, output: int, declared: DeclaredNoise) -> float:
@@ -106,8 +128,9 @@ def _nothing(x: FloatArray) -> Behaviour:
 
 
 def _values(base: Baseline, output: int) -> FloatArray:
-    """Return the gap and the columns that every fit projects out, shape (N, 1 + q)."""
-    return np.column_stack([base.run.gap[:, output], base.columns[output]])
+    """Return the gap and the columns that every fit projects out, shape (1 + q, N)."""
+    values = np.column_stack([base.run.gap[:, output], base.columns[output]])
+    return np.ascontiguousarray(values.T)
 
 
 def named_laws(found: Sequence[NoiseEffect], margin: float) -> tuple[NoiseEffect, ...]:
@@ -287,79 +310,13 @@ def _score(
     gain = steady_gain(whole, noise / unit, look, max(r, FLOOR * unit) / unit)
     if gain is None:
         return math.inf, 0.0, 0.0
-    white = innovations(whole - np.outer(gain, look), gain, look, np.ascontiguousarray(values))
-    left, columns = white[:, 0], white[:, 1:]
+    kept = np.ascontiguousarray(whole - np.outer(gain, look))
+    white = innovations(kept, gain, look, values)
     if not float(np.abs(white).max()) < 1e6 * float(np.abs(values).max()):
         return math.inf, 0.0, 0.0
-    lengths = np.linalg.norm(columns[blocks.train], axis=0)
-    kept = lengths > 1e-9 * np.maximum(np.linalg.norm(values[:, 1:][blocks.train], axis=0), _TINY)
-    columns = columns[:, kept] / lengths[kept]
-    beta = np.linalg.lstsq(columns[blocks.train], left[blocks.train], rcond=1e-10)[0]
-    left = left - columns @ beta
-    rows = int(blocks.train.sum())
-    variance = max(float(np.mean(left[blocks.train] ** 2)), _TINY)
+    left = left_by_columns(white, values, blocks.train, VANISHED)
+    inside, outside = left[blocks.train], left[blocks.held]
+    variance = max(float(inside @ inside) / len(inside), _TINY)
     log = math.log(2.0 * math.pi * variance)
-    outside = np.minimum(left[blocks.held] ** 2 / variance, SURPRISE**2)
-    return rows * (log + 1.0), len(outside) * log + float(outside.sum()), math.sqrt(variance)
-
-
-def steady_gain(a: FloatArray, q: FloatArray, c: FloatArray, r: float) -> FloatArray | None:
-    """Return Kalman's gain of one-step predictions, shape (n,), by doubling; None without one.
-
-    Args:
-        a, q: of the states, shape (n, n).
-        c: of the one output, shape (n,).
-        r: its variance.
-    """
-    if not len(a):
-        return np.zeros(0)
-    identity = np.eye(len(a))
-    forward, seen, p = a.T.copy(), np.outer(c, c) / r, q.copy()
-    for _ in range(DOUBLINGS):
-        try:
-            inner = np.linalg.solve(identity + seen @ p, forward)
-        except np.linalg.LinAlgError:
-            return None
-        grown = p + forward.T @ p @ inner
-        seen = seen + forward @ np.linalg.solve(identity + seen @ p, seen) @ forward.T
-        forward = forward @ inner
-        change = float(np.abs(grown - p).max())
-        p = 0.5 * (grown + grown.T)
-        if not np.isfinite(p).all():
-            return None
-        if change <= 1e-10 * float(np.abs(p).max()):
-            break
-    return np.asarray(a @ p @ c / (float(c @ p @ c) + r))
-
-
-@compiled
-def innovations(
-    kept: FloatArray, gain: FloatArray, look: FloatArray, values: FloatArray
-) -> FloatArray:
-    """Return what one-step predictions miss of each column of ``values``, shape (N, G).
-
-    Args:
-        kept: A − K c, shape (n, n).
-        gain: K, shape (n,).
-        look: c, shape (n,).
-        values: shape (N, G).
-    """
-    count, columns = values.shape
-    size = len(gain)
-    missed = np.empty((count, columns))
-    state, following = np.zeros(size), np.zeros(size)
-    for g in range(columns):
-        state[:] = 0.0
-        for k in range(count):
-            foretold = 0.0
-            for i in range(size):
-                foretold += look[i] * state[i]
-            missed[k, g] = values[k, g] - foretold
-            for i in range(size):
-                total = gain[i] * values[k, g]
-                for j in range(size):
-                    total += kept[i, j] * state[j]
-                following[i] = total
-            for i in range(size):
-                state[i] = following[i]
-    return missed
+    outside = np.minimum(outside**2 / variance, SURPRISE**2)
+    return len(inside) * (log + 1.0), len(outside) * log + float(outside.sum()), math.sqrt(variance)

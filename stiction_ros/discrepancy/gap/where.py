@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import BoolArray, left_by, projector
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop.set_points import set_point_moves

@@ -54,6 +54,34 @@ def whitened_rows(values: FloatArray, ar: FloatArray, rows: BoolArray) -> FloatA
 
 
 @compiled
+def whitened_block(
+    columns: FloatArray, ar: FloatArray, rows: BoolArray, vanished: float
+) -> FloatArray:
+    """Return the marked rows of whitened columns, shape (q, n), zero where nothing is left.
+
+    Args:
+        columns: shape (q, N).
+        ar: φ, shape (p,).
+        rows: shape (N,).
+        vanished: share of a column's length on those rows, up to which it is nothing.
+    """
+    count = 0
+    for marked in rows:
+        count += 1 if marked else 0
+    white = np.empty((len(columns), count))
+    for j in range(len(columns)):
+        column = whitened_rows(columns[j], ar, rows)
+        before = 0.0
+        for k in range(len(rows)):
+            if rows[k]:
+                before += columns[j, k] * columns[j, k]
+        nothing = inner_product(column, column) <= vanished * vanished * before
+        for n in range(count):
+            white[j, n] = 0.0 if nothing else column[n]
+    return white
+
+
+@compiled
 def _reflect(whole: FloatArray, step: int, pivot: int) -> None:
     """Put the pivot, which is not zero, in its place and eliminate what lies below it."""
     for k in range(whole.shape[1]):

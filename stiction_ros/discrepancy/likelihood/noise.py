@@ -13,9 +13,12 @@ from scipy.signal import lfilter
 from stiction_ros.discrepancy.likelihood.kernels import (
     NOTHING,
     best_autoregression,
+    least_squares,
     orthonormal,
     sums_of_squares,
     turn,
+    whitened_block,
+    whitened_rows,
 )
 from stiction_ros.effects import FloatArray
 
@@ -161,11 +164,14 @@ def given_noise(
     target: FloatArray, columns: FloatArray, blocks: Blocks, ar: FloatArray
 ) -> NoiseFit:
     """Fit the linear columns under noise whose φ are given, its spread left open."""
-    train = blocks.train
-    white = whitened_columns(columns, ar, train)
-    beta = _solve(white, whiten(target, ar)[train])
+    train, target = blocks.train, np.ascontiguousarray(target)
+    white = whitened_block(np.ascontiguousarray(columns.T), ar, train, VANISHED)
+    wanted = whitened_rows(target, ar, train)
+    sure, beta = least_squares(white, wanted)
+    if not sure:
+        beta = _solve(white.T, wanted)
     residual = target - columns @ beta
-    unseen = ~white.any(axis=0)
+    unseen = ~white.any(axis=1)
     if unseen.any():  # the innovations do not show them, the free run does
         beta[unseen] = _solve(columns[train][:, unseen], residual[train])
         residual = target - columns @ beta
@@ -177,10 +183,8 @@ def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> Fl
 
     Noise of an equation that has settled hides how its run began.
     """
-    white = whiten(columns, ar)[rows]
-    lengths, before = np.linalg.norm(white, axis=0), np.linalg.norm(columns[rows], axis=0)
-    white[:, lengths <= VANISHED * before] = 0.0
-    return white
+    block = whitened_block(np.ascontiguousarray(columns.T), ar, rows, VANISHED)
+    return np.asarray(block.T)
 
 
 def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:

@@ -6,7 +6,8 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import CHI_SQUARE, Intervals
 from stiction_ros.discrepancy.process.free_search import FreeSearch
 from stiction_ros.effects import FloatArray

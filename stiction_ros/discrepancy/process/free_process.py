@@ -14,7 +14,8 @@ from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict
 from stiction_ros.discrepancy.decision.extend import same_candidate
 from stiction_ros.discrepancy.decision.measured_stem import confirmed
 from stiction_ros.discrepancy.decision.scores import Progress, Scores, all_candidates
-from stiction_ros.discrepancy.fit.search import Baseline, CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.process.free_equation import Equation, Fitted, best_fit
 from stiction_ros.discrepancy.process.free_search import HOPELESS, FreeSearch
 from stiction_ros.discrepancy.process.refit import (

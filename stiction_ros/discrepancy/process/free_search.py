@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import BoolArray, NoiseFit
 from stiction_ros.discrepancy.process.free_equation import Equation, Fitted, best_fit, filtered_fits
 from stiction_ros.discrepancy.process.refit import equations_of, problems_of

@@ -22,5 +22,6 @@ class TriangleDisturbance(PeriodicDisturbance):
 
     @staticmethod
     def wave(angle: FloatArray) -> FloatArray:
-        turn = np.mod(angle / (2.0 * math.pi) + 0.25, 1.0)
+        turn = angle / (2.0 * math.pi) + 0.25
+        turn -= np.floor(turn)
         return np.asarray(1.0 - 4.0 * np.abs(turn - 0.5))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import f as fisher
 
-from stiction_ros.discrepancy.fit.search import Baseline
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import measure_gap
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,

@@ -136,9 +136,12 @@ def change_lines(found: Discrepancy) -> list[str]:
                 f"(95 % between {number(low)} and {number(high)})"
             )
             continue
-        what = "gain" if change.what == "gain" else "time constants"
+        what = "gain"
+        if change.model is not None:
+            kind = "lead" if change.what == "lead" else "time constant"
+            what = f"{kind} of {number(change.model)} s"
         lines.append(
-            f"{change.output}: {what} {number(change.value)} times those of the model "
+            f"{change.output}: {what} {number(change.value)} times that of the model "
             f"(95 % between {number(low)} and {number(high)})"
         )
     return lines
