@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from typing import Any, TypeVar
 
 from stiction_ros.cli.output.progress import bar
 
@@ -63,6 +63,12 @@ def run_each(work: Callable[[S], T], items: Sequence[S], jobs: int, text: str) -
                 done[futures[future]] = future.result()
                 show(len(done) / len(items))
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            drop(futures)
             raise
     return [done[place] for place in range(len(items))]
+
+
+def drop(futures: Iterable[Future[Any]]) -> None:
+    """Cancel what has not begun, one by one: leaving its pool forgets that all were to be."""
+    for future in futures:
+        future.cancel()

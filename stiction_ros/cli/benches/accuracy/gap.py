@@ -21,6 +21,7 @@ from stiction_ros.cli.benches.accuracy.judged import check_seeds, logged_rows, s
 from stiction_ros.cli.options import choices
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.output.progress import bar
+from stiction_ros.cli.runs.seeds import drop
 
 if TYPE_CHECKING:
     from stiction_ros.blind.scores.scoring import Scored
@@ -147,7 +148,7 @@ def judge_all(
                 keep(future.result())
                 show_share(done / len(futures))
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            drop(futures)
             raise
 
 
