@@ -165,7 +165,8 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
         left = option_of(What.LEAVE, runs, "The loop as it is, simulated.")
         note = f"Not simulated: {_doubt(now, left.measures)}."
         others = [Option(what, None, {}, note) for what in What if what is not What.LEAVE]
-        return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, left))
+        same = Option(What.LEAVE, now, {}, "The loop as it is, as recorded.")
+        return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, same))
     note = f"The loop as it is: {len(kept)} of {DRAWS} drawn loops repeat the record."
     left = option_of(What.LEAVE, [runs[k] for k in kept], note)
     draws = Draws(frictions[kept], draws.tunings[kept])

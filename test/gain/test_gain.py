@@ -94,6 +94,15 @@ def test_leaving_the_loop_is_now(gain: Gain) -> None:
         assert value == pytest.approx(getattr(gain.now, key))
 
 
+def test_leaving_a_loop_that_is_not_repeated_is_now_too(
+    record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiction_ros.gain.gain.REPEATS", -1.0)
+    unlike = gain_of(record, found)
+    assert unlike.option(What.LEAVE).measures == unlike.now
+    assert unlike.option(What.SERVICE).measures is None
+
+
 def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
     document = gain.to_json()
     assert [option["what"] for option in document["options"]] == [
