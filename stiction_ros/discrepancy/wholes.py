@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Sequence
 
+from stiction_ros.discrepancy.decision.decide import on_the_way
 from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, run_with
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
@@ -99,7 +100,12 @@ def best_whole(
         others = [each for each in singles if each.fit.candidate.key not in known][:SINGLES]
         tried += [whole(bare, runs, [alone]) for alone in others]
     least = min(each.worth(margin) for each in tried)
-    near = [with_laws(each) for each in tried if each.worth(margin) < least + LAWS]
+    loads = not any(on_the_way(each.place, each.effect) for each in added)
+    near = [
+        with_laws(each)
+        for each in tried
+        if each.worth(margin) < least + LAWS or (loads and not each.effects)
+    ]
     best = min(near, key=lambda each: each.worth(margin))
     if len(best.effects) != 1 or len(added) < 2:
         return best
@@ -209,6 +215,15 @@ def with_process(
     own = whole(changed.model, runs, effects)
     rows = max(fit.rows for fit in own.base.noise)
     return Mended(changed, own, own.worth(margin) + price_of(changed.changes, rows, margin))
+
+
+def same_thing(changes: Sequence[ProcessChange], effects: Sequence[str]) -> bool:
+    """Tell whether a changed process is one effect of the process by another name.
+
+    A model that is a little off is so in several figures; one alone is what an effect says.
+    """
+    whats = {change.what for change in changes}
+    return len(whats) == 1 and whats <= set(effects)
 
 
 def price_of(changes: Sequence[ProcessChange], rows: int, margin: float) -> float:

@@ -47,9 +47,7 @@ from stiction_ros.discrepancy.decision.scores import (
 from stiction_ros.discrepancy.decision.testable import Testable, testable_effects
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.fit.uncertainty import (
-    chance_threshold,
-)
+from stiction_ros.discrepancy.fit.uncertainty import chance_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.options import GapOptions
 from stiction_ros.discrepancy.process.change import ProcessChange
@@ -67,6 +65,7 @@ from stiction_ros.discrepancy.wholes import (
     best_whole,
     best_with_process,
     price_of,
+    same_thing,
     suspicious,
     whole,
     with_process,
@@ -164,7 +163,7 @@ class _Workflow:
             if self._mend_process():
                 testable = self._look_on()
                 self._compare_wholes()
-            if len(self.added) > 1:
+            if len(self.added) > 1 or self.changes:
                 self._tell_friction_again()
         return closing(self._ended(testable))
 
@@ -195,6 +194,8 @@ class _Workflow:
         due = margin if self.added else 0.0
         if found is None or found.worth >= now.worth(margin) + self._price(now) - due:
             return False
+        if same_thing(found.changed.changes, [each.effect for each in self.added]):
+            return False
         self.bare, self.changes = found.changed.model, found.changed.changes
         self.added = found.whole.effects if self.added else ()  # else the looks have to find it
         self.base = Baseline.of(run_with(self.bare, self.runs, self.added))
@@ -212,8 +213,12 @@ class _Workflow:
         margin = self.options.margin
         now = whole(self.bare, self.runs, self.added)
         found = with_process(self.given, self.runs, self.added, margin)
-        best = max((fit.evidence for fit in scores.fits if fit.candidate.inside), default=0.0)
-        if found is None or found.worth >= now.worth(margin) - max(best, 0.0):
+        inside = [fit for fit in scores.fits if fit.candidate.inside and fit.evidence > 0.0]
+        best = max(inside, key=lambda fit: fit.evidence, default=None)
+        gained = 0.0 if best is None else best.evidence
+        if found is None or found.worth >= now.worth(margin) - gained:
+            return False
+        if best is not None and same_thing(found.changed.changes, [best.candidate.effect]):
             return False
         self._take(found)
         return True

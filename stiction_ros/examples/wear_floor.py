@@ -173,13 +173,13 @@ class _Heat:
             Shape (L,), then from each stem to each, (L, L), twice.
         """
         first = np.concatenate([stems, STEMS])
-        waits = np.arange(LONGEST + 1)
+        waits = np.arange(LONGEST + 1.0)
         away = self.ends(first) - goal
         apart = start[:, None] - self.ends(first)[None, :]
         paid = self._sums(away[None, :, None], apart[:, :, None], waits)
         there = self.ends(first)[None, :, None] + apart[:, :, None] * self.fading**waits
         own = np.arange(len(stems))
-        none = self._sums(away[own], apart[own, own], np.array(length))
+        none = self._sums(away[own], apart[own, own], np.array(float(length)))
         one, two = (np.full((len(stems), len(stems)), np.inf) for _ in range(2))
         begun = np.abs(first[None, :] - stems[:, None]) >= jump
         for place, stem in enumerate(stems):

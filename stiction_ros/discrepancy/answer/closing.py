@@ -36,7 +36,7 @@ from stiction_ros.discrepancy.fit.uncertainty import (
 )
 from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.gap.noise_check import OutputNoise, check_noise, noise_sentences
-from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, noise_effects
+from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.options import GapOptions
 from stiction_ros.discrepancy.process.change import ProcessChange
@@ -232,26 +232,34 @@ def _louder(ended: Ended) -> list[FoundEffect]:
     found = []
     for i, declared in enumerate(declared_noise(ended.base.run.model)):
         fit = ended.base.noise[i]
-        if declared is None or not fit.enlarged:
+        if declared is None or not fit.enlarged or _slowed(ended, i):
             continue
         if not _matters(ended, i):
             continue
         beside = ended.added or ended.changes
         laws = noise_effects(ended.base, i, declared, A_ROW if beside else 0.0)
-        if laws and laws[0].score < fit.bic(0) + fit.held_minus_two_log - _stranger(ended):
+        if laws and laws[0].score < fit.bic(0) + fit.held_minus_two_log - _stranger(ended, laws[0]):
             own = ended.base.under_declared(i)
             found.append(of_noise(laws, own.bic(0) + own.held_minus_two_log, ended.options.margin))
     return found
 
 
-def _stranger(ended: Ended) -> float:
+def _slowed(ended: Ended, output: int) -> bool:
+    """Tell whether beside an effect the declared noise is left, which may have passed its lag."""
+    fits = [effect.fit.noise for effect in ended.added]
+    return any(output in noise and not noise[output].enlarged for noise in fits)
+
+
+def _stranger(ended: Ended, law: NoiseEffect) -> float:
     """Return what an explanation gains that has no name, or one of a set that is left in doubt.
 
-    A noise has to be worth as much to be named.
+    A noise has to be worth as much to be named; what it is a name of is no rival of it.
     """
     last = ended.looks[-1]
     if last.decision.verdict is GapVerdict.UNKNOWN:
-        return max(fit.evidence for fit in last.scores.fits)
+        name = law.place, law.behaviour.effect
+        rivals = [f.evidence for f in last.scores.fits if name not in f.candidate.contains]
+        return max([*rivals, -NO_LAW])
     if last.decision.chosen is not None and not last.kept:
         return last.decision.chosen.evidence
     return -NO_LAW

@@ -10,12 +10,12 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.data.gate import DataFinding
-from stiction_ros.discrepancy.decision.decide import LAGS, GapVerdict
+from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
-from stiction_ros.effects import Behaviour, FloatArray, about
+from stiction_ros.effects import Behaviour, FloatArray
 
 WIDEST = 10.0  # times the range of its signal that an interval of a size may be wide
 WHOLE = 0.95  # of a range of search: an interval that wide holds nothing out
@@ -143,13 +143,6 @@ def moved_by(without: Baseline, base: Baseline) -> FloatArray:
     """Return what an effect adds to the free run, start and level fitted anew, shape (N, p)."""
     pairs = zip(without.noise, base.noise, strict=True)
     return np.column_stack([old.residual - new.residual for old, new in pairs])
-
-
-def on_the_way(place: str, effect: str) -> bool:
-    """Tell whether an effect changes what OP does to PV."""
-    return place.startswith(("valve:", "process:")) or (
-        place.startswith("sensor:") and about(effect).family == LAGS
-    )
 
 
 def holds_nothing_out(

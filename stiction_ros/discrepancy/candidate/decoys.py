@@ -52,6 +52,9 @@ class Trend(_Decoy):
     def __init__(self, run: FreeRun, output: int) -> None:
         """Take the output's index."""
         super().__init__(run, output, "disturbance", "slow load")
+        places = [f"disturbance:{run.model.outputs[output]}"]
+        places += [f"load:{valve}" for valve in run.model.valve_names]
+        self.contains = tuple((place, "random_walk") for place in places)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         at = run.runs.time / max(float(run.runs.time.max()), 1e-9)

@@ -20,6 +20,7 @@ from stiction_ros.effects import (
 )
 
 FASTEST = 0.45  # cycles per sample
+SHAPED = FASTEST / 3.0  # of a square or a triangle: its third harmonic has to be seen
 SLOWEST = 2.0  # cycles in the longest record
 BESIDE = (-0.5, -0.25, 0.0, 0.25, 0.5)  # of the width of a spectral line
 PHASES = 8
@@ -118,7 +119,10 @@ class SineWave(Wave):
 
 
 class ShapedWave(Wave):
-    """A square or a triangle, by its frequency and where in its cycle the record begins."""
+    """A square or a triangle, by its frequency and where in its cycle it is amid the record.
+
+    Where it begins would follow its frequency: what is searched apart has to be told apart.
+    """
 
     def __init__(
         self,
@@ -130,31 +134,33 @@ class ShapedWave(Wave):
         rows = run.runs.longest
         self._bin = 1.0 / (rows.stop - rows.start)
         self._step, self._lines, self._kind = run.runs.sample_time, lines, kind
+        self._middle = 0.5 * (rows.stop - rows.start)
         self.effect = kind.effect
-        self.axes = (_frequencies(self._bin), Axis(-0.5, 1.0, 3 * PHASES + 1, natural=True))
+        self.axes = (_frequencies(self._bin, SHAPED), Axis(-0.5, 1.0, 3 * PHASES + 1, natural=True))
 
     def grid(self) -> FloatArray:
         """Return half a turn of phases: a negative amplitude is the other half."""
-        lines, phases = _near(self._lines, self._bin), np.arange(PHASES) / (2.0 * PHASES)
+        lines, phases = _near(self._lines, self._bin, SHAPED), np.arange(PHASES) / (2.0 * PHASES)
         meshed = np.meshgrid(lines, phases, indexing="ij")
         return np.stack([each.ravel() for each in meshed], axis=1)
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
-        turns = (run.runs.time[:, None] / self._step) * points[:, 0] + points[:, 1]
+        turns = (run.runs.time[:, None] / self._step - self._middle) * points[:, 0] + points[:, 1]
         return self._kind.wave(_TURN * turns)[:, :, None]
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         size = float(factors[0])
-        phase = _TURN * (float(point[1]) + (0.5 if size < 0.0 else 0.0))
+        begun = float(point[1] - self._middle * point[0])
+        phase = _TURN * (begun + (0.5 if size < 0.0 else 0.0))
         turned = math.remainder(phase, _TURN)
         return self._kind(abs(size), self._step / float(point[0]), turned)
 
 
-def _frequencies(width: float) -> Axis:
-    return Axis(SLOWEST * width, FASTEST, 2 * int(FASTEST / width))
+def _frequencies(width: float, fastest: float = FASTEST) -> Axis:
+    return Axis(SLOWEST * width, fastest, 2 * int(fastest / width))
 
 
-def _near(lines: FloatArray, width: float) -> FloatArray:
+def _near(lines: FloatArray, width: float, fastest: float = FASTEST) -> FloatArray:
     """Return frequencies on and beside the lines, shape (K,)."""
-    low, high = SLOWEST * width, FASTEST
+    low, high = SLOWEST * width, fastest
     return np.unique(np.clip(lines[:, None] + np.array(BESIDE) * width, low, high))

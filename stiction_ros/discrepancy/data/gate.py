@@ -79,7 +79,13 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
     """
     runs = join_records(model, records)
     gate = look_at_data(model, runs)
-    seen = dataclasses.replace(runs, usable=gate.usable, quanta=gate.rounding, thinned=gate.thinned)
+    seen = dataclasses.replace(
+        runs,
+        usable=gate.usable,
+        quanta=gate.rounding,
+        thinned=gate.thinned,
+        lattices=gate.quantum,
+    )
     return seen, gate
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.simulation.free_run import HELD_SHARE
-from stiction_ros.effects import Backlash, Stiction
+from stiction_ros.effects import Backlash, Stiction, about
 
 JUMP_SURE = 10.0  # BIC by which a jump is there
 JUMP_ABSENT = 3.0  # BIC by which it is not
@@ -138,6 +138,13 @@ def large_enough(fit: CandidateFit) -> bool:
     if fit.candidate.at_bound(fit.point):
         return False
     return fit.candidate.large_enough(fit.point, fit.factors)
+
+
+def on_the_way(place: str, effect: str) -> bool:
+    """Tell whether an effect changes what OP does to PV."""
+    return place.startswith(("valve:", "process:")) or (
+        place.startswith("sensor:") and about(effect).family == LAGS
+    )
 
 
 def _unknown(stranger: CandidateFit, reason: str) -> Decision:

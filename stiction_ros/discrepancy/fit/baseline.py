@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, rounded
 from stiction_ros.discrepancy.likelihood.grouped import best_noise
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
@@ -75,8 +75,10 @@ class Baseline:
         shared = tuple(run.free if columns is None else columns)
         blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
         declared = tuple(
-            () if noise is None or thinned else (noise.ar,)
-            for noise, thinned in zip(declared_noise(run.model), run.runs.thinned, strict=True)
+            () if noise is None or thinned else (rounded(noise, quantum).ar,)
+            for noise, thinned, quantum in zip(
+                declared_noise(run.model), run.runs.thinned, run.runs.lattices, strict=True
+            )
         )
         forms = [
             noise_forms(gap[:, i], shared[i], blocks[i], _FIRST_GUESSES, declared[i])

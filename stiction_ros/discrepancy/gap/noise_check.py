@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, rounded
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
 LAGS = 20
@@ -53,7 +53,8 @@ def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
         if declared is None:
             found.append(OutputNoise(name, math.nan, fit.innovation_std, False, 0))
             continue
-        expected = math.sqrt(declared.std**2 + quantum**2 / 12.0)
+        shown = rounded(declared, base.run.runs.lattices[i])
+        expected = math.sqrt(shown.std**2 + (0.0 if len(shown.ar) else quantum**2 / 12.0))
         larger = fit.innovation_std > LARGER * expected
         memory = _memory(base, i) if fit.enlarged else 0
         found.append(

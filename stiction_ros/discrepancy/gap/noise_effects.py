@@ -10,13 +10,17 @@ import numpy as np
 from scipy.optimize import minimize
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.noise_kernels import innovations, left_by_columns, steady_gain
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import (
     ENLARGED,
     SURPRISE,
     VANISHED,
     Blocks,
+)
+from stiction_ros.discrepancy.likelihood.state_noise import (
+    innovations,
+    left_by_columns,
+    steady_gain,
 )
 from stiction_ros.effects import (
     Behaviour,
@@ -29,6 +33,11 @@ from stiction_ros.processes import AlteredProcess, ArxProcess
 TIMES = (5.0, 30.0, 150.0)  # samples, of the first guesses of a coloured noise's memory
 RATIOS = (0.03, 0.3)  # of a random walk's step to the declared noise, first guesses
 SMALLEST, LARGEST = 1e-4, 100.0  # of the declared noise, and of what is left, that is searched
+RECORDS = 10.0  # that a random walk remembers
+SIDES = (-1.0, 1.0)
+REJECTED = 8.0  # −2 log likelihood, above that of the best figures
+SHORTEST_WAY = 1e-3
+FLAT = 1e-3  # curvature of the likelihood over a logarithm, below which it has none
 CLEAR = 0.3  # by which the logarithm of a figure has to be inside of its range
 FLOOR = 1e-6  # of the declared variance, that every measurement has
 NORMAL = 1.96
@@ -119,7 +128,7 @@ def _without(base: Baseline, output: int, declared: DeclaredNoise) -> float:
         _nothing,
     )
     own, values = _declared_block(base, output, declared), _values(base, output)
-    whole, held, _ = _score(np.zeros(0), none, own, values, base.blocks[output])
+    whole, held, *_ = _score(np.zeros(0), none, own, values, base.blocks[output])
     return whole + held
 
 
@@ -148,7 +157,7 @@ def _laws(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Law]:
         return np.array([[keep]]), np.array([[spread]]), np.ones(1)
 
     def walk(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return np.eye(1), np.array([[math.exp(2.0 * float(x[0])) * step]]), np.ones(1)
+        return np.array([[stays]]), np.array([[math.exp(2.0 * float(x[0])) * step]]), np.ones(1)
 
     def walked(x: FloatArray) -> Behaviour:
         return RandomWalkDisturbance(math.exp(float(x[0])))
@@ -156,6 +165,8 @@ def _laws(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Law]:
     spread = float(np.std(base.noise[output].residual[base.blocks[output].train]))
     size = max(spread, 2.0 * unit)
     lasts = float(base.run.runs.time.max())
+    # Beside a process that integrates, a walk that forgets nothing could not be observed.
+    stays = math.exp(-step / (RECORDS * lasts))
     walks = np.log([SMALLEST * unit]), np.log([max(spread, unit) / math.sqrt(step)])
     found = [
         _Law(
@@ -184,7 +195,7 @@ def _laws(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Law]:
         ) -> tuple[FloatArray, FloatArray, FloatArray]:
             count = len(a)
             whole = np.zeros((count + 1, count + 1))
-            whole[:count, :count], whole[:count, count], whole[count, count] = a, b, 1.0
+            whole[:count, :count], whole[:count, count], whole[count, count] = a, b, stays
             spread = np.zeros_like(whole)
             spread[count, count] = math.exp(2.0 * float(x[0])) * step
             return whole, spread, np.append(c, 0.0)
@@ -223,7 +234,7 @@ def _declared_block(
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return A, Q, c and R of the declared noise, rounding in R; no states where it is white."""
     variance = declared.std**2
-    rounding = base.run.runs.quanta[output] ** 2 / 12.0
+    rounding = base.run.runs.lattices[output] ** 2 / 12.0
     count = len(declared.ar)
     if not count:
         return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0), variance + rounding
@@ -251,11 +262,15 @@ def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: _Law) -> 
     low, high = law.range
     if not math.isfinite(best) or np.any(found < low + CLEAR) or np.any(found > high - CLEAR):
         return None  # a figure on the bound of its range is no name
-    whole, held, std = _score(found, law, own, values, blocks)
+    whole, held, std, louder = _score(found, law, own, values, blocks)
     rows = max(int(blocks.train.sum()), 2)
     price = len(found) * math.log(rows) + ENLARGED
-    ends = [np.clip(end, low, high) for end in _ends(loss, found)]
-    behaviours = [law.behaviour(x) for x in (found, *ends)]
+    first = np.eye(len(found))[0]  # is a size: σ is its unit
+    behaviours = [law.behaviour(found + math.log(louder) * first)]
+    for k, end in enumerate(_ends(loss, found, law.range)):
+        scale = math.log(_score(end, law, own, values, blocks)[3])
+        scale += SIDES[k % 2] * NORMAL / math.sqrt(2.0 * rows)
+        behaviours.append(law.behaviour(end + scale * first))
     keys = [(p.key, p.attribute) for p in behaviours[0].parameters()]
     intervals = {
         key: (
@@ -267,7 +282,9 @@ def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: _Law) -> 
     return NoiseEffect(law.place, behaviours[0], intervals, whole + held + price, std)
 
 
-def _ends(loss: Callable[[FloatArray], float], found: FloatArray) -> list[FloatArray]:
+def _ends(
+    loss: Callable[[FloatArray], float], found: FloatArray, limits: tuple[FloatArray, FloatArray]
+) -> list[FloatArray]:
     """Return points at both ends of each figure's 95 % by the curvature of the likelihood."""
     count, step = len(found), 0.1
     shifts = step * np.eye(count)
@@ -280,9 +297,22 @@ def _ends(loss: Callable[[FloatArray], float], found: FloatArray) -> list[FloatA
             bend[i, j] = bend[j, i] = (corner - other) / (4.0 * step**2)
         plus, minus = loss(found + shifts[i]), loss(found - shifts[i])
         bend[i, i] = (plus + minus - 2.0 * centre) / step**2
-    spread = np.linalg.pinv(0.5 * bend)
-    reach = NORMAL * np.sqrt(np.maximum(np.diag(spread), 0.0))
-    return [found + side * each for each in np.diag(reach) for side in (-1.0, 1.0)]
+    if not np.isfinite(bend).all():
+        return [np.array(limits[k]) for _ in found for k in range(2)]
+    sizes, axes = np.linalg.eigh(0.5 * bend)
+    spread = (axes / np.maximum(sizes, FLAT)) @ axes.T  # what does not bend is not known at all
+    ways = NORMAL * spread / np.sqrt(np.diag(spread))  # each figure's end, the others at their best
+    ends = []
+    for way in ways.T:
+        for side in SIDES:  # a valley may be bent: back to what the likelihood does not reject
+            share = side
+            while abs(share) > SHORTEST_WAY:
+                end = np.clip(found + share * way, *limits)
+                if loss(end) < centre + REJECTED:
+                    break
+                share *= 0.5
+            ends.append(end)
+    return ends
 
 
 def _score(
@@ -291,14 +321,15 @@ def _score(
     own: tuple[FloatArray, FloatArray, FloatArray, float],
     values: FloatArray,
     blocks: Blocks,
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """Return −2 log likelihood of fitted and of held-out rows, and σ of the innovations.
 
-    The ratio of the law to the declared noise is what counts: σ is left open as everywhere.
+    The ratio of the law to the declared noise is what counts: σ is left open as everywhere. The
+    last is σ over that of the figures.
     """
     low, high = law.range
     if np.any(x < low) or np.any(x > high):
-        return math.inf, 0.0, 0.0
+        return math.inf, 0.0, 0.0, 1.0
     a, q, c, r = own
     a2, q2, c2 = law.block(x)
     size, more = len(a), len(a2)
@@ -307,16 +338,18 @@ def _score(
     noise[:size, :size], noise[size:, size:] = q, q2
     look = np.concatenate([c, c2])
     unit = max(r, float(np.trace(q)), _TINY)
-    gain = steady_gain(whole, noise / unit, look, max(r, FLOOR * unit) / unit)
-    if gain is None:
-        return math.inf, 0.0, 0.0
+    steady = steady_gain(whole, noise / unit, look, max(r, FLOOR * unit) / unit)
+    if steady is None:
+        return math.inf, 0.0, 0.0, 1.0
+    gain, foretold = steady
     kept = np.ascontiguousarray(whole - np.outer(gain, look))
     white = innovations(kept, gain, look, values)
     if not float(np.abs(white).max()) < 1e6 * float(np.abs(values).max()):
-        return math.inf, 0.0, 0.0
+        return math.inf, 0.0, 0.0, 1.0
     left = left_by_columns(white, values, blocks.train, VANISHED)
     inside, outside = left[blocks.train], left[blocks.held]
     variance = max(float(inside @ inside) / len(inside), _TINY)
     log = math.log(2.0 * math.pi * variance)
     outside = np.minimum(outside**2 / variance, SURPRISE**2)
-    return len(inside) * (log + 1.0), len(outside) * log + float(outside.sum()), math.sqrt(variance)
+    fitted, kept_back = len(inside) * (log + 1.0), len(outside) * log + float(outside.sum())
+    return fitted, kept_back, math.sqrt(variance), math.sqrt(variance / (unit * foretold))

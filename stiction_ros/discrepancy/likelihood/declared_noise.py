@@ -6,13 +6,16 @@ import dataclasses
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 
+from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxProcess, NoiseEntry
 
 LONGEST = 20  # samples that an autoregression of declared noises reaches back
 NEGLIGIBLE = 0.01  # of φ
+UNSEEN = 1e-3  # of the variance of a noise, that rounding may add to it when it is whitened
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +82,31 @@ def _beside_white(
     last = int(np.max(np.flatnonzero(np.abs(ar) > NEGLIGIBLE), initial=-1)) + 1
     variance = float(covariance[0] - ar @ covariance[1:])
     return DeclaredNoise(float(np.sqrt(max(variance, 0.0))), ar[:last])
+
+
+def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
+    """Return a noise as values rounded to a quantum show it, however fine they are.
+
+    Rounding is white. Beside noise of an equation, whose whitening makes it larger, that is seen
+    long before it is coarse.
+    """
+    count, white = len(noise.ar), quantum**2 / 12.0
+    if not count or white * (1.0 + float(noise.ar @ noise.ar)) < UNSEEN * noise.std**2:
+        return noise
+    states = np.zeros((count, count))
+    states[:, 0] = noise.ar
+    states[:-1, 1:] += np.eye(count - 1)
+    driven, look = np.zeros((count, count)), np.eye(count)[0]
+    driven[0, 0] = 1.0
+    steady = steady_gain(states, driven, look, white / noise.std**2)
+    if steady is None:
+        return noise
+    gain, missed = steady
+    moving = np.concatenate([[1.0], gain - noise.ar])  # of the innovations, over A
+    inverse = np.asarray(lfilter([1.0], moving, np.eye(1, LONGEST)[0]))
+    last = int(np.max(np.flatnonzero(np.abs(inverse) > NEGLIGIBLE))) + 1
+    whitening = np.convolve(np.concatenate([[1.0], -noise.ar]), inverse[:last])
+    return DeclaredNoise(noise.std * float(np.sqrt(missed)), -whitening[1:])
 
 
 def behind_lag(ar: FloatArray, keep: float) -> FloatArray:

@@ -33,6 +33,7 @@ class Runs:
         slices: rows of each record.
         usable: per output the rows whose PV can be scored, shape (p, N).
         quanta: per output the step of a coarse rounding; 0 where there is none.
+        lattices: per output the distance of PV's values, however fine; 0 where there is none.
         thinned: per output whether values were held or interpolated, so that their noise is
             no longer that of the loop.
     """
@@ -45,6 +46,7 @@ class Runs:
     usable: BoolArray
     quanta: tuple[float, ...]
     thinned: tuple[bool, ...]
+    lattices: tuple[float, ...]
 
     @property
     def sample_time(self) -> float:
@@ -82,7 +84,7 @@ def join_records(
     time = np.concatenate([r.time for r in records])
     count = pv.shape[1]
     op = np.clip(op, low, high)
-    none = (0.0,) * count, (False,) * count
+    none = (0.0,) * count, (False,) * count, (0.0,) * count
     return Runs(tuple(records), op, pv, time, slices, usable, *none)
 
 

@@ -45,6 +45,7 @@ PEAKS = 6  # of a spectrum, at which square and triangle waves are tried
 PHASES = 24
 WAVES = 3.0  # periods in a record, at least: with fewer a square is a step
 SHORTEST = 8.0  # samples of a period
+LONGER = (10.0, 30.0, 100.0)  # memories of a coloured noise that is nearly a random walk
 TURN = 2.0 * math.pi
 
 
@@ -198,11 +199,17 @@ class Fits:
         )
         return -min(begun, float(found.fun))
 
-    def _random(self, effect: Effect) -> float:
-        """Return ln L with noise of another form beside, its size and memory fitted."""
+    def _random(self, effect: Effect, longer: tuple[float, ...] = ()) -> float:
+        """Return ln L with noise of another form beside, its size and memory fitted.
+
+        Args:
+            effect: about as it may be.
+            longer: further factors of its memory.
+        """
         sample_time = self.loop.record.sample_time
         sizes = np.geomspace(0.1, 10.0, 7)
-        times = (0.3, 1.0, 3.0) if effect.name == "coloured" else (1.0,)
+        times: tuple[float, ...] = (0.3, 1.0, 3.0) if effect.name == "coloured" else (1.0,)
+        times = (*times, *longer)
 
         def score(size: float, time: float) -> float:
             figures = {"rate": size * effect.figures.get("rate", 0.0)}
@@ -231,7 +238,8 @@ class Fits:
             rate = 4.0 / math.sqrt(self.count * self.loop.record.sample_time) * size
             yield (place, "random_walk"), self._random(Effect(place, "random_walk", {"rate": rate}))
         figures = {"std": 0.8 * unit, "tau": 15.0 * self.loop.record.sample_time}
-        yield (OUTPUT, "coloured"), self._random(Effect(OUTPUT, "coloured", figures))
+        rival = Effect(OUTPUT, "coloured", figures)
+        yield (OUTPUT, "coloured"), self._random(rival, LONGER)
 
     def _searched(self) -> Iterator[tuple[Name, FloatArray, Callable[[FloatArray], Effect]]]:
         """Yield effects whose figures are searched: their grids, and what makes them of a row."""

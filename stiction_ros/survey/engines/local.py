@@ -177,10 +177,10 @@ def _end(worker: _Worker) -> None:
 def _answer(pipe: Connection) -> Assessed | str | None:
     """Return what a worker says; None where it has died."""
     try:
-        answer = pipe.recv()
+        answer: object = pipe.recv()
     except (EOFError, OSError):
         return None
-    assert answer == READY or isinstance(answer, Assessed)
+    assert isinstance(answer, Assessed | str)
     return answer
 
 

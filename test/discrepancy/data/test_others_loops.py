@@ -17,8 +17,8 @@ from stiction_ros.loop.model import PiTuning
 QUICK = GapOptions(quick=True)
 
 
-def answered(seed: int, stem: bool = True) -> Discrepancy:
-    loop = hidden_loop(seed)
+def answered(seed: int, stem: bool = True, given: str = "exact") -> Discrepancy:
+    loop = hidden_loop(seed, given=given)
     record = loop.record if stem else dataclasses.replace(loop.record, stem=None)
     return find_discrepancy(LoopModel.from_mapping(loop.given), [record], QUICK)
 
@@ -36,7 +36,6 @@ def test_noise_of_the_equation_does_not_hide_what_an_effect_closes() -> None:
         ("valve:V1", "lag"),
     }
     assert found.closed > 0.9
-    assert answer.closed < found.closed
 
 
 def test_a_recorded_stem_tells_a_lag_of_the_valve_from_those_behind_it() -> None:
@@ -53,6 +52,26 @@ def test_a_named_effect_of_the_process_is_no_correction_of_the_model() -> None:
     assert names(answer) == [("process:PV1", "delay")]
     assert answer.effects[0].parameters["extra"] == pytest.approx(1.0, abs=0.3)
     assert answer.process_changes == ()
+
+
+def test_a_model_that_is_off_is_mended_before_steps_are_seen_in_it() -> None:
+    answer = answered(240, given="off")  # an open loop that begins the wrong way, little noise
+    assert names(answer) == [("valve:V1", "characteristic")]
+    changed = [change.what for change in answer.process_changes]
+    assert changed == ["gain", "delay", "time_constant", "time_constant", "lead"]
+    loop = hidden_loop(240, given="off")
+    lead = loop.base.plant.lead / loop.known.lead
+    assert answer.process_changes[-1].value == pytest.approx(lead, abs=0.03)
+
+
+def test_no_noise_is_named_that_explains_less_than_a_wave_in_doubt() -> None:
+    answer = answered(220, given="off")  # a triangle of the load with nine periods
+    assert answer.verdict is GapVerdict.AMBIGUOUS
+    assert ("load:V1", "triangle") in answer.alternatives
+
+
+def test_fine_rounding_beside_noise_of_the_equation_is_no_noise_of_its_own() -> None:
+    assert names(answered(700)) == [("disturbance:PV1", "triangle")]
 
 
 @pytest.mark.parametrize(("factor", "other"), [(0.97, False), (0.8, True)])

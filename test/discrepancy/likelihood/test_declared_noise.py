@@ -10,7 +10,12 @@ from gap_loops import loop, record
 from scipy.signal import lfilter
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
-from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag, declared_noise
+from stiction_ros.discrepancy.likelihood.declared_noise import (
+    DeclaredNoise,
+    behind_lag,
+    declared_noise,
+    rounded,
+)
 from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms, whiten
 from stiction_ros.effects import (
     Behaviour,
@@ -59,6 +64,21 @@ def test_noise_beside_a_coloured_disturbance_is_whitened() -> None:
     white = whiten(slow + 0.3 * random.standard_normal(40_000), declared.ar)[100:]
     assert float(np.std(white)) == pytest.approx(declared.std, rel=0.02)
     assert float(np.corrcoef(white[1:], white[:-1])[0, 1]) == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("pole", [0.95, 1.0])
+def test_rounding_is_part_of_the_noise_of_an_equation(pole: float) -> None:
+    random, quantum = np.random.default_rng(2), 1.5
+    a = np.convolve([1.0, -pole], [1.0, -0.8])
+    noise = lfilter([1.0], a, random.standard_normal(40_000))
+    values = noise + quantum * (random.random(40_000) - 0.5)  # rounding, told by its variance
+    shown = rounded(DeclaredNoise(1.0, -a[1:]), quantum)
+    white = whiten(values, shown.ar)[100:]
+    assert float(np.std(white)) == pytest.approx(shown.std, rel=0.02)
+    assert abs(float(white[1:] @ white[:-1])) < 0.02 * float(white @ white)
+    plain = whiten(values, -a[1:])[100:]
+    assert abs(float(plain[1:] @ plain[:-1])) > 0.1 * float(plain @ plain)
+    assert rounded(shown, 0.0) is shown
 
 
 def test_behind_a_lag_noise_has_one_more_pole() -> None:

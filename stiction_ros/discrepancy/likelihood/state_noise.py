@@ -13,8 +13,12 @@ DOUBLINGS = 30
 _TINY = 1e-300
 
 
-def steady_gain(a: FloatArray, q: FloatArray, c: FloatArray, r: float) -> FloatArray | None:
-    """Return Kalman's gain of one-step predictions, shape (n,), by doubling; None without one.
+def steady_gain(
+    a: FloatArray, q: FloatArray, c: FloatArray, r: float
+) -> tuple[FloatArray, float] | None:
+    """Return Kalman's gain, shape (n,), and the variance of what its predictions miss.
+
+    By doubling; None where there is no steady one.
 
     Args:
         a, q: of the states, shape (n, n).
@@ -22,7 +26,7 @@ def steady_gain(a: FloatArray, q: FloatArray, c: FloatArray, r: float) -> FloatA
         r: its variance.
     """
     if not len(a):
-        return np.zeros(0)
+        return np.zeros(0), r
     identity = np.eye(len(a))
     forward, seen, p = a.T.copy(), np.outer(c, c) / r, q.copy()
     for _ in range(DOUBLINGS):
@@ -39,7 +43,8 @@ def steady_gain(a: FloatArray, q: FloatArray, c: FloatArray, r: float) -> FloatA
             return None
         if change <= 1e-10 * float(np.abs(p).max()):
             break
-    return np.asarray(a @ p @ c / (float(c @ p @ c) + r))
+    missed = float(c @ p @ c) + r
+    return np.asarray(a @ p @ c / missed), missed
 
 
 @compiled
