@@ -10,7 +10,15 @@ All weights follow from the identified loop, in units of OP's and PV's own movem
 - the observer's variances of noise and of a wandering load are those of the load's own moves:
   white noise of variance r on a random walk of variance q makes moves of variance q + 2 r of
   which neighbours have the covariance −r;
-- the jumps' margin comes from the intervals of the frictions.
+- the jumps' margin is a share of the half-widths of the frictions' intervals: a jump that is too
+  small costs a sample, one that is too large costs PV every time;
+- stems are believed to move where they should: the slip check judges by the process, and an
+  identified one leaves loads that look like stems that stayed, each of which would raise f_S;
+- a valve with backlash alone has f_S = f_D, half its band, and so no least jump.
+
+The controller answers faster than the loop ever has, and what the process does then is known less
+well than what it did. So it is run on processes that are drawn, too, each with the load with which
+it repeats the record; see :data:`PROCESSES`.
 """
 
 from __future__ import annotations
@@ -22,10 +30,12 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.control import ControlMode, ControlSettings, FrictionSpread, MpcController
+from stiction_ros.control.design import History
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
+from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop import LoopModel
 
 MOVE_SHARE = 2.0
@@ -45,6 +55,18 @@ SETTLED = 0.95
 
 STARTED = 1e-3
 """Share of its largest value from which a step's response has begun."""
+
+MARGIN = 0.3
+"""Share of the half-widths of the frictions' intervals that a jump is larger than it must be."""
+
+PROCESSES = ((1.0, 1.0), (0.8, 1.0), (1.25, 1.0), (1.0, 0.5), (1.0, 1.5))
+"""Factors on gain and dead time of the processes that it is run on."""
+
+PAST = 1000
+"""Samples before a run that the controller takes over, at most."""
+
+FRICTIONS = 3
+"""Drawn frictions that it is run on; all but the first with the process as it was identified."""
 
 LEAST_NOISE = 0.02
 """Standard deviation of the noise that is taken at least, in those of PV."""
@@ -101,10 +123,11 @@ class EmbeddingDesign:
             },
             loop.record.name,
         )
-        friction = HeStiction(estimate.static_friction / scale, estimate.dynamic_friction / scale)
+        static, dynamic = pair_of(estimate)
+        friction = HeStiction(static / scale, dynamic / scale)
         spread = FrictionSpread(
-            0.5 * float(np.ptp(estimate.static_interval)) / scale,
-            0.5 * float(np.ptp(estimate.dynamic_interval)) / scale,
+            0.5 * MARGIN * float(np.ptp(estimate.static_interval)) / scale,
+            0.5 * MARGIN * float(np.ptp(estimate.dynamic_interval)) / scale,
         )
         noise, walk = _variances(loop.load[:, i])
         return cls.by_rule(model, friction, spread, (noise, walk))
@@ -139,6 +162,7 @@ class EmbeddingDesign:
             jump_price=PRICED * noise,
             look_ahead=0,
             kick_limits=(math.inf,),
+            slip_check=False,
         )
         return cls(model, settings, friction, spread)
 
@@ -168,16 +192,28 @@ class EmbeddingDesign:
             "state_noise": settings.state_noise * op,
             "disturbance_noise": settings.disturbance_noise[0] * pv,
             "measurement_noise": settings.measurement_noise[0] * pv,
+            "slip_check": settings.slip_check,
         }
 
 
 class EmbeddingRun:
     """One run of a controller that answers sample by sample, scaled."""
 
-    def __init__(self, design: EmbeddingDesign) -> None:
-        """Begin before the first sample."""
+    def __init__(self, design: EmbeddingDesign, pv: FloatArray, op: FloatArray) -> None:
+        """Take over from the controller that is there, as the live loop does.
+
+        Without the past the observer would learn its state and the stem's from its own kicks, and
+        its slip check would believe in frictions that are none.
+
+        Args:
+            design: of the controller.
+            pv, op: of the samples before the first, shape (K,) each.
+        """
         self.controller = design.controller()
         self._no_dv: FloatArray = np.zeros(0)
+        if len(op):
+            past = History(op[:, None], pv[:, None], np.zeros((len(op), 0)))
+            self.controller.take_over(past)
 
     def __call__(self, pv: float, sp: float, op: float) -> float:
         """Return OP for PV and SP; ``op`` is what was applied before."""
@@ -185,38 +221,49 @@ class EmbeddingRun:
         return float(step.op[0])
 
 
+def pair_of(estimate: ValveEstimate) -> tuple[float, float]:
+    """Return f_S and f_D of a valve as the controller takes them, %."""
+    static, dynamic = estimate.static_friction, estimate.dynamic_friction
+    if estimate.jump > 0.0:
+        return static, dynamic
+    return 0.5 * (static + dynamic), 0.5 * (static + dynamic)
+
+
 def embedded(
-    loop: RecordedLoop, design: EmbeddingDesign, frictions: FloatArray, samples: int
+    loop: RecordedLoop, design: EmbeddingDesign, frictions: FloatArray
 ) -> list[Measures | None]:
-    """Return the measures under the controller, with each friction of the valve.
+    """Return the measures under the controller, on valves and processes that may be the loop's.
 
     Args:
-        loop: whose process and load act.
-        design: of the controller, which keeps the friction of the estimate.
-        frictions: (f_S, f_D) of the valve, %, shape (R, 2).
-        samples: that are run, the last ones of the loop's rows.
+        loop: whose rows are run.
+        design: of the controller, which keeps its friction and its process.
+        frictions: (f_S, f_D) of the valve, %, shape (R, 2), the likeliest first.
+
+    Returns:
+        One entry for each of :data:`PROCESSES` with the first friction, then one for each of the
+        next ones; None for a run that grows without end.
     """
-    return [_embedded(loop, design, pair / loop.op_scale, samples) for pair in frictions]
+    runs = [_embedded(loop.with_process(*one), design, frictions[0]) for one in PROCESSES]
+    return runs + [_embedded(loop, design, pair) for pair in frictions[1:FRICTIONS]]
 
 
-def _embedded(
-    loop: RecordedLoop, design: EmbeddingDesign, friction: FloatArray, samples: int
-) -> Measures | None:
+def _embedded(loop: RecordedLoop, design: EmbeddingDesign, friction: FloatArray) -> Measures | None:
     i, j, process = loop.output, loop.valve, loop.process
-    past = loop.past
+    past, begin = loop.past, loop.rows[0]
+    static, dynamic = (friction / loop.op_scale).tolist()
     a, b, delay = process.a[i], process.b[i, j], int(process.delay[i, j])
-    begin = max(loop.rows[1] - samples, loop.rows[0])
-    rows = np.arange(begin, loop.rows[1])
+    rows = np.arange(*loop.rows)
     load = loop.loop.pv[:, i] - loop.simulated[:, i]
     others = process.bias[i] + _others(loop)
     sp = loop.set_points[:, i]
-    first = loop.rows[0] - past
+    first = begin - past
     y = np.empty(past + len(rows))
     stem = np.empty(past + len(rows))
     y[:past] = loop.simulated[begin - past : begin, i]
     stem[:past] = loop.loop.stem[begin - past : begin, j]
     op, at = float(loop.loop.op[begin - 1, j]), float(stem[past - 1])
-    control = EmbeddingRun(design)
+    whole = slice(max(loop.loop.longest[0], begin - PAST), begin)
+    control = EmbeddingRun(design, loop.loop.pv[whole, i], loop.loop.op[whole, j])
     errors = np.empty(len(rows))
     back_a, back_b = a[::-1].copy(), b[::-1].copy()
     for k, row in enumerate(rows.tolist()):
@@ -228,20 +275,12 @@ def _embedded(
         errors[k] = pv - goal
         op = control(pv, goal, op)
         apart = op - at
-        if abs(apart) > friction[0]:
-            at = op - float(np.copysign(friction[1], apart))
+        if abs(apart) > static:
+            at = op - math.copysign(dynamic, apart)
         stem[now] = at
         if not abs(y[now]) < 1e6:
             return None
-    moved = dataclasses.replace(
-        loop.yardstick, stretches=_within(loop.yardstick.stretches, begin - loop.rows[0])
-    )
-    return moved.measure(loop.pv_scale * errors, loop.op_scale * stem[past:])
-
-
-def _within(stretches: Any, begin: int) -> list[tuple[int, int]]:
-    """Return stretches from row ``begin`` on, counted from there."""
-    return [(max(a - begin, 0), b - begin) for a, b in stretches if b > begin]
+    return loop.yardstick.measure(loop.pv_scale * errors, loop.op_scale * stem[past:])
 
 
 def _others(loop: RecordedLoop) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.draws import DRAWS, SEED, drawn_frictions, drawn_tunings
-from stiction_ros.gain.embedding import EmbeddingDesign, embedded
+from stiction_ros.gain.embedding import EmbeddingDesign, embedded, pair_of
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.gain.retuning import UNCHANGED, best_tuning
@@ -20,13 +20,18 @@ from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import Identification, VerdictKind
 from stiction_ros.records.record import Record
 
-HARDER = (1.0, 1.3, 1.6)
-"""Times the identified friction that the valve has under the embedding controller. The worst of
-these is given: a controller that plans every jump by the friction must also do with one that has
-grown, or was underestimated, before anything is promised of it."""
+AGREED = 0.25
+"""Share of the median by which 5th and 95th percentile of the embedding's runs may lie about it:
+where they lie farther apart the record does not tell what it would bring."""
+
+AGREED_NOW = 0.05
+"""The same as a share of now."""
 
 EMBEDDING_SAMPLES = 1000
-"""Samples of such a run, the last ones."""
+"""Samples of a run of the embedding, the last ones."""
+
+TAKEN_OVER = 200
+"""Samples before it that the controller takes over."""
 
 ENDS = (5.0, 95.0)
 """Percentiles of the draws that are given as interval."""
@@ -60,8 +65,8 @@ class Option:
 
     Attributes:
         what: see :class:`What`.
-        measures: medians of the draws that repeat the record, of the embedding the worst; None
-            where it could not be simulated.
+        measures: medians of the draws that repeat the record; None where it could not be
+            simulated, or where the draws do not agree.
         interval: 5th and 95th percentile of each measure over the draws.
         note: one sentence.
         settings: weights of the embedding, factors of the retuning.
@@ -160,23 +165,18 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
         left = option_of(What.LEAVE, runs, "The loop as it is, simulated.")
         note = f"Not simulated: {_doubt(now, left.measures)}."
         others = [Option(what, None, {}, note) for what in What if what is not What.LEAVE]
-        return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, left))
+        same = Option(What.LEAVE, now, {}, "The loop as it is, as recorded.")
+        return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, same))
     note = f"The loop as it is: {len(kept)} of {DRAWS} drawn loops repeat the record."
     left = option_of(What.LEAVE, [runs[k] for k in kept], note)
     draws = Draws(frictions[kept], draws.tunings[kept])
-    options = (
-        _service(loop, draws, now),
-        _embedding(loop, found),
-        _retune(loop, draws, found),
-        left,
-    )
     assert left.measures is not None
-    return Gain(
-        record.valves[loop.valve],
-        record.outputs[loop.output],
-        now,
-        tuple(option.beside(now, left.measures) for option in options),
+    service, retuned, same = (
+        option.beside(now, left.measures)
+        for option in (_service(loop, draws, now), _retune(loop, draws, found), left)
     )
+    options = (service, _embedding(loop, draws, found), retuned, same)
+    return Gain(record.valves[loop.valve], record.outputs[loop.output], now, options)
 
 
 class Draws(NamedTuple):
@@ -244,23 +244,42 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
     return option_of(What.RETUNE, runs, note, settings)
 
 
-def _embedding(loop: RecordedLoop, found: Identification) -> Option:
+def _embedding(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
+    """Return what the embedding does, in the ratio to what is recorded of the same rows."""
     cause = found.outputs[loop.output].cause
     if not loop.estimate.verdict.has_friction or cause is None or cause.kind is not CauseKind.VALVE:
         note = "The record does not show a valve whose friction makes the loop cycle."
         return Option(What.EMBEDDING, None, {}, f"{note} Nothing is promised of embedding it.")
-    estimate = np.array([loop.estimate.static_friction, loop.estimate.dynamic_friction])
+    part = embedding_part(loop)
+    frictions = np.vstack([pair_of(loop.estimate), draws.frictions[1:]])
     try:
         design = EmbeddingDesign.of(loop)
-        runs = embedded(loop, design, np.outer(HARDER, estimate), EMBEDDING_SAMPLES)
+        runs = embedded(part, design, frictions)
     except InputError as error:
         return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
-    note = "Predictive control that knows the friction; the worst of frictions up to 1.6 times it."
-    if None in runs:
-        return Option(What.EMBEDDING, None, {}, f"{note} The simulated loop grows without end.")
-    worst = max((run for run in runs if run is not None), key=lambda run: run.iae_per_hour)
-    option = option_of(What.EMBEDDING, runs, note, design.weights(loop.pv_scale, loop.op_scale))
-    return dataclasses.replace(option, measures=worst)
+    note = f"Predictive control that knows the friction, on {len(runs)} drawn loops."
+    weights = design.weights(loop.pv_scale, loop.op_scale)
+    option = option_of(What.EMBEDDING, runs, note, weights).beside(loop.now(), part.now())
+    if None in runs or not _agreed(option, loop.now()):
+        note = f"{note} They do not agree: the record does not tell what it would bring."
+        return dataclasses.replace(option, measures=None, note=note)
+    return option
+
+
+def embedding_part(loop: RecordedLoop) -> RecordedLoop:
+    """Return the rows of a loop on which the embedding is run, behind those it takes over."""
+    return loop.last(EMBEDDING_SAMPLES, TAKEN_OVER)
+
+
+def _agreed(option: Option, now: Measures) -> bool:
+    """Tell whether the runs of an option say the same of IAE and amplitude."""
+    for key in ("iae_per_hour", "amplitude"):
+        if key in option.interval and option.measures is not None:
+            low, high = option.interval[key]
+            room = max(AGREED * getattr(option.measures, key), AGREED_NOW * getattr(now, key))
+            if high - low > 2.0 * room:
+                return False
+    return option.measures is not None
 
 
 def option_of(

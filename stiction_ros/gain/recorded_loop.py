@@ -171,6 +171,48 @@ class RecordedLoop:
         stem = self.loop.stem[rows, self.valve]
         return self.yardstick.measure(self.pv_scale * error, self.op_scale * stem)
 
+    def last(self, samples: int, past: int) -> RecordedLoop:
+        """Return the loop with no more than its last ``samples`` rows.
+
+        Args:
+            samples: rows that are kept, at most.
+            past: rows of the longest stretch that are before them, as far as a third of it goes.
+        """
+        first, last = self.loop.longest
+        ahead = first + min(past, (last - first) // 3)
+        return self._from(max(self.rows[0], last - samples, ahead))
+
+    def with_process(self, gain: float, dead_time: float) -> RecordedLoop:
+        """Return the loop with another process; what that leaves of PV is its load.
+
+        So it repeats the record as well. Rows that it has no past for are left out.
+
+        Args:
+            gain: factor on what the valve does.
+            dead_time: factor on its dead time; other than 1 it makes a sample at least, as far as
+                there is any.
+        """
+        process = self.process
+        i, j = self.output, self.valve
+        b, delay = process.b.copy(), process.delay.copy()
+        b[i, j] *= gain
+        known = int(delay[i, j])
+        change = max(round(abs(dead_time - 1.0) * known), 1) if dead_time != 1.0 else 0
+        delay[i, j] = max(known + (change if dead_time > 1.0 else -change), 0)
+        process = process._replace(b=b, delay=delay)
+        simulated = free_run(process, self.loop, self.loop.stem)
+        other = dataclasses.replace(self, process=process, simulated=simulated)
+        return other._from(max(self.rows[0], other.past))
+
+    def _from(self, row: int) -> RecordedLoop:
+        """Return the loop from a row on."""
+        ahead = row - self.rows[0]
+        stretches = [(max(a - ahead, 0), b - ahead) for a, b in self.yardstick.stretches]
+        yardstick = dataclasses.replace(
+            self.yardstick, stretches=[(a, b) for a, b in stretches if b > 0]
+        )
+        return dataclasses.replace(self, rows=(row, self.rows[1]), yardstick=yardstick)
+
     def run(self, frictions: FloatArray, tunings: FloatArray) -> list[Measures | None]:
         """Return the measures of the loop with another friction or tuning of the valve.
 

@@ -64,6 +64,8 @@ sub { font-size: 0.72em; line-height: 0; }
 .warn { border-left: 5px solid var(--bad); background: var(--panel); padding: 10px 14px;
   border-radius: 6px; }
 footer { margin-top: 56px; color: var(--soft); font-size: 0.85rem; }
+@media screen and (prefers-color-scheme: dark) {
+  figure img { filter: invert(0.91) hue-rotate(180deg); } }
 @media (max-width: 640px) { figure img { width: 640px; } }
 @media print { main { padding: 0; max-width: none; } figure { break-inside: avoid; } }
 </style>

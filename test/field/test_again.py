@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from stiction_ros.field import ValveKind
-from stiction_ros.field.counterfactual.again import Again
+from stiction_ros.field.counterfactual.again import Again, Control
+from stiction_ros.field.kernels import FloatArray
 from stiction_ros.field.simulation import run
 from stiction_ros.field.valves import Law
 
@@ -44,10 +45,31 @@ def test_a_controller_that_repeats_op_repeats_the_loop(again: Again) -> None:
     made = again.made
     out = run(made.loop, made.signals)
     op = iter((again.factor * out.op + again.offset)[made.warm :: made.loop.clock.sample])
-    repeated = again.controlled(lambda pv, sp, last: float(next(op)))
+    repeated = again.controlled(lambda past, ops: lambda pv, sp, last: float(next(op)))
     recorded = again.as_recorded()
     assert repeated.stem == pytest.approx(recorded.stem, abs=1e-6)
     assert repeated.error == pytest.approx(recorded.error, abs=1e-6 * np.ptp(recorded.error))
+
+
+def test_a_controller_takes_over_at_a_row_what_has_been_so_far(again: Again) -> None:
+    row, made = 150, again.made
+    out = run(made.loop, made.signals)
+    step = made.loop.clock.sample
+    begun = made.warm + int(again.samples[row]) * step
+    op = iter((again.factor * out.op + again.offset)[begun::step])
+    taken = []
+
+    def take_over(pv: FloatArray, ops: FloatArray) -> Control:
+        taken.append((pv, ops))
+        return lambda pv, sp, last: float(next(op))
+
+    repeated, recorded = again.controlled(take_over, row), again.as_recorded()
+    assert repeated.stem == pytest.approx(recorded.stem, abs=1e-6)
+    assert repeated.error == pytest.approx(recorded.error, abs=1e-6 * np.ptp(recorded.error))
+    ((pv, ops),) = taken
+    assert pv[-1] == out.pv[begun - step]
+    assert ops[-1] == again.factor * out.op[begun - step] + again.offset
+    assert len(pv) == len(ops) >= row
 
 
 def test_a_serviced_valve_follows_and_the_loop_does_better(again: Again) -> None:

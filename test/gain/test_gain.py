@@ -7,8 +7,10 @@ import pytest
 
 from stiction_ros.errors import InputError
 from stiction_ros.gain.draws import drawn_frictions
-from stiction_ros.gain.gain import Gain, What, gain_of
+from stiction_ros.gain.embedding import PROCESSES, EmbeddingDesign, embedded, pair_of
+from stiction_ros.gain.gain import AGREED, Gain, What, embedding_part, gain_of
 from stiction_ros.gain.model_gain import gain_of_model
+from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.gain.stems import stems_of
 from stiction_ros.identification import Identification, IdentificationOptions, VerdictKind, identify
 from stiction_ros.loop import LoopModel
@@ -92,6 +94,15 @@ def test_leaving_the_loop_is_now(gain: Gain) -> None:
         assert value == pytest.approx(getattr(gain.now, key))
 
 
+def test_leaving_a_loop_that_is_not_repeated_is_now_too(
+    record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiction_ros.gain.gain.REPEATS", -1.0)
+    unlike = gain_of(record, found)
+    assert unlike.option(What.LEAVE).measures == unlike.now
+    assert unlike.option(What.SERVICE).measures is None
+
+
 def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
     document = gain.to_json()
     assert [option["what"] for option in document["options"]] == [
@@ -101,10 +112,56 @@ def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
         "leave",
     ]
     for option in document["options"]:
-        assert option["iae_per_hour"] is not None
         low, high = option["interval"]["iae_per_hour"]
         assert low <= high
+        if option["what"] != "embedding":
+            assert option["iae_per_hour"] is not None
     assert document["options"][1]["settings"]["embedding_move_weights"] > 0.0
+
+
+def test_the_embedding_takes_over_and_does_not_rest_off_its_place(
+    record: Record, found: Identification, gain: Gain
+) -> None:
+    """Begun cold, its slip check believed in a larger friction and the stem never moved again."""
+    loop = RecordedLoop.of(record, found)
+    part = embedding_part(loop)
+    now = part.now().iae_per_hour
+    runs = embedded(part, EmbeddingDesign.of(loop), np.array([pair_of(loop.estimate)]))
+    assert len(runs) == len(PROCESSES)
+    for run in runs:
+        assert run is not None
+        assert run.iae_per_hour < 0.6 * now
+    interval = gain.option(What.EMBEDDING).interval["iae_per_hour"]
+    assert interval[1] < 0.6 * gain.now.iae_per_hour
+
+
+def test_what_drawn_loops_do_not_agree_on_has_no_figures(gain: Gain) -> None:
+    option = gain.option(What.EMBEDDING)
+    low, high = option.interval["iae_per_hour"]
+    wide = high - low > AGREED * (high + low)
+    assert (option.measures is None) == ("do not agree" in option.note)
+    if wide:
+        assert option.measures is None
+
+
+def test_another_process_repeats_the_record_with_its_own_load(
+    record: Record, found: Identification
+) -> None:
+    loop = RecordedLoop.of(record, found)
+    other = loop.with_process(1.25, 1.5)
+    assert other.process.delay[0, 0] == loop.process.delay[0, 0] + 1
+    assert np.allclose(other.process.b, 1.25 * loop.process.b)
+    rows = slice(*other.rows)
+    repeated = other.simulated[rows] + other.load[other.past :]
+    assert np.allclose(repeated, other.loop.pv[rows])
+    assert other.with_process(1.0, 0.5).process.delay[0, 0] == loop.process.delay[0, 0]
+
+
+def test_backlash_is_planned_without_a_least_jump(found: Identification) -> None:
+    valve = found.valves[0]
+    assert pair_of(valve) == (valve.static_friction, valve.dynamic_friction)
+    static, dynamic = pair_of(dataclasses.replace(valve, jump=0.0))
+    assert static == dynamic == 0.5 * (valve.static_friction + valve.dynamic_friction)
 
 
 def test_the_same_record_gives_the_same_answer(

@@ -18,6 +18,12 @@ from stiction_ros.field.simulation import Loop, Signals, run
 Control = Callable[[float, float, float], float]
 """PV, SP and the OP of the sample before, in the units of the record, to the OP from now on."""
 
+TakeOver = Callable[[FloatArray, FloatArray], Control]
+"""PV and OP of the samples so far, shape (K,), in the units of the record, to the controller."""
+
+PAST = 1000
+"""Samples that another controller may take over, at most."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Sampled:
@@ -77,15 +83,19 @@ class Again:
         law = dataclasses.replace(law.scaled(gain), integral=law.integral * integral)
         return self._run(dataclasses.replace(self.made.loop, controller=law))
 
-    def controlled(self, control: Control) -> Sampled:
-        """Return the run under another controller that moves OP at the samples of the record.
+    def controlled(self, take_over: TakeOver, after: int = 0) -> Sampled:
+        """Return the run in which another controller moves OP at the samples of the record.
 
-        Before the record begins, and until its first sample, the loop's own controller acts.
+        Args:
+            take_over: makes it from what has been so far.
+            after: row of the record from which on it acts; the loop's own controller does before.
         """
         loop, signals, clock = self.made.loop, self.made.signals, self.made.loop.clock
-        begun = self.made.warm
+        begun = self.made.warm + int(self.samples[after]) * clock.sample
         before = run(loop, _until(signals, begun))
         state, stems, op = before.state, before.stem, float(before.op[-1])
+        so_far = slice(max(begun - PAST * clock.sample, begun % clock.sample), begun, clock.sample)
+        control = take_over(before.pv[so_far].copy(), self.factor * before.op[so_far] + self.offset)
         dead = round(loop.process.dead_time / clock.step)
         waiting = np.full(dead + 1, stems[-1])
         known = stems[-(dead + 1) :]
@@ -94,8 +104,10 @@ class Again:
         cycle = max(1, round(loop.process.cycle / clock.step))
         stem_state = loop.valve.rest(float(stems[-1]))
         clean = float(kernels.plant_output(loop.process.code, state))
-        shown = clean
-        errors, positions = [], []
+        shown = float(before.pv[-1])
+        done = slice(self.made.warm, begun, clock.sample)
+        errors = (before.pv - signals.set_point[:begun])[done].tolist()
+        positions = (self.factor * stems[done] + self.offset).tolist()
         last = self.factor * op + self.offset
         for k in range(begun, len(signals.load), clock.sample):
             due = k - k % cycle

@@ -227,7 +227,8 @@ def _legend(costs: bool) -> str:
     return (
         "<h2>How to read it</h2><p>Valves that stick or have backlash and make their loop cycle "
         "come first, those that are surest and lose most of OP's movement in their band at the "
-        f"top.{money} <i>After service</i>, <i>embedding</i> and <i>retuned</i> are what of the "
+        "top. Undecided ones follow in the order of what speaks for their friction."
+        f"{money} <i>After service</i>, <i>embedding</i> and <i>retuned</i> are what of the "
         "IAE of now is left, simulated; the pages of the loops have all figures with their "
         "intervals.</p>"
     )

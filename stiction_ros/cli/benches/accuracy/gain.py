@@ -14,10 +14,11 @@ from rich.table import Table
 from stiction_ros.cli.benches.accuracy.field import FIRST, FOUND, LAST
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.runs.seeds import run_seeds
+from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.field.counterfactual.again import Again, Sampled
+from stiction_ros.field.counterfactual.again import Again, Control, Sampled, TakeOver
 from stiction_ros.gain.embedding import EmbeddingDesign, EmbeddingRun
-from stiction_ros.gain.gain import Gain, What, gain_of
+from stiction_ros.gain.gain import Gain, What, embedding_part, gain_of
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.identification import identify
@@ -86,16 +87,24 @@ def judge(seed: int) -> Judged:
     def measured(run: Sampled) -> Measures:
         return loop.yardstick.measure(run.error[rows], run.stem[rows])
 
-    now = measured(again.as_recorded())
+    recorded = again.as_recorded()
+    now = measured(recorded)
     true = {What.LEAVE: now, What.SERVICE: measured(again.serviced())}
     factors = gain.option(What.RETUNE).settings
     if factors:
         true[What.RETUNE] = measured(
             again.retuned(factors["gain_factor"], factors["integral_time_factor"])
         )
-    if gain.option(What.EMBEDDING).measures is not None:
-        true[What.EMBEDDING] = measured(again.controlled(_embedding(loop)))
     promises = _promises(gain, true, now)
+    if gain.option(What.EMBEDDING).measures is not None:
+        part = embedding_part(loop)
+        late = _rows(again, part)
+
+        def behind(run: Sampled) -> Measures:
+            return part.yardstick.measure(run.error[late], run.stem[late])
+
+        came = behind(again.controlled(_embedding(loop), late.start))
+        promises += _promises(gain, {What.EMBEDDING: came}, behind(recorded))
     note = "" if promises else gain.option(What.SERVICE).note
     return Judged(seed, valve, verdict, promises, note)
 
@@ -108,20 +117,28 @@ def _rows(again: Again, loop: RecordedLoop) -> slice:
     return slice(first + loop.rows[0], first + loop.rows[1])
 
 
-def _embedding(loop: RecordedLoop) -> Any:
-    """Return the controller between the signals of the record."""
-    run = EmbeddingRun(EmbeddingDesign.of(loop))
+def _embedding(loop: RecordedLoop) -> TakeOver:
+    """Return what makes the controller between the signals of the record."""
     scales, j, i = loop.loop, loop.valve, loop.output
     op_mean, pv_mean = float(scales.op_mean[j]), float(scales.pv_mean[i])
     known = loop.record.sp is not None
     rest = float(loop.law.set_point[loop.rows[0]])
 
-    def control(pv: float, sp: float, op: float) -> float:
-        goal = (sp - pv_mean) / loop.pv_scale if known else rest
-        at = run((pv - pv_mean) / loop.pv_scale, goal, (op - op_mean) / loop.op_scale)
-        return at * loop.op_scale + op_mean
+    def take_over(pasts: FloatArray, ops: FloatArray) -> Control:
+        run = EmbeddingRun(
+            EmbeddingDesign.of(loop),
+            (pasts - pv_mean) / loop.pv_scale,
+            (ops - op_mean) / loop.op_scale,
+        )
 
-    return control
+        def control(pv: float, sp: float, op: float) -> float:
+            goal = (sp - pv_mean) / loop.pv_scale if known else rest
+            at = run((pv - pv_mean) / loop.pv_scale, goal, (op - op_mean) / loop.op_scale)
+            return at * loop.op_scale + op_mean
+
+        return control
+
+    return take_over
 
 
 def _promises(gain: Gain, true: dict[What, Measures], now: Measures) -> tuple[Promise, ...]:
