@@ -28,6 +28,8 @@ SAMPLES = 640
 OFFSET_SAMPLES = 50
 LATE_SAMPLES = 60  # end of every hold in which a valve that still turns is cycling
 
+TANK = "tank.scenario.yaml"
+
 TRUE = {"V1": HeStiction(8.0, 1.0)}
 SECOND = {**TRUE, "V2": HeStiction(5.0, 1.0)}
 
@@ -112,7 +114,7 @@ class ControlOutcome:
 
 def run_unaware(case: ControlCase, seed: int) -> ControlOutcome:
     """Run the controller that does not know of the friction on the plant of ``case``."""
-    scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    scenario = Scenario.load(find_config(TANK))
     true = {k: [v] for k, v in case.true.items()}
     return _run(case, scenario, scenario.process, true, seed, {"mode": "unaware"})
 
@@ -127,7 +129,7 @@ def run_case(
         seed: of the noise.
         settings: changes to the scenario's controller settings.
     """
-    scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    scenario = Scenario.load(find_config(TANK))
     model = scenario.process.with_valve_effects({k: [v] for k, v in case.known.items()})
     true = {k: [v] for k, v in case.true.items()}
     return _run(case, scenario, model, true, seed, {**case.settings, **(settings or {})})
@@ -135,7 +137,7 @@ def run_case(
 
 def run_reference(case: ControlCase, seed: int) -> ControlOutcome:
     """Run the unaware controller on the plant of ``case`` with ideal valves."""
-    scenario = Scenario.load(find_config("tank.scenario.yaml"))
+    scenario = Scenario.load(find_config(TANK))
     settings: dict[str, object] = {"mode": "unaware"}
     if case.own_weights:
         laws = tuple(case.known.get(name) for name in scenario.process.valve_names)

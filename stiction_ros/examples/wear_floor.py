@@ -1,4 +1,4 @@
-r"""The least IAE of the tank's C that so many moves of valve 1 can buy, whatever the controller.
+r"""The least IAE of the tank that so many moves of a valve can buy, whatever the controller.
 
 Only the stem of valve 1 moves C, by
 
@@ -10,9 +10,18 @@ in which a stem may go anywhere that is the quickest, and a third move makes it 
 jump is at least J. The plant is known exactly, there is neither noise nor a limit of a kick, and a
 set-point is not known before it moves. Levels are those of all set-points and ``LEVELS`` more, so
 the floor is good to their distance. The moves are distributed over the run so that they buy most.
+
+Where valve 2 sticks as well the same is asked of T,
+
+.. math:: V \dot T = K_1 \chi_1 (T_A - T) + F_B (T_B - T) + K_2 \chi_2 \lambda / (\rho c_p),
+
+beside a valve 1 that rests where C's set-point wants it from the sample at which that moves. As it
+moves T on its way, valve 2 may also stay until T comes to its goal by itself, and rest then (1).
 """
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
@@ -26,6 +35,7 @@ from stiction_ros.processes.stirred_tank import StirredTank, TankParameters
 STEMS = np.linspace(0.0, 100.0, 201)  # %, tried for a stem on its way
 LONGEST = 30  # samples that it may stay there
 LEVELS = 12
+RESTS = 3 * LONGEST  # samples after whose first third T comes to rest
 
 
 def least_iae(scenario: Scenario, seed: int, least_jump: float) -> FloatArray:
@@ -48,7 +58,21 @@ def least_iae(scenario: Scenario, seed: int, least_jump: float) -> FloatArray:
     schedule, samples = schedule_of(scenario, seed)
     times = np.arange(samples) * scenario.plant.sample_time
     wanted = np.array([schedule.at(time)[0] for time in times])
-    minutes = scenario.plant.sample_time / 60.0
+    return floor_of(process, wanted, least_jump)
+
+
+def floor_of(process: StirredTank, wanted: FloatArray, least_jump: float) -> FloatArray:
+    """Return the least IAE of C, PV · h, with 0, 1, 2 … moves of valve 1.
+
+    Args:
+        process: the tank, at rest at the first set-point.
+        wanted: set-point of C at each sample, shape (N,).
+        least_jump: J of valve 1, %.
+
+    Returns:
+        Shape (2 n + 1,) for n stretches between moves of the set-point, never rising.
+    """
+    minutes = process.sample_time / 60.0
     stretches = holds(wanted[:, None])
     goals = [float(wanted[begin]) for begin, _ in stretches]
     levels = np.unique([*goals, *np.linspace(min(goals), max(goals), LEVELS)])
@@ -59,6 +83,128 @@ def least_iae(scenario: Scenario, seed: int, least_jump: float) -> FloatArray:
         found = step.onwards(found)
     least = np.minimum.accumulate(found.min(axis=0))
     return np.asarray(least * minutes / 60.0)
+
+
+def least_iae_beside(process: StirredTank, wanted: FloatArray, least_jump: float) -> FloatArray:
+    """Return the least IAE of T, °C · h, with 0, 1, 2 … moves of valve 2.
+
+    Args:
+        process: the tank, at rest at the first set-points.
+        wanted: set-points of C and T at each sample, shape (N, 2).
+        least_jump: J of valve 2, %.
+
+    Returns:
+        Shape (2 n + 1,) for n moves of a set-point, never rising.
+
+    Raises:
+        InputError: two of these moves are so near that T does not come to rest between them.
+    """
+    tank, minutes = process.parameters, process.sample_time / 60.0
+    stretches = holds(wanted)
+    if min((end - begin for begin, end in stretches[1:]), default=RESTS) < RESTS:
+        raise InputError(f"set-points must stay for {RESTS} samples", where="the floor of T")
+    goals = [tuple(wanted[begin].tolist()) for begin, _ in stretches]
+    heats = [_Heat.of(tank, concentration, minutes) for concentration, _ in goals]
+    rests = [heat.rest(goal) for heat, (_, goal) in zip(heats, goals, strict=True)]
+    stems = np.unique([*rests, *np.linspace(min(rests), max(rests), LEVELS)])
+    found = np.full((len(stems), 1), np.inf)
+    found[np.searchsorted(stems, rests[0]), 0] = 0.0
+    before = heats[0]
+    later = zip(heats, goals, stretches, strict=True)
+    next(later)  # at rest, and nobody knows what will be wanted
+    for heat, (_, goal), (begin, end) in later:
+        none, one, two = heat.costs(before.ends(stems), stems, goal, end - begin, least_jump)
+        count = found.shape[1]
+        after = np.full((len(stems), count + 2), np.inf)
+        after[:, :count] = found + none[:, None]
+        for moves, cost in ((1, one), (2, two)):
+            there = (found[:, None, :] + cost[:, :, None]).min(axis=0)
+            rows = slice(moves, count + moves)
+            after[:, rows] = np.minimum(after[:, rows], there)
+        found, before = after, heat
+    least = np.minimum.accumulate(found.min(axis=0))
+    return np.asarray(least * minutes / 60.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Heat:
+    """T while valve 1 rests.
+
+    Attributes:
+        fading: of a deviation, from one sample to the next.
+        cold: T at rest with valve 2 shut, °C.
+        gain: °C of rest per % of valve 2.
+    """
+
+    fading: float
+    cold: float
+    gain: float
+
+    @classmethod
+    def of(cls, tank: TankParameters, concentration: float, minutes: float) -> _Heat:
+        """Return it for the stem of valve 1 at which C rests at ``concentration``."""
+        inflow = tank.flow_a_max * _rest(tank, concentration) / 100.0
+        through = inflow + tank.flow_b
+        cold = (inflow * tank.temperature_a + tank.flow_b * tank.temperature_b) / through
+        heat = tank.steam_max / 100.0 * tank.latent_heat / (tank.density * tank.heat_capacity)
+        return cls(float(np.exp(-through / tank.volume * minutes)), cold, heat / through)
+
+    def rest(self, temperature: float) -> float:
+        """Return the stem of valve 2 at which T rests, %."""
+        return (temperature - self.cold) / self.gain
+
+    def ends(self, stems: FloatArray) -> FloatArray:
+        """Return T at rest with valve 2 at ``stems``."""
+        return self.cold + self.gain * stems
+
+    def costs(
+        self, start: FloatArray, stems: FloatArray, goal: float, length: int, jump: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return Σ|T − goal| over ``length`` samples without a move, with one and with two.
+
+        Args:
+            start: T at the begin, with valve 2 at each of ``stems``, shape (L,).
+            stems: at which it may rest, shape (L,).
+            goal: set-point of T.
+            length: samples.
+            jump: J of valve 2, %.
+
+        Returns:
+            Shape (L,), then from each stem to each, (L, L), twice.
+        """
+        first = np.concatenate([stems, STEMS])
+        waits = np.arange(LONGEST + 1.0)
+        away = self.ends(first) - goal
+        apart = start[:, None] - self.ends(first)[None, :]
+        paid = self._sums(away[None, :, None], apart[:, :, None], waits)
+        there = self.ends(first)[None, :, None] + apart[:, :, None] * self.fading**waits
+        own = np.arange(len(stems))
+        none = self._sums(away[own], apart[own, own], np.array(float(length)))
+        one, two = (np.full((len(stems), len(stems)), np.inf) for _ in range(2))
+        begun = np.abs(first[None, :] - stems[:, None]) >= jump
+        for place, stem in enumerate(stems):
+            end = float(self.ends(stem))
+            rest = self._sums(np.array(end - goal), there - end, length - waits)
+            cost = (paid + rest).min(axis=2)
+            allowed = np.abs(first - stem) >= jump
+            one[:, place] = np.where(allowed[own], cost[own, own], np.inf)
+            two[:, place] = np.where(begun & allowed, cost, np.inf).min(axis=1)
+        return none, one, two
+
+    def _sums(self, away: FloatArray, apart: FloatArray, counts: FloatArray) -> FloatArray:
+        """Return Σ|away + apart · fading^k| over k < counts; the arrays are broadcast."""
+        fading = self.fading
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossing = np.ceil(np.log(-away / apart) / np.log(fading))
+        crosses = away * (away + apart) < 0.0
+        crossing = np.where(crosses, np.clip(np.nan_to_num(crossing), 0.0, counts), 0.0)
+
+        def sums(terms: FloatArray) -> FloatArray:
+            faded = (1.0 - fading**terms) / (1.0 - fading)
+            return np.asarray(away * terms + apart * faded)
+
+        until = sums(crossing)
+        return np.asarray(np.abs(until) + np.abs(sums(np.asarray(counts)) - until))
 
 
 class _Stretch:

@@ -18,7 +18,8 @@ from stiction_ros.faults.loop.setting_up import HAND_OVER, SETTLING, WARM_UP
 
 START = 90.0  # s until the first samples; a first start compiles
 SWAP = 20.0  # s until the controller has taken the prepared model
-QUIET = 6.0  # s until what the start has brought is no longer shown
+AGAIN = 5.0  # s after which it is offered again
+QUIET = 20.0  # s until what the start has brought is no longer shown, at most
 LOOK = 2.5  # s that every loop is looked at after its fault, at least
 ENDING = 30.0  # s until a node that was killed is no longer seen in the graph
 AWARE = ("embedding", "inversion")
@@ -163,11 +164,12 @@ class _Watched:
         loop = self._loop
         taken = loop.heard("pv")
         loop.wait_until(lambda: len(taken) >= HAND_OVER + WARM_UP, START)
-        loop.offer(loop.model)
-        if not loop.wait_until(lambda: loop.known.mode in AWARE or self._ended(), SWAP):
-            loop.remark(f"the prepared model was not taken within {SWAP:g} s")
-            return False
-        return loop.wait_samples(SETTLING)
+        for _ in range(round(SWAP / AGAIN)):  # a controller that came late knows too little yet
+            loop.offer(loop.model)
+            if loop.wait_until(lambda: loop.known.mode in AWARE or self._ended(), AGAIN):
+                return loop.wait_samples(SETTLING)
+        loop.remark(f"the prepared model was not taken within {SWAP:g} s")
+        return False
 
     def _quiet(self) -> bool:
         now = time.monotonic()

@@ -152,6 +152,7 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
         travel_per_hour=work.travel / hours,
         reversals_per_hour=work.reversals / hours,
         confidence=confidence(valve, kind, round(work.reversals)),
+        evidence=valve["evidence"],
         notes=notes,
         beats=_beats(record, outputs.index(output), cycling),
     )

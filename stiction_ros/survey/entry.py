@@ -51,6 +51,7 @@ class Entry:
         travel_per_hour, reversals_per_hour: of the stem, as recorded.
         gain: measures now and by option, as ``stiction gain`` gives them.
         confidence: in the verdict, 0 to 1, see :mod:`.ranking`.
+        evidence: figures behind the verdict by name, as in ``identify --json``.
         cost_per_hour: what the cycle costs, where a cost was given.
         rank: place in the list, from 1.
         group: number of the group of loops that cycle together, from 1.
@@ -80,6 +81,7 @@ class Entry:
     reversals_per_hour: float | None = None
     gain: Mapping[str, Any] | None = None
     confidence: float | None = None
+    evidence: Mapping[str, float] = dataclasses.field(default_factory=dict)
     cost_per_hour: float | None = None
     rank: int | None = None
     group: int | None = None

@@ -16,6 +16,12 @@ point, .5 for an interval as wide as twice its middle), how often it was seen (n
 that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees
 (1 where it says the valve is the cause, .8 where it does not tell, .6 where it names another
 one), and the share of the rates and halves of the record that agree.
+
+A valve that is *undecided* shows friction, and something speaks against believing it. Among these
+confidence is the product of: friction's gain in evidence (g/(g + 7.5) for a gain of g, ln units; an
+even chance at the price that a believed friction must gain), the share of rates and halves that
+agree, whether the loop closed again with this friction moves as recorded (else .01), and how much
+of its movement goes away without it ((.3 + share)/1.3). All together are at most .3.
 """
 
 from __future__ import annotations
@@ -43,6 +49,19 @@ HEALTHY = 0.9
 HALF_SEEN = 3.0
 """Reversals of the stem from which a friction is half believed."""
 
+PRICE = 15.0
+"""−2 log likelihood that a believed friction must gain, and at which a gain counts half."""
+
+ALIKE = (0.2, 1.7)
+"""Movement over the recorded one of a loop that is closed again and moves as recorded."""
+
+OTHERWISE = 0.01
+"""Factor where it moves otherwise."""
+
+KEPT = 0.3
+"""What the share that goes away without the friction begins from: little of it is no proof that
+there is none."""
+
 
 def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> float:
     """Return the confidence in a verdict, 0 to 1.
@@ -55,13 +74,25 @@ def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> f
     stability = valve.get("stability")
     steady = len(stability["agreed"]) / len(stability["tried"]) if stability else 1.0
     if valve["verdict"] == "undecided":
-        return OPEN * steady
+        return OPEN * _shown(valve)
     if valve["verdict"] == "healthy":
         return HEALTHY * steady
     low, high = valve["f_s_interval"]
     known = 1.0 / (1.0 + (high - low) / max(high + low, 1e-12))
     seen = reversals / (reversals + HALF_SEEN)
     return float(known) * seen * AGREES.get(cause or "unknown", DISAGREES) * steady
+
+
+def _shown(valve: Mapping[str, Any]) -> float:
+    """Return how much speaks for the friction of an undecided valve, 0 to 1."""
+    told, stability = valve.get("evidence", {}), valve.get("stability")
+    agreed = len(stability["agreed"]) + 1 if stability else 1
+    steady = agreed / (len(stability["tried"]) + 1 if stability else 1)
+    gain = max(told.get("delta_bic", -PRICE) + PRICE, 0.0)
+    low, high = ALIKE
+    alike = 1.0 if low < told.get("moved_with", 1.0) < high else OTHERWISE
+    gone = (KEPT + told.get("loop_gone", 0.0)) / (KEPT + 1.0)
+    return float(gain / (gain + PRICE) * alike * gone * steady)
 
 
 def kind(entry: Entry) -> int:

@@ -18,6 +18,8 @@ from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state
 from stiction_ros.online.health import Noticed
 
+SOON = 10.0  # s, on a machine that is busy; else it takes three at most
+
 
 @pytest.fixture(autouse=True)
 def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,7 +149,7 @@ def test_a_loop_that_stops_is_an_error_until_it_goes_on(graph: Graph) -> None:
     loop.show([1, 2])
     begin = time.monotonic()
     loop.says(b"\x02", "no pv")
-    assert time.monotonic() - begin < 3.0
+    assert time.monotonic() - begin < SOON
     shown = [2]
 
     def over() -> bool:

@@ -29,6 +29,7 @@ from stiction_ros.records.bag.run_metadata import run_metadata
 from stiction_ros.records.run.log import read_run
 
 PATIENCE = 120.0
+SOON = 10.0  # s, on a machine that is busy
 TOPICS = ("clock", "pv", "sp", "op", "stem", "stiction", "loop_model", "mode", "prediction")
 
 
@@ -213,7 +214,7 @@ def test_a_partner_that_was_killed_ends_a_run_in_lockstep_soon_with_a_sentence(t
         controller.kill()
         begin = time.monotonic()
         wait_until(lambda: processes._processes["plant"].poll() is not None)
-        assert time.monotonic() - begin < LEASE + 3.0
+        assert time.monotonic() - begin < LEASE + SOON
         wait_until(lambda: processes._processes["estimator"].poll() is not None)
     finally:
         processes.stop()

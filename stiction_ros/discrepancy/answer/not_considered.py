@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck, ControllerStatus
 from stiction_ros.discrepancy.data.gate import SHOWN
-from stiction_ros.effects import Behaviour, Offset, Stiction, TimeShift, Tuning, behaviours
+from stiction_ros.effects import Behaviour, Offset, TimeShift, Tuning, behaviours
 
 ALONE = (
     "samples of {name} that stand alone, {count} of them, were left out before the search: what "
@@ -93,8 +93,6 @@ def _reason(kind: type[Behaviour], candidates: Sequence[Candidate]) -> str:
     if kind.absorbed and not any(c.absorbed for c in candidates):
         return ABSORBED
     said = kind.not_searched
-    if said == Stiction.not_searched and _of_ones_own(kind):
-        said = Behaviour.not_searched  # what is said of the laws here does not hold for it
     plain = said == Behaviour.not_searched
     return NO_ROOM if plain and _has_candidate(kind) else said
 

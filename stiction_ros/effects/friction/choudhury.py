@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction.moving_rules import SlopeRules
-from stiction_ros.effects.friction.parameters import SlipJumpPair
+from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
 from stiction_ros.effects.friction.switching import MovingCells, Switching
 
 MOVING = -1.0  # a threshold that every |u − x_ss| exceeds
@@ -48,6 +48,7 @@ class ChoudhuryStiction(SlipJumpPair):
     """
 
     law: ClassVar[str | None] = "choudhury"
+    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching | None] = MovingCells(SlopeRules)
 
     def rest(self, value: float) -> Memory:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction.jump_form import JumpForm
-from stiction_ros.effects.friction.parameters import FrictionPair
+from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
 from stiction_ros.effects.friction.switching import SlipCells, Switching
 
 
@@ -39,6 +39,7 @@ class HeStiction(FrictionPair):
     """
 
     law: ClassVar[str | None] = "he"
+    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching | None] = SlipCells()
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory
 from stiction_ros.effects.friction.jump_form import JumpForm
 from stiction_ros.effects.friction.moving_rules import FollowingRules
-from stiction_ros.effects.friction.parameters import SlipJumpPair
+from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
 from stiction_ros.effects.friction.switching import MovingCells, Switching
 
 
@@ -44,6 +44,7 @@ class KanoStiction(SlipJumpPair):
     """
 
     law: ClassVar[str | None] = "kano"
+    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching | None] = MovingCells(FollowingRules)
 
     def rest(self, value: float) -> Memory:

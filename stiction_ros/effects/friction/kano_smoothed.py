@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, parameter
-from stiction_ros.effects.friction.parameters import SlipJumpPair
+from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
 
 REST = 10.0  # OP that moves by less than REST / τ in a sample rests
 
@@ -44,6 +44,7 @@ class SmoothedKanoStiction(SlipJumpPair):
     """
 
     law: ClassVar[str | None] = "kano_smoothed"
+    not_searched: ClassVar[str] = NOT_SEARCHED
     not_identified: ClassVar[str] = (
         "its smoothed switches are for optimisers, its signature is that of kano"
     )

@@ -24,6 +24,8 @@ from stiction_ros.effects.friction.switching import Switching
 from stiction_ros.effects.seen import Seen
 from stiction_ros.errors import InputError
 
+NOT_SEARCHED = "stiction is searched by the laws he and xch"  # what the laws here say to the gap
+
 
 @runtime_checkable
 class FrictionLaw(SimulatesGrid, Protocol):
@@ -87,7 +89,6 @@ class Stiction(Behaviour):
     )
     family: ClassVar[str] = "friction"
     least: ClassVar[float] = 0.1  # %
-    not_searched: ClassVar[str] = "stiction is searched by the laws he and xch"
     # For `stiction identify`.
     switching: ClassVar[Switching | None] = None
     not_identified: ClassVar[str] = ""

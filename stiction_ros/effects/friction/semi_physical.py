@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, parameter
 from stiction_ros.effects.friction.jump_form import JumpForm
-from stiction_ros.effects.friction.parameters import FrictionPair
+from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
 from stiction_ros.effects.friction.switching import SlipPolygons, Switching
 
 
@@ -46,6 +46,7 @@ class SemiPhysicalStiction(FrictionPair):
     """
 
     law: ClassVar[str | None] = "semi_physical"
+    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching | None] = SlipPolygons()
     held: ClassVar[tuple[str, ...]] = ("k",)  # as published; every slip hangs on its last digits
 

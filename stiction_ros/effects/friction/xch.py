@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory, starts
 from stiction_ros.effects.friction.jump_form import JumpForm
 from stiction_ros.effects.friction.moving_rules import FollowingRules
-from stiction_ros.effects.friction.parameters import FrictionPair
+from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
 from stiction_ros.effects.friction.switching import MovingCells, Switching
 
 
@@ -46,6 +46,7 @@ class XchStiction(FrictionPair):
     """
 
     law: ClassVar[str | None] = "xch"
+    not_searched: ClassVar[str] = NOT_SEARCHED
     switching: ClassVar[Switching | None] = MovingCells(FollowingRules)
 
     def rest(self, value: float) -> Memory:

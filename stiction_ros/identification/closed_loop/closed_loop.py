@@ -143,9 +143,14 @@ class OutputLoop:
 
     @property
     def rivalry(self) -> float:
-        """BIC gain by the line alone over the gain by friction; infinite where that is none."""
+        """BIC gain by the line alone over the gain by friction; infinite where that is none.
+
+        Where there is no line there is no rival either: it is 0 or below.
+        """
         friction = self.alone.plain - self.after.plain
-        return self.alone.gain / friction if friction > 0.0 else math.inf
+        if friction > 0.0:
+            return self.alone.gain / friction
+        return math.inf if self.alone.gain > 0.0 else 0.0
 
 
 @dataclasses.dataclass(frozen=True)

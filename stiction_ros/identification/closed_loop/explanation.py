@@ -26,6 +26,10 @@ BELIEVED = 10.0
 MATERIAL = 0.15
 """Share of OP's movement that must go away with the friction for the valve to be the cause."""
 
+SURE = 40.0
+"""Evidence beyond the margin from which on a friction is not doubted for what a model of the loop
+says, unless that grows without end: the linear process and the controller are less certain."""
+
 LINE = 6.0
 """BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
 
@@ -136,9 +140,18 @@ def _is_cause(valve: ValveEstimate, loop: ValveLoop, output: OutputLoop) -> bool
     return (
         valve.static_friction > 0.0
         and valve.evidence.get("delta_bic", 0.0) > BELIEVED
-        and loop.gone > MATERIAL
+        and (loop.gone > MATERIAL or _open_and_sure(valve, loop))
         and output.rivalry < RIVAL
     )
+
+
+def _open_and_sure(valve: ValveEstimate, loop: ValveLoop) -> bool:
+    """Tell whether friction is sure and the loop cannot be closed for want of its controller.
+
+    What goes away without the friction is then nobody's to say, and acquits no valve.
+    """
+    known = loop.controller is not None and loop.controller.r_squared > OPEN
+    return not known and valve.evidence.get("delta_bic", 0.0) >= SURE
 
 
 def _kind(
@@ -152,6 +165,11 @@ def _kind(
         return CauseKind.SET_POINT, "The set-point moves the loop at this period."
     if acting:
         valve, with_it = max(acting, key=lambda one: one[1].gone)
+        if with_it.gone <= MATERIAL:
+            return (
+                CauseKind.VALVE,
+                f"{valve.name} sticks; what else moves OP its controller does not tell.",
+            )
         gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
         return (
             CauseKind.VALVE,

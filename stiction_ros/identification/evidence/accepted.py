@@ -93,7 +93,8 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
         size = float(centre.sum())
         grids += [finer_grid(centre[None, :], step * size / 3.0, LIMIT) for step in STEPS]
     grid = np.vstack(grids)
-    grid = np.vstack([grid, np.column_stack([grid[:, 0], grid[:, 0]])])  # deadbands
+    deadbands = np.repeat(np.unique(grid[:, :1]), 2).reshape(-1, 2)
+    grid = np.vstack([grid, deadbands])
     start = np.full(len(grid), best.starts[valve])
     rows.append(grid)
     lost.append(losses(problem, best, valve, np.column_stack([grid, start]), best.fits))

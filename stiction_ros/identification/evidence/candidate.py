@@ -12,6 +12,8 @@ from stiction_ros.identification.evidence.output_fit import OutputFit, Whitened,
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.kernels.scan import best_apart
 
+TOGETHER = 64  # stems that are judged in one go: few enough to stay near the processor
+
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
@@ -53,14 +55,15 @@ def losses(
         rows: (f_S, f_D, start), shape (G, 3), further parameters of the law before the start.
         fits: whose noise and prior are taken.
     """
-    stems = problem.stems(valve, rows[:, :-1], rows[:, -1])
     others = np.delete(beside.stems, valve, axis=0)
-    total = np.zeros(len(rows))
-    for i, fit in enumerate(fits):
-        total += Whitened.of(problem, i, others, fit.noise).under(fit.prior).losses(stems)
-    moves = np.count_nonzero(np.diff(stems, axis=1), axis=1)
-    out = (moves < problem.least_moves) | (rows[:, 0] > problem.limit[valve])
-    return np.where(out, np.inf, total)
+    judges = [Whitened.of(problem, i, others, f.noise).under(f.prior) for i, f in enumerate(fits)]
+    out = np.full(len(rows), np.inf)
+    within = np.flatnonzero(rows[:, 0] <= problem.limit[valve])
+    for begin in range(0, len(within), TOGETHER):
+        some = within[begin : begin + TOGETHER]
+        stems = problem.stems(valve, rows[some, :-1], rows[some, -1])
+        out[some] = sum(judge.losses(stems, problem.least_moves) for judge in judges)
+    return out
 
 
 def rows_apart(places: FloatArray, found: FloatArray, count: int, distance: float) -> list[int]:

@@ -14,12 +14,12 @@ from stiction_ros.identification.closed_loop.explanation import (
     LINE,
     OPEN,
     RIVAL,
+    SURE,
     explained,
 )
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.further import with_further
-from stiction_ros.identification.evidence.kernels import whitened
 from stiction_ros.identification.evidence.output_fit import OutputFit, noise_of
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.rates import (
@@ -33,6 +33,7 @@ from stiction_ros.identification.evidence.rates import (
 )
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import half_gains, is_deadband, kind_of
+from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
     Data,
@@ -56,9 +57,6 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
-SURE = 40.0
-"""What a friction gains beyond :data:`PRICE` from which on it is not doubted for being idle, unless
-the closed loop grows without end: the linear process that is fitted at last is less certain."""
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 HARMLESS = 0.08  # of the range of OP: a valve is healthy when larger bands are rejected
 POWERFUL = 2  # rates at which larger bands must be rejected, of those that carry news

@@ -8,144 +8,37 @@ import numpy as np
 
 from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.kernels.lags import (
+    Moves,
+    grouped,
+    lag_products,
+    lagged_products,
+    moves_of,
+    own_products,
+    step_products,
+    whitened,
+    with_past,
+)
 
 LEAST = 1e-12  # share of the output's energy that is always left
-
-
-@compiled_fused
-def whitened(noise: FloatArray, signal: FloatArray, before: float) -> FloatArray:
-    """Return D(q) of a signal that was ``before`` before its first sample, shape (N,)."""
-    out = np.empty(len(signal))
-    for k in range(len(signal)):
-        total = 0.0
-        for i in range(len(noise)):
-            total += noise[i] * (signal[k - i] if k >= i else before)
-        out[k] = total
-    return out
-
-
-@compiled_fused
-def answered(signal: FloatArray, response: FloatArray) -> FloatArray:
-    """Return what an impulse response makes of a signal, shape (N,).
-
-    Args:
-        signal: shape (N,); it was at its first value before.
-        response: from one sample on, shape (M,).
-    """
-    out, before = np.zeros(len(signal)), 0.0
-    for i in range(len(response)):
-        past = i + 1
-        for k in range(past, len(signal)):
-            out[k] += response[i] * signal[k - past]
-        before += response[i]
-    for k in range(min(len(response), len(signal))):
-        out[k] += before * signal[0]
-        before -= response[k]
-    return out
-
-
-@compiled_fused
-def with_past(signal: FloatArray, taps: int) -> FloatArray:
-    """Return a signal behind M samples of its first value, shape (M + N,)."""
-    out = np.empty(taps + len(signal))
-    out[:taps] = signal[0]
-    out[taps:] = signal
-    return out
-
-
-@compiled_fused
-def lagged_with(padded: FloatArray, other: FloatArray, edges: IntArray) -> FloatArray:
-    """Return the products of the groups of lags of a signal with another, shape (r,).
-
-    Args:
-        padded: the signal by :func:`with_past`.
-        other: its last samples, shape (n,).
-        edges: group g sums lags ``edges[g] + 1`` to ``edges[g + 1]``, shape (r + 1,).
-    """
-    out = np.zeros(len(edges) - 1)
-    for g in range(len(out)):
-        for i in range(edges[g], edges[g + 1]):
-            start = len(padded) - len(other) - 1 - i
-            out[g] += np.dot(padded[start : start + len(other)], other)
-    return out
-
-
-@compiled_fused
-def groups(edges: IntArray) -> IntArray:
-    """Return the group of every lag, shape (M,); ``edges`` as in :func:`lagged_with`."""
-    out = np.empty(edges[-1], dtype=np.int64)
-    for g in range(len(edges) - 1):
-        out[edges[g] : edges[g + 1]] = g
-    return out
-
-
-@compiled_fused
-def lagged_products(left: FloatArray, right: FloatArray, count: int, edges: IntArray) -> FloatArray:
-    """Return the products of the groups of lags of two signals, shape (r, r).
-
-    Those of two lags follow from their neighbours up and left by two samples; only one row and
-    one column are summed up.
-
-    Args:
-        left, right: by :func:`with_past`.
-        count: n, samples of a row.
-        edges: of the groups, as in :func:`lagged_with`.
-    """
-    size, taps, start = len(edges) - 1, edges[-1], len(left) - 1 - count
-    out, group = np.zeros((size, size)), groups(edges)
-    row, above = np.empty(taps), np.empty(taps)
-    for j in range(taps):
-        row[j] = np.dot(right[start - j : start - j + count], left[start : start + count])
-    for i in range(taps):
-        if i > 0:
-            above, row = row, above
-            row[0] = np.dot(left[start - i : start - i + count], right[start : start + count])
-            enters, leaves = left[start - i], left[start - i + count]
-            for j in range(1, taps):
-                gone = leaves * right[start - j + count]
-                row[j] = above[j - 1] + enters * right[start - j] - gone
-        for j in range(taps):
-            out[group[i], group[j]] += row[j]
-    return out
-
-
-@compiled_fused
-def own_products(signal: FloatArray, count: int, edges: IntArray) -> FloatArray:
-    """Return :func:`lagged_products` of a signal with itself, at half the work."""
-    size, taps, start = len(edges) - 1, edges[-1], len(signal) - 1 - count
-    out, group = np.zeros((size, size)), groups(edges)
-    first, row = signal[start : start + count], np.empty(taps)
-    for j in range(taps):
-        row[j] = np.dot(signal[start - j : start - j + count], first)
-    for i in range(taps):
-        if i > 0:  # row[j] holds lags i and i + j
-            enters, leaves = signal[start - i], signal[start - i + count]
-            for j in range(taps - i):
-                gone = leaves * signal[start - i - j + count]
-                row[j] += enters * signal[start - i - j] - gone
-        out[group[i], group[i]] += row[0]
-        for j in range(1, taps - i):
-            out[group[i], group[i + j]] += row[j]
-            out[group[i + j], group[i]] += row[j]
-    return out
 
 
 @compiled_fused
 def factorised(matrix: FloatArray) -> float:
     """Replace the lower triangle by its Cholesky factor; return the log determinant."""
     size, total = len(matrix), 0.0
+    column = np.empty(size)
     for j in range(size):
-        pivot = matrix[j, j]
-        for k in range(j):
-            pivot -= matrix[j, k] * matrix[j, k]
-        pivot = np.sqrt(max(pivot, 1e-300))
+        pivot = np.sqrt(max(matrix[j, j], 1e-300))
         matrix[j, j] = pivot
         total += np.log(pivot)
         for i in range(j + 1, size):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = value / pivot
+            column[i] = matrix[i, j] / pivot
+            matrix[i, j] = column[i]
+        for i in range(j + 1, size):
+            by = column[i]
+            for k in range(j + 1, i + 1):
+                matrix[i, k] -= by * column[k]
     return 2.0 * total
 
 
@@ -171,18 +64,24 @@ class Given(NamedTuple):
 
     Attributes:
         noise: monic polynomial D, shape (d + 1,).
-        known: rows of any signals, shape (c, n).
-        others: stems of the other valves, by :func:`with_past`, shape (m − 1, M + N).
-        root: L^-1, with L L^T the products of ``known`` and of the lags of each of ``others``
-            with each other and what is known of them before the record, shape (q, q).
-        target: what all these leave of the output, shape (n,).
+        judged: n, rows that count.
+        known: :func:`step_products` with signals of any kind, shape (c, N + M + 8).
+        others: stems of the other valves, scaled, shape (m − 1, N).
+        beside: their last M + n + 1 samples, whitened, shape (m − 1, M + n + 1).
+        others_first: :func:`step_products` with their first lag, shape (m − 1, N + M + 8).
+        root: L^-1, with L L^T the products of the known signals and of the lags of each of
+            ``others`` with each other and what is known of them before the record, shape (q, q).
+        target: :func:`step_products` with what all these leave of the output, shape (N + M + 8,).
         energy: of that and of the prior of what explains the rest.
         edges: of the groups of lags, shape (r + 1,).
     """
 
     noise: FloatArray
+    judged: int
     known: FloatArray
     others: FloatArray
+    beside: FloatArray
+    others_first: FloatArray
     root: FloatArray
     target: FloatArray
     energy: float
@@ -203,28 +102,47 @@ def evidence(stem: FloatArray, given: Given, precision: FloatArray) -> tuple[flo
         given: everything else.
         precision: inverse of K, shape (r, r).
     """
-    size, known, count = len(precision), len(given.known), len(given.target)
-    signal = with_past(whitened(given.noise, stem, stem[0]), given.edges[-1])
-    gram = own_products(signal, count, given.edges)
+    return _evidence(stem, moves_of(stem), given, precision)
+
+
+@compiled_fused
+def _evidence(
+    stem: FloatArray, moves: Moves, given: Given, precision: FloatArray
+) -> tuple[float, FloatArray]:
+    size, known, edges = len(precision), len(given.known), given.edges
+    taps, count = edges[-1], given.judged
+    signal = with_past(whitened(given.noise, stem, stem[0]), taps)[-(taps + count + 1) :]
+    first = step_products(given.noise, signal[-1 - count : -1], len(stem), taps)
+    gram = own_products(signal, lag_products(moves, first, taps), edges)
     shared = np.empty((size, len(given.root)))
     for row in range(known):
-        shared[:, row] = lagged_with(signal, given.known[row], given.edges)
+        shared[:, row] = grouped(lag_products(moves, given.known[row], taps), edges)
     for other in range(len(given.others)):
-        at, beside = known + other * size, given.others[other]
-        shared[:, at : at + size] = lagged_products(signal, beside, count, given.edges)
+        at, theirs = known + other * size, moves_of(given.others[other])
+        begun = (
+            lag_products(moves, given.others_first[other], taps),
+            lag_products(theirs, first, taps),
+        )
+        beside = given.beside[other]
+        shared[:, at : at + size] = lagged_products(signal, beside, begun, edges)
     shared = np.dot(shared, given.root.T)
     gram -= np.dot(shared, shared.T)
     gram += precision
     determinant = factorised(gram)
-    response, explained = solved(gram, lagged_with(signal, given.target, given.edges))
+    seen = grouped(lag_products(moves, given.target, taps), edges)
+    response, explained = solved(gram, seen)
     left = max(given.energy - explained, LEAST * given.energy)
     return count * np.log(left / count) + determinant, response
 
 
 @compiled_fused
-def evidences(stems: FloatArray, given: Given, precision: FloatArray) -> FloatArray:
-    """Return :func:`evidence` of many stems, shape (G, N)."""
-    out = np.empty(len(stems))
+def evidences(
+    stems: FloatArray, given: Given, precision: FloatArray, least_moves: int
+) -> FloatArray:
+    """Return :func:`evidence` of many stems, shape (G, N); infinite where one moves less often."""
+    out = np.full(len(stems), np.inf)
     for g in range(len(stems)):
-        out[g] = evidence(stems[g], given, precision)[0]
+        moves = moves_of(stems[g])
+        if len(moves.at) >= least_moves:
+            out[g] = _evidence(stems[g], moves, given, precision)[0]
     return out

@@ -19,19 +19,20 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     LEAST,
     Given,
-    answered,
     evidence,
     evidences,
     factorised,
-    lagged_products,
-    lagged_with,
-    own_products,
     solved,
-    whitened,
-    with_past,
 )
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.response_prior import ResponsePrior
+from stiction_ros.identification.kernels.lags import (
+    Products,
+    answered,
+    products_of,
+    step_products,
+    whitened,
+)
 
 ROUNDS = 6
 SETTLED = 0.2  # of −2 log likelihood: a round that gains less is the last
@@ -72,9 +73,13 @@ class Criterion:
     precision: FloatArray
     constant: float
 
-    def losses(self, stems: FloatArray) -> FloatArray:
-        """Return the loss of each of many stems, scaled, shape (G, n)."""
-        return np.asarray(evidences(stems, self.given, self.precision) + self.constant)
+    def losses(self, stems: FloatArray, least_moves: int = 0) -> FloatArray:
+        """Return the loss of each of many stems, scaled, shape (G, N).
+
+        It is infinite for a stem that moves in fewer than ``least_moves`` rows.
+        """
+        found = evidences(stems, self.given, self.precision, least_moves)
+        return np.asarray(found + self.constant)
 
     def best(self, stem: FloatArray) -> tuple[float, FloatArray]:
         """Return the loss of one stem and its response."""
@@ -90,7 +95,8 @@ class Whitened:
         noise: D.
         seen: the output, shape (n,).
         known: a constant, shape (1, n).
-        stems: by :func:`.kernels.with_past`, shape (m, M + N).
+        stems: scaled, shape (m, N).
+        lags: of the stems, with each other and with ``known`` and the output.
         products: of ``known`` and of the lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
         edges: of the groups of taps.
@@ -100,34 +106,26 @@ class Whitened:
     seen: FloatArray
     known: FloatArray
     stems: FloatArray
+    lags: Products
     products: FloatArray
     seen_products: FloatArray
     edges: IntArray
 
     @classmethod
     def of(cls, problem: Problem, output: int, stems: FloatArray, noise: FloatArray) -> Whitened:
-        """Whiten an output and ``stems``, scaled, shape (m, n); m may be 0."""
-        edges, first = problem.edges, problem.first
+        """Whiten an output and ``stems``, scaled, shape (m, N); m may be 0."""
         y = problem.pv[output]
-        seen = whitened(noise, y, float(y[0]))[first:]
+        seen = whitened(noise, y, float(y[0]))[problem.first :]
         known = np.full((1, len(seen)), 1.0 / np.sqrt(len(seen)))
-        past = [with_past(whitened(noise, stem, float(stem[0])), problem.taps) for stem in stems]
-        signals = np.array(past).reshape(len(stems), problem.taps + problem.rows)
-        count, size = len(known), len(edges) - 1
-        products = np.empty((count + len(stems) * size,) * 2)
+        lags = products_of(noise, stems, np.vstack([known, seen]), problem.edges)
+        count = len(known)
+        products = np.empty((count + len(lags.shared),) * 2)
         products[:count, :count] = known @ known.T
-        with_seen = [known @ seen]
-        for i, left in enumerate(signals):
-            down = slice(count + i * size, count + (i + 1) * size)
-            for row, one in enumerate(known):
-                products[row, down] = products[down, row] = lagged_with(left, one, edges)
-            for j, right in enumerate(signals[:i]):
-                along = slice(count + j * size, count + (j + 1) * size)
-                products[down, along] = lagged_products(left, right, len(seen), edges)
-                products[along, down] = products[down, along].T
-            products[down, down] = own_products(left, len(seen), edges)
-            with_seen.append(lagged_with(left, seen, edges))
-        return cls(noise, seen, known, signals, products, np.concatenate(with_seen), edges)
+        products[:count, count:] = lags.beside[:count]
+        products[count:, :count] = lags.beside[:count].T
+        products[count:, count:] = lags.shared
+        seen_products = np.concatenate([known @ seen, lags.beside[count]])
+        return cls(noise, seen, known, stems, lags, products, seen_products, problem.edges)
 
     def with_precision(self, prior: ResponsePrior) -> FloatArray:
         """Return the products and what is known before the record, shape (q, q)."""
@@ -158,12 +156,26 @@ class Whitened:
         weights = root.T @ half
         target = self.seen - weights[: len(self.known)] @ self.known
         levels = weights[len(self.known) :].reshape(len(self.stems), len(self.edges) - 1)
-        for signal, level in zip(self.stems, levels, strict=True):
-            target -= answered(signal, np.repeat(level, np.diff(self.edges)))[-len(target) :]
+        for past, level in zip(self.lags.past, levels, strict=True):
+            target -= answered(past, np.repeat(level, np.diff(self.edges)))[-len(target) :]
         energy = float(self.seen @ self.seen) - float(half @ half)
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
+        rows, taps = self.stems.shape[1], int(self.edges[-1])
+        noise, count = self.noise, len(self.seen)
+        known = np.array([step_products(noise, row, rows, taps) for row in self.known])
         return Criterion(
-            Given(self.noise, self.known, self.stems, root, target, energy, self.edges),
+            Given(
+                noise=noise,
+                judged=count,
+                known=known,
+                others=self.stems,
+                beside=self.lags.past,
+                others_first=self.lags.first,
+                root=root,
+                target=step_products(noise, target, rows, taps),
+                energy=energy,
+                edges=self.edges,
+            ),
             prior.precision(self.edges),
             determinant + prior.log_determinant(self.edges),
         )
@@ -186,16 +198,16 @@ def fit_output(
 
 def follow(problem: Problem, output: int, stems: FloatArray, start: OutputFit) -> OutputFit:
     """Return ``start`` carried over to other stems: its prior, and its noise taken once anew."""
-    kept = _fitted(problem, output, stems, start.noise, start.prior)
-    noise = noise_of(kept.rest[problem.first - NOISE_ORDER :])
-    return min(kept, _fitted(problem, output, stems, noise, start.prior), key=lambda f: f.loss)
+    kept = _fitted(problem, output, Whitened.of(problem, output, stems, start.noise), start.prior)
+    again = Whitened.of(problem, output, stems, _noise_beside(problem, kept))
+    return min(kept, _fitted(problem, output, again, start.prior), key=lambda fit: fit.loss)
 
 
 def white(problem: Problem, output: int, stems: FloatArray, memory: float) -> OutputFit:
     """Return the fit under the noise 1 − ``memory`` q⁻¹, with the prior that suits it."""
     noise = np.array([1.0, -memory]) if memory else np.ones(1)
-    prior = _tuned(problem, output, stems, noise, ResponsePrior())
-    return _fitted(problem, output, stems, noise, prior)
+    whole = Whitened.of(problem, output, stems, noise)
+    return _fitted(problem, output, whole, _tuned(whole, ResponsePrior()))
 
 
 def _descended(
@@ -203,28 +215,26 @@ def _descended(
 ) -> OutputFit:
     noise = np.ones(1) if start is None else start.noise
     prior = ResponsePrior() if start is None else start.prior
-    best = None if start is None else _fitted(problem, output, stems, noise, prior)
-    last = np.inf
+    whole = Whitened.of(problem, output, stems, noise)
+    fit = _fitted(problem, output, whole, prior)
+    best, last = (None if start is None else fit), np.inf
     for turn in range(ROUNDS):
-        if turn in TUNED:
-            prior = _tuned(problem, output, stems, noise, prior)
-        rest = _fitted(problem, output, stems, noise, prior).rest
-        noise = noise_of(rest[problem.first - NOISE_ORDER :])
-        now = _fitted(problem, output, stems, noise, prior)
-        if best is None or now.loss < best.loss:
-            best = now
-        if abs(last - now.loss) < SETTLED:
+        if turn in TUNED and (tuned := _tuned(whole, prior)) != prior:
+            prior = tuned
+            fit = _fitted(problem, output, whole, prior)
+        whole = Whitened.of(problem, output, stems, _noise_beside(problem, fit))
+        fit = _fitted(problem, output, whole, prior)
+        if best is None or fit.loss < best.loss:
+            best = fit
+        if abs(last - fit.loss) < SETTLED:
             break
-        last = now.loss
+        last = fit.loss
     assert best is not None
     return best
 
 
-def _tuned(
-    problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
-) -> ResponsePrior:
+def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
     """Return the prior to which no neighbour is better, downhill from ``prior``."""
-    whole = Whitened.of(problem, output, stems, noise)
     met: dict[ResponsePrior, float] = {}
 
     def loss(one: ResponsePrior) -> float:
@@ -239,16 +249,18 @@ def _tuned(
         prior = better
 
 
-def _fitted(
-    problem: Problem, output: int, stems: FloatArray, noise: FloatArray, prior: ResponsePrior
-) -> OutputFit:
-    loss, weights = Whitened.of(problem, output, stems, noise).loss(prior)
-    responses = weights[1:].reshape(len(stems), len(problem.edges) - 1)
+def _fitted(problem: Problem, output: int, whole: Whitened, prior: ResponsePrior) -> OutputFit:
+    loss, weights = whole.loss(prior)
+    responses = weights[1:].reshape(len(whole.stems), len(problem.edges) - 1)
     rest = problem.pv[output].copy()
-    for stem, levels in zip(stems, responses, strict=True):
+    for stem, levels in zip(whole.stems, responses, strict=True):
         rest -= answered(stem, np.repeat(levels, np.diff(problem.edges)))
     rest -= rest[problem.first :].mean()
-    return OutputFit(noise, prior, loss, responses, rest)
+    return OutputFit(whole.noise, prior, loss, responses, rest)
+
+
+def _noise_beside(problem: Problem, fit: OutputFit) -> FloatArray:
+    return noise_of(fit.rest[problem.first - NOISE_ORDER :])
 
 
 def noise_of(rest: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.friction.grid import find_law, simulate
+from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.options import IdentificationOptions, limited
 from stiction_ros.records.record import Record
 
@@ -128,7 +129,8 @@ class Problem:
 
     def ideal_stems(self) -> FloatArray:
         """Return the stems of valves without friction, scaled, shape (m, n)."""
-        return np.asarray(self._slowed(self.op) / self.scale[:, None])
+        rows = [self._in_rows(op[:, None], j) for j, op in enumerate(self.op)]
+        return np.concatenate(rows)
 
     def stems(self, valve: int, friction: FloatArray, starts: FloatArray | float) -> FloatArray:
         """Return stems of one valve, scaled, shape (G, n).
@@ -148,15 +150,9 @@ class Problem:
             stems = simulate(self.law, rows, op, begin, further) / self.span[valve]
         else:
             stems = simulate(self.law, friction, op, begin, further)
-        return np.asarray(self._slowed(stems.T) / self.scale[valve])
+        return self._in_rows(stems, valve)
 
-    def _slowed(self, signals: FloatArray) -> FloatArray:
-        slow = np.ascontiguousarray(signals)
-        if self.rate > 1:
-            slow = slow.reshape(len(signals), self.rows, self.rate).mean(axis=2)
-        if self.skipped == 0:
-            return slow
-        delayed: FloatArray = np.empty_like(slow)
-        delayed[:, self.skipped :] = slow[:, : slow.shape[1] - self.skipped]
-        delayed[:, : self.skipped] = slow[:, :1]
-        return delayed
+    def _in_rows(self, stems: FloatArray, valve: int) -> FloatArray:
+        """Return stems of one valve, shares of the span, shape (N, G), as rows, scaled, (G, n)."""
+        scale = float(self.scale[valve])
+        return np.asarray(in_rows(stems, self.rate, self.skipped, scale))

@@ -11,6 +11,7 @@ normal distributions, so the inverse of K is tridiagonal and its determinant a p
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -43,15 +44,12 @@ class ResponsePrior:
         return np.append(powers[:-1] - powers[1:], powers[-1])
 
     def precision(self, edges: IntArray) -> FloatArray:
-        """Return the inverse of K, shape (r, r)."""
-        weights = 1.0 / self.variances(edges)
-        found = np.diag(weights + np.append(0.0, weights[:-1]))
-        found -= np.diag(weights[:-1], 1) + np.diag(weights[:-1], -1)
-        return found
+        """Return the inverse of K, shape (r, r), not to be written to."""
+        return _inverse(self, edges.tobytes())[0]
 
     def log_determinant(self, edges: IntArray) -> float:
         """Return log det K."""
-        return float(np.log(self.variances(edges)).sum())
+        return _inverse(self, edges.tobytes())[1]
 
     def neighbours(self) -> list[ResponsePrior]:
         """Return the members next to this one, itself included."""
@@ -60,3 +58,14 @@ class ResponsePrior:
             for decay in range(max(self.decay - 1, 0), min(self.decay + 2, len(DECAYS)))
             for size in range(max(self.size - 1, 0), min(self.size + 2, len(SIZES)))
         ]
+
+
+@functools.lru_cache(maxsize=1024)
+def _inverse(prior: ResponsePrior, edges: bytes) -> tuple[FloatArray, float]:
+    """Return the inverse of K and log det K: few priors and groups serve a whole search."""
+    variances = prior.variances(np.frombuffer(edges, dtype=np.int64))
+    weights = 1.0 / variances
+    found = np.diag(weights + np.append(0.0, weights[:-1]))
+    found -= np.diag(weights[:-1], 1) + np.diag(weights[:-1], -1)
+    found.flags.writeable = False
+    return found, float(np.log(variances).sum())

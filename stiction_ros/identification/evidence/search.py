@@ -73,14 +73,23 @@ class Found:
 class _Valve:
     """The search over one valve's friction beside given other valves."""
 
-    def __init__(self, problem: Problem, base: Candidate, valve: int) -> None:
+    def __init__(
+        self, problem: Problem, base: Candidate, valve: int, known: Sequence[Candidate] = ()
+    ) -> None:
+        """Begin beside the other valves of ``base``; what is ``known`` is not tried again."""
         self.problem, self.base, self.valve = problem, base, valve
         self.met: list[Candidate] = []
-        self._keys: set[tuple[float, ...]] = set()
+        others = np.arange(len(problem.op)) != valve
+        self._keys = {
+            _key(self.row_of(one))
+            for one in known
+            if np.array_equal(one.friction[others], base.friction[others])
+            and np.array_equal(one.starts[others], base.starts[others])
+        }
 
     def add(self, row: FloatArray, fits: Sequence[OutputFit], *, whole: bool) -> None:
         """Fit a row (f_S, f_D, start) from neighbouring fits; ``whole`` until nothing changes."""
-        key = tuple(round(float(value), 9) for value in row)
+        key = _key(row)
         if key in self._keys and not whole:
             return
         self._keys.add(key)
@@ -173,6 +182,11 @@ class _Valve:
         return np.asarray(rows[np.abs(starts) <= rows[:, 0]])
 
 
+def _key(row: FloatArray) -> tuple[float, ...]:
+    """Return what tells a row (f_S, f_D, start) from others."""
+    return tuple(round(float(value), 9) for value in row)
+
+
 def search_valve(
     problem: Problem, base: Candidate, valve: int, providers: Sequence[Provider] = tuple(Provider)
 ) -> list[Candidate]:
@@ -226,7 +240,7 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
     """
     met, best = list(found.met), found.best
     for valve in range(len(problem.op)):
-        tried = _Valve(problem, best, valve)
+        tried = _Valve(problem, best, valve, found.met)
         rubbing = [seed for seed in seeds if seed.friction[valve, 0] > 0.0]
         for seed in candidates_apart(rubbing, valve, SEEDS, NEAR):
             tried.add(tried.row_of(seed), best.fits, whole=False)

@@ -99,11 +99,12 @@ def log_time_caps(files: Sequence[Path]) -> list[int | None]:
     """
     found: tuple[int, int] | None = None
     for number, file in enumerate(files):
-        scan = McapScan(file, salvage=True)
+        scan, looked = McapScan(file, salvage=True), 0
         for message in scan.messages():
-            told = [entry for name, entry in scan.metadata if name == SIMULATED]
-            if told and told[0].get("first", "").isdecimal():
-                return _caps(len(files), number, int(told[0]["first"]))
+            new, looked = scan.metadata[looked:], len(scan.metadata)
+            for name, entry in new:
+                if name == SIMULATED and entry.get("first", "").isdecimal():
+                    return _caps(len(files), number, int(entry["first"]))
             if found is None and message.topic.name == CLOCK:
                 found = number, message.log_time  # of a recorder that does not tell
     return _caps(len(files), *found) if found is not None else [None] * len(files)

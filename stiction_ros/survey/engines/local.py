@@ -1,12 +1,15 @@
 """Worker processes of this machine: the engine that needs nothing else.
 
 A process that is killed is replaced and its loop tried once more. One loop is with each worker at
-a time and one more is drawn when it comes back, so memory does not grow with the plant.
+a time and one more is drawn when it comes back, so memory does not grow with the plant. A worker
+first imports and compiles what it needs and says that it is ready; only then is it sent its loop,
+and the loop's time begins: what a busy machine takes to start is no loop's fault.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
 import multiprocessing
 import signal
 import time
@@ -14,6 +17,7 @@ from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 
+from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
@@ -21,6 +25,9 @@ from stiction_ros.survey.options import SurveyOptions
 
 LONGEST = 600.0
 """Seconds that one loop may take; a usual one takes a second or two."""
+
+READY = "ready"
+"""What a worker says once, before its first loop."""
 
 ENDS_WITHIN = 2.0
 """Seconds that a worker is given to end by itself."""
@@ -31,8 +38,18 @@ class _Worker:
     process: SpawnProcess
     pipe: Connection
     task: Task | None = None
-    since: float = 0.0
     attempt: int = 1
+    ready: bool = False
+    since: float = math.inf
+
+    def send(self) -> None:
+        """Hand over the loop; its time begins now."""
+        assert self.task is not None
+        self.since = time.monotonic()
+        try:
+            self.pipe.send(self.task.loop)
+        except (BrokenPipeError, OSError):  # it has died; that shows when it is waited for
+            return
 
 
 class LocalEngine:
@@ -45,7 +62,7 @@ class LocalEngine:
 
         Args:
             jobs: processes, one at least.
-            longest: seconds that a loop may take.
+            longest: seconds that a loop may take, from when a worker that is ready has it.
         """
         self._jobs, self._longest = max(jobs, 1), longest
         self._workers: list[_Worker] = []
@@ -97,24 +114,26 @@ class LocalEngine:
         return worker
 
     def _give(self, worker: _Worker, task: Task, attempt: int) -> None:
-        worker.task, worker.since, worker.attempt = task, time.monotonic(), attempt
-        try:
-            worker.pipe.send(task.loop)
-        except (BrokenPipeError, OSError):  # it has died; that shows when it is waited for
-            return
+        worker.task, worker.attempt, worker.since = task, attempt, math.inf
+        if worker.ready:
+            worker.send()
 
     def _gathered(self, options: SurveyOptions) -> Iterator[Done]:
-        """Wait for a worker to answer, to die or to take too long."""
+        """Wait for a worker to be ready, to answer, to die or to take too long."""
         busy = self._busy
-        ends = [worker.since + self._longest for worker in busy]
-        room = max(min(ends) - time.monotonic(), 0.0)
-        ready = wait([worker.pipe for worker in busy], timeout=room)
+        end = min(worker.since + self._longest for worker in busy)
+        room = None if end == math.inf else max(end - time.monotonic(), 0.0)
+        speaking = wait([worker.pipe for worker in busy], timeout=room)
         for worker in busy:
             task = worker.task
             assert task is not None
-            if worker.pipe in ready:
+            if worker.pipe in speaking:
                 answer = _answer(worker.pipe)
-                if answer is not None:
+                if answer == READY:
+                    worker.ready = True
+                    worker.send()
+                    continue
+                if isinstance(answer, Assessed):
                     worker.task = None
                     yield Done(task, answer)
                     continue
@@ -155,19 +174,24 @@ def _end(worker: _Worker) -> None:
     worker.process.join()
 
 
-def _answer(pipe: Connection) -> Assessed | None:
+def _answer(pipe: Connection) -> Assessed | str | None:
     """Return what a worker says; None where it has died."""
     try:
-        answer = pipe.recv()
+        answer: object = pipe.recv()
     except (EOFError, OSError):
         return None
-    assert isinstance(answer, Assessed)
+    assert isinstance(answer, Assessed | str)
     return answer
 
 
 def _work(pipe: Connection, options: SurveyOptions) -> None:
     """Judge loops until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asked
+    compile_loops((options.identification.method,))
+    try:
+        pipe.send(READY)
+    except (BrokenPipeError, OSError):
+        return
     while True:
         try:
             loop: Loop = pipe.recv()

@@ -155,6 +155,34 @@ def test_a_diagnostic_that_is_missing_late_or_stays_fails(told, reason):
     assert reason in " ".join(found.reasons)
 
 
+LATE = "running; 2 samples behind; samples passed over: 3"
+OTHER = "running; OP is held; 1 samples behind; samples passed over: 4"
+
+
+@pytest.mark.parametrize(
+    ("texts", "reason"),
+    [
+        ({103.5: LATE, 104.5: LATE, 105.5: OTHER, 106.5: LATE}, ""),
+        ({103.5: LATE, 104.5: LATE, 105.5: OTHER, 109.5: LATE}, ""),
+        ({103.5: LATE, 104.5: LATE, 105.5: LATE}, "nothing new"),
+        ({103.5: LATE, 107.5: OTHER}, "after 3.5 s"),
+        ({103.5: LATE, **{105.5 + k: OTHER for k in range(9)}}, "still shown"),
+    ],
+    ids=["noticed", "late again after it", "not noticed", "too late", "stays"],
+)
+def test_a_late_sample_before_a_fault_is_no_sign_of_it(texts: dict[float, str], reason: str):
+    told = tuple(
+        dataclasses.replace(one, text=texts.get(one.wall, "running"))
+        for one in statuses(*((wall, "warn") for wall in texts))
+    )
+    found = outcome(fault(notices=noticed("warn")), statuses=told)
+    if reason:
+        assert reason in " ".join(found.reasons)
+    else:
+        assert found.passed
+        assert found.noticed == pytest.approx(1.5)
+
+
 def test_a_diagnostic_that_ends_too_late_fails():
     told = tuple((104.5 + k, "error") for k in range(11))
     longer = observation(until=130.0, statuses=statuses(*told))

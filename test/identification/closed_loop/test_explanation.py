@@ -8,7 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_loops import Kind, Known, changed, known
 
+from stiction_ros.identification.closed_loop.closed_loop import OutputLoop, close_loop
+from stiction_ros.identification.closed_loop.explanation import cause as cause_of
 from stiction_ros.identification.closed_loop.explanation import explained
+from stiction_ros.identification.closed_loop.outside_line import NO_LINE
 from stiction_ros.identification.result.cause import Cause, CauseKind
 from stiction_ros.identification.result.identification import Identification
 
@@ -36,6 +39,33 @@ def test_a_sticky_valve_is_the_cause(friction: tuple[float, float], noise: float
     assert found.regularity > 1.0
     assert found.period == pytest.approx(5.0 * 70.0, rel=0.15)
     assert "V1" in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("fit", "evidence", "blamed"),
+    [(0.5, 60.0, True), (0.5, 20.0, False), (0.99, 60.0, False)],
+    ids=["a controller not known", "and little evidence", "a controller that is known"],
+)
+def test_a_controller_that_is_not_known_acquits_no_surely_sticky_valve(
+    fit: float, evidence: float, blamed: bool
+) -> None:
+    one = known(Kind(friction=(6.0, 2.0), noise=0.05))
+    valve = dataclasses.replace(one.found.valves[0], evidence={"delta_bic": evidence})
+    found = dataclasses.replace(one.found, valves=(valve,))
+    closed = close_loop(one.record, found)
+    loop = closed.valves[0]
+    assert loop.controller is not None
+    controller = dataclasses.replace(loop.controller, r_squared=fit)
+    idle = dataclasses.replace(loop, controller=controller, gone=0.0)
+    told = cause_of(one.record, found, dataclasses.replace(closed, valves=(idle,)), 0)
+    assert (told.kind is CauseKind.VALVE) == blamed
+
+
+def test_where_there_is_no_line_there_is_no_rival() -> None:
+    worse = dataclasses.replace(NO_LINE, gain=-4.0)
+    assert OutputLoop("PV1", None, after=worse, alone=worse).rivalry <= 0.0
+    line = dataclasses.replace(NO_LINE, gain=9.0)
+    assert OutputLoop("PV1", None, after=line, alone=line).rivalry == np.inf
 
 
 @pytest.mark.parametrize("shape", ["sine", "square", "triangle"])

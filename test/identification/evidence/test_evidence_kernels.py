@@ -8,17 +8,24 @@ from hypothesis import strategies as st
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     Given,
-    answered,
     evidence,
+    evidences,
     factorised,
-    lagged_products,
-    lagged_with,
-    own_products,
     solved,
+)
+from stiction_ros.identification.evidence.response_prior import ResponsePrior
+from stiction_ros.identification.kernels.lags import (
+    answered,
+    grouped,
+    in_rows,
+    lag_products,
+    lagged_products,
+    moves_of,
+    own_products,
+    step_products,
     whitened,
     with_past,
 )
-from stiction_ros.identification.evidence.response_prior import ResponsePrior
 
 
 def _groups(signal: FloatArray, before: float, first: int, edges: IntArray) -> FloatArray:
@@ -33,17 +40,60 @@ EDGES = st.lists(st.integers(1, 4), min_size=1, max_size=5).map(
 )
 
 
+def _stem(random: np.random.Generator, rows: int, stays: float) -> FloatArray:
+    """Return what stays in a share of its rows, shape (N,)."""
+    moves = random.standard_normal(rows) * (random.random(rows) >= stays)
+    return np.cumsum(moves)
+
+
+NOISE = np.array([1.0, -0.6, 0.2])
+
+
 @settings(deadline=None, max_examples=25)
-@given(st.integers(0, 10**6), EDGES, st.integers(0, 20))
-def test_products_of_lags_are_those_of_the_rows(seed: int, edges: IntArray, first: int) -> None:
-    signal, other = np.random.default_rng(seed).standard_normal((2, 60))
-    rows = _groups(signal, float(signal[0]), first, edges)
-    others = _groups(other, float(other[0]), first, edges)
-    one, two = (with_past(x, int(edges[-1])) for x in (signal, other))
-    found = lagged_products(one, two, 60 - first, edges)
-    assert found == pytest.approx(rows @ others.T, abs=1e-9)
-    assert own_products(one, 60 - first, edges) == pytest.approx(rows @ rows.T, abs=1e-9)
-    assert lagged_with(one, other[first:], edges) == pytest.approx(rows @ other[first:], abs=1e-9)
+@given(st.integers(0, 10**6), EDGES, st.integers(2, 20), st.sampled_from([0.0, 0.5, 0.9, 1.0]))
+def test_products_of_lags_are_those_of_the_rows(
+    seed: int, edges: IntArray, first: int, stays: float
+) -> None:
+    random, taps, count = np.random.default_rng(seed), int(edges[-1]), 60 - first
+    stems = [_stem(random, 60, stays) for _ in range(2)]
+    signals = [whitened(NOISE, stem, float(stem[0])) for stem in stems]
+    one, two = (with_past(signal, taps)[-(taps + count + 1) :] for signal in signals)
+    lags = [_groups(signal, float(signal[0]), first, np.arange(taps + 1)) for signal in signals]
+    steps = [step_products(NOISE, lag[0], 60, taps) for lag in lags]
+    moves = [moves_of(stem) for stem in stems]
+    begun = lag_products(moves[0], steps[1], taps), lag_products(moves[1], steps[0], taps)
+    assert begun[0] == pytest.approx(lags[0] @ lags[1][0], abs=1e-9)
+    assert begun[1] == pytest.approx(lags[1] @ lags[0][0], abs=1e-9)
+    rows, others = (np.add.reduceat(lag, edges[:-1]) for lag in lags)
+    found = lagged_products(one, two, begun, edges)
+    assert found == pytest.approx(rows @ others.T, abs=1e-8)
+    own = own_products(one, lag_products(moves[0], steps[0], taps), edges)
+    assert own == pytest.approx(rows @ rows.T, abs=1e-8)
+    other = random.standard_normal(count)
+    seen = lag_products(moves[0], step_products(NOISE, other, 60, taps), taps)
+    assert grouped(seen, edges) == pytest.approx(rows @ other, abs=1e-9)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10**6), st.integers(1, 60), st.floats(0.0, 1.0))
+def test_a_stem_is_its_beginning_and_its_moves(seed: int, rows: int, stays: float) -> None:
+    stem = _stem(np.random.default_rng(seed), rows, stays)
+    moves = moves_of(stem)
+    again = np.full(rows, moves.begin)
+    for k, move in zip(moves.at, moves.by, strict=True):
+        again[k:] += move
+    assert again == pytest.approx(stem, abs=1e-12)
+    assert len(moves.at) == np.count_nonzero(np.diff(stem))
+
+
+@pytest.mark.parametrize("size", [1, 8, 19])
+@pytest.mark.parametrize(("rate", "skipped"), [(1, 0), (1, 3), (4, 0), (2, 1)])
+def test_rows_are_means_that_come_later(size: int, rate: int, skipped: int) -> None:
+    stems = np.random.default_rng(size).standard_normal((26, size))
+    rows = len(stems) // rate
+    means = stems[: rows * rate].reshape(rows, rate, size).mean(axis=1)
+    wanted = np.vstack([means[:1]] * skipped + [means])[:rows].T / 2.0
+    assert in_rows(stems, rate, skipped, 2.0) == pytest.approx(wanted, abs=1e-12)
 
 
 @settings(deadline=None, max_examples=25)
@@ -79,9 +129,9 @@ def test_evidence_is_the_marginal_likelihood_of_a_normal_record(
     seed: int, edges: IntArray, decay: int
 ) -> None:
     random = np.random.default_rng(seed)
-    stem, y = random.standard_normal(50), random.standard_normal(40)
+    stem, y = _stem(random, 50, 0.5), random.standard_normal(40)
     prior, noise = ResponsePrior(decay, 2), np.array([1.0, -0.5])
-    given = Given(noise, np.zeros((1, 40)), np.empty((0, 50)), np.eye(1), y, float(y @ y), edges)
+    given = _given(noise, y, edges)
     loss, response = evidence(stem, given, prior.precision(edges))
     rows = _groups(whitened(noise, stem, float(stem[0])), float(stem[0]) * 0.5, 10, edges)
     kernel = np.linalg.inv(prior.precision(edges))
@@ -90,3 +140,32 @@ def test_evidence_is_the_marginal_likelihood_of_a_normal_record(
     wanted += np.linalg.slogdet(covariance)[1]
     assert loss + prior.log_determinant(edges) == pytest.approx(wanted, abs=1e-6)
     assert response == pytest.approx(kernel @ rows @ np.linalg.solve(covariance, y), abs=1e-7)
+
+
+def test_a_stem_that_moves_too_seldom_is_not_judged() -> None:
+    edges, random = np.arange(4), np.random.default_rng(3)
+    stems = np.zeros((2, 50))
+    stems[0, 20:] = 1.0
+    stems[1, 20:], stems[1, 30:] = 1.0, 2.0
+    given = _given(np.array([1.0, -0.5]), random.standard_normal(40), edges)
+    precision = ResponsePrior().precision(edges)
+    found = evidences(stems, given, precision, 2)
+    assert np.isinf(found[0])
+    assert found[1] == evidence(stems[1], given, precision)[0]
+
+
+def _given(noise: FloatArray, y: FloatArray, edges: IntArray) -> Given:
+    """Return what stands beside the only stem of an output of zero mean."""
+    taps, rows = int(edges[-1]), len(y) + 10
+    return Given(
+        noise=noise,
+        judged=len(y),
+        known=step_products(noise, np.zeros(len(y)), rows, taps)[None],
+        others=np.empty((0, rows)),
+        beside=np.empty((0, taps + len(y) + 1)),
+        others_first=np.empty((0, rows + taps + 8)),
+        root=np.eye(1),
+        target=step_products(noise, y, rows, taps),
+        energy=float(y @ y),
+        edges=edges,
+    )

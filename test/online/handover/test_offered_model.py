@@ -11,6 +11,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.handover.offered_model import LONGEST_REASON, read_offer
 
+SOON = 10.0  # s of this process; without limits the worst take minutes
+
 OWN = LoopModel.load(find_config("example1_process.loop.yaml"))
 GOOD = find_config("example1.loop.yaml").read_text(encoding="utf-8")
 
@@ -51,7 +53,7 @@ def test_a_bad_one_is_refused_in_one_short_sentence(case: str) -> None:
     begin = time.process_time()
     with pytest.raises(InputError) as caught:
         read_offer(text, OWN)
-    assert time.process_time() - begin < 2.0
+    assert time.process_time() - begin < SOON
     assert said in str(caught.value)
     assert len(str(caught.value)) <= LONGEST_REASON + 1
     assert "\n" not in str(caught.value)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import time
@@ -71,6 +72,19 @@ def test_a_loop_that_takes_too_long_is_given_up() -> None:
     assert "more than 3 s" in done["bad"].reason
     assert done["1"].reason == "has no column OP"
     assert time.monotonic() - begun < 100.0
+
+
+def test_the_time_of_a_loop_begins_when_its_worker_is_ready() -> None:
+    slow = dataclasses.replace(OPTIONS, read_by=_Then(time.sleep, 3.0))  # unpickled by the worker
+    done = list(LocalEngine(1, longest=1.5).run(_tasks(3), slow))
+    assert {one.assessed.entry.reason for one in done} == {"has no column OP"}
+    assert len(done) == 3
+
+
+def test_a_worker_that_never_gets_ready_loses_its_loop_and_no_more_time() -> None:
+    broken = dataclasses.replace(OPTIONS, read_by=_Then(os._exit, 3))
+    (done,) = LocalEngine(1).run(_tasks(1), broken)
+    assert "worker ended 3 times, the last time with code 3" in done.assessed.entry.reason
 
 
 def test_tasks_are_drawn_no_faster_than_they_are_done() -> None:
