@@ -70,11 +70,7 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
-# What the tests need compiled is compiled while one core lints: else two processes both do it.
-test: setup
-	@$(BIN)/python -c "from stiction_ros.identification import warm_up; warm_up.compile_loops()" & \
-	compiling=$$!; $(MAKE) --no-print-directory lint && wait $$compiling || \
-	{ kill $$compiling 2>/dev/null; exit 1; }
+test: lint
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? -eq 5  # 5: ARGS picks none of them
 
