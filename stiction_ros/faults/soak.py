@@ -232,7 +232,7 @@ def soak(
                 readings.add(share, name, process.resident())
                 if process.code is not None:
                     failures.append(f"{name} ended with code {process.code}")
-            watch.look(stolen_seconds(), sum(map(int, _values(probe.values, MISSED).values())))
+            watch.look(stolen_seconds(), sum(_missed(probe.values).values()))
             last = (now, sample) if sample != last[1] else last
             if now - last[0] > STALL:
                 failures.append(f"no sample for {STALL:g} s at sample {sample}")
@@ -251,7 +251,7 @@ def soak(
     return Soaked(
         _number(probe.values, "plant", "sample"),
         took,
-        {key: int(value) for key, value in _values(probe.values, MISSED).items()},
+        _missed(probe.values),
         _values(probe.values, TOLD),
         kept(nodes),
         readings.memory(),
@@ -272,6 +272,10 @@ def _values(
         for node, key in keys
         if key in values.get(f"{node}: status", {})
     }
+
+
+def _missed(values: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
+    return {key: int(value) for key, value in _values(values, MISSED).items()}
 
 
 def kept(nodes: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:

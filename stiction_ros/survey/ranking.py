@@ -32,6 +32,7 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros.identification.evidence.rates import PRICE
 from stiction_ros.survey.entry import Entry, Status
 
 AGREES = {"valve": 1.0, "none": 0.8, "unknown": 0.8}
@@ -48,9 +49,6 @@ HEALTHY = 0.9
 
 HALF_SEEN = 3.0
 """Reversals of the stem from which a friction is half believed."""
-
-PRICE = 15.0
-"""−2 log likelihood that a believed friction must gain, and at which a gain counts half."""
 
 ALIKE = (0.2, 1.7)
 """Movement over the recorded one of a loop that is closed again and moves as recorded."""
@@ -84,7 +82,10 @@ def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> f
 
 
 def _shown(valve: Mapping[str, Any]) -> float:
-    """Return how much speaks for the friction of an undecided valve, 0 to 1."""
+    """Return how much speaks for the friction of an undecided valve, 0 to 1.
+
+    A gain of :data:`PRICE`, which a believed friction must have, counts half.
+    """
     told, stability = valve.get("evidence", {}), valve.get("stability")
     agreed = len(stability["agreed"]) + 1 if stability else 1
     steady = agreed / (len(stability["tried"]) + 1 if stability else 1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import left_by, projector, whiten, whitened_columns
+from stiction_ros.discrepancy.likelihood.noise import left_by, whiten
 from stiction_ros.discrepancy.simulation.free_run import seen_of
 from stiction_ros.effects import FloatArray, Offset, ProcessGain
 
@@ -64,7 +64,7 @@ def _expected(base: Baseline, candidate: Candidate) -> float:
         if i in response.sizes:
             wave = wave + _reference_size(candidate, noise.innovation_std, response.sizes[i][:, 0])
         train = blocks.train
-        basis = projector(whitened_columns(base.columns[i], noise.ar, train))
+        basis = base.basis(i, noise.ar)
         left = left_by(basis, whiten(wave, noise.ar)[train])
         energy += float(left @ left) / max(noise.innovation_std**2, 1e-300)
         rows = max(rows, noise.rows)

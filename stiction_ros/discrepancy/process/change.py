@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect, run_with
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import left_by, projector, whiten, whitened_columns
+from stiction_ros.discrepancy.likelihood.noise import left_by, whiten
 from stiction_ros.discrepancy.process.refit import equations_of, with_equations
 from stiction_ros.discrepancy.process.slower import Changeable
 from stiction_ros.discrepancy.simulation.free_run import Runs
@@ -143,7 +143,7 @@ class _Search:
                     if free[k]
                 ]
             )
-            basis = projector(whitened_columns(base.columns[output], ar, train))
+            basis = base.basis(output, ar)
             target = left_by(basis, whiten(gap, ar)[train])
             white = left_by(basis, whiten(slopes, ar)[train])
             step, *_ = np.linalg.lstsq(white, -target, rcond=1e-8)

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.held import (
+    NOTHING,
     ComplexArray,
     Held,
     held,
@@ -24,7 +25,6 @@ MOST = {GAIN: 0.15, TIME_CONSTANT: 0.2, LEAD: 0.2, DELAY: 1.5}
 OF_DELAY = 0.15  # of the model's dead time, where that is more
 PROBES = {GAIN: 0.01, TIME_CONSTANT: 0.01, LEAD: 0.01, DELAY: 0.1}  # of the derivatives
 SHORTEST = 1.0  # sample, of a time constant that counts
-NOTHING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)

@@ -65,7 +65,7 @@ def look_for(notice: Notice, seen: Observation) -> Noticing:
     new = frozenset().union(*during) - known
     bad = [one.wall for one in news if not warned or reasons(one.text) & new]
     after = (one for one in seen.statuses if one.node == notice.node)
-    good = [one.wall for one in after if one.wall > max(*bad, seen.over, 0.0)]
+    good = [one.wall for one in after if one.wall > max(*bad, seen.over)]
     if not good:
         return Noticing(shown, None, f"{name} is still shown {seen.until - seen.over:.1f} s after")
     gone = max(good[0] - seen.over, 0.0)

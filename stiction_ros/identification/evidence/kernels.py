@@ -89,7 +89,9 @@ class Given(NamedTuple):
 
 
 @compiled_fused
-def evidence(stem: FloatArray, given: Given, precision: FloatArray) -> tuple[float, FloatArray]:
+def evidence(
+    stem: FloatArray, moves: Moves, given: Given, precision: FloatArray
+) -> tuple[float, FloatArray]:
     r"""Return −2 log of the marginal likelihood but for constants, and the response.
 
     .. math:: n \log(r / n) + \log\det(X X^T + K^{-1})
@@ -99,16 +101,10 @@ def evidence(stem: FloatArray, given: Given, precision: FloatArray) -> tuple[flo
 
     Args:
         stem: scaled, shape (N,).
+        moves: of the stem.
         given: everything else.
         precision: inverse of K, shape (r, r).
     """
-    return _evidence(stem, moves_of(stem), given, precision)
-
-
-@compiled_fused
-def _evidence(
-    stem: FloatArray, moves: Moves, given: Given, precision: FloatArray
-) -> tuple[float, FloatArray]:
     size, known, edges = len(precision), len(given.known), given.edges
     taps, count = edges[-1], given.judged
     signal = with_past(whitened(given.noise, stem, stem[0]), taps)[-(taps + count + 1) :]
@@ -144,5 +140,5 @@ def evidences(
     for g in range(len(stems)):
         moves = moves_of(stems[g])
         if len(moves.at) >= least_moves:
-            out[g] = _evidence(stems[g], moves, given, precision)[0]
+            out[g] = evidence(stems[g], moves, given, precision)[0]
     return out

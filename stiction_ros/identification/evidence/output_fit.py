@@ -19,7 +19,6 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     LEAST,
     Given,
-    evidence,
     evidences,
     factorised,
     solved,
@@ -80,11 +79,6 @@ class Criterion:
         """
         found = evidences(stems, self.given, self.precision, least_moves)
         return np.asarray(found + self.constant)
-
-    def best(self, stem: FloatArray) -> tuple[float, FloatArray]:
-        """Return the loss of one stem and its response."""
-        loss, response = evidence(stem, self.given, self.precision)
-        return float(loss) + self.constant, response
 
 
 @dataclasses.dataclass(frozen=True)

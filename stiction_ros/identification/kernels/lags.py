@@ -255,13 +255,15 @@ def products_of(
     past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps + EIGHT))
     whole = valves * size
     beside, shared = np.empty((len(signals), whole)), np.empty((whole, whole))
+    seen = np.empty((len(signals), rows + taps + EIGHT))
+    for row in range(len(signals)):
+        seen[row] = step_products(noise, signals[row], rows, taps)
     for i in range(valves):
         moves, at = moves_of(stems[i]), i * size
         past[i] = with_past(whitened(noise, stems[i], stems[i, 0]), taps)[-(taps + count + 1) :]
         first[i] = step_products(noise, past[i, -1 - count : -1], rows, taps)
         for row in range(len(signals)):
-            lags = lag_products(moves, step_products(noise, signals[row], rows, taps), taps)
-            beside[row, at : at + size] = grouped(lags, edges)
+            beside[row, at : at + size] = grouped(lag_products(moves, seen[row], taps), edges)
         for j in range(i):
             along, theirs = j * size, moves_of(stems[j])
             begun = (lag_products(moves, first[j], taps), lag_products(theirs, first[i], taps))

@@ -132,7 +132,7 @@ def test_evidence_is_the_marginal_likelihood_of_a_normal_record(
     stem, y = _stem(random, 50, 0.5), random.standard_normal(40)
     prior, noise = ResponsePrior(decay, 2), np.array([1.0, -0.5])
     given = _given(noise, y, edges)
-    loss, response = evidence(stem, given, prior.precision(edges))
+    loss, response = evidence(stem, moves_of(stem), given, prior.precision(edges))
     rows = _groups(whitened(noise, stem, float(stem[0])), float(stem[0]) * 0.5, 10, edges)
     kernel = np.linalg.inv(prior.precision(edges))
     covariance = np.eye(40) + rows.T @ kernel @ rows
@@ -151,7 +151,7 @@ def test_a_stem_that_moves_too_seldom_is_not_judged() -> None:
     precision = ResponsePrior().precision(edges)
     found = evidences(stems, given, precision, 2)
     assert np.isinf(found[0])
-    assert found[1] == evidence(stems[1], given, precision)[0]
+    assert found[1] == evidence(stems[1], moves_of(stems[1]), given, precision)[0]
 
 
 def _given(noise: FloatArray, y: FloatArray, edges: IntArray) -> Given:
