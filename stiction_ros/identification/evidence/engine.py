@@ -11,9 +11,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import (
     ENDLESS,
-    LINE,
     OPEN,
-    RIVAL,
     SURE,
     explained,
 )
@@ -59,6 +57,9 @@ Progress = Callable[[float], None]
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 HARMLESS = 0.08  # of the range of OP: a valve is healthy when larger bands are rejected
+WIDEST = 0.4
+"""Of the range of OP: a wider band beside a wave from outside is not believed. A stem that goes to
+and fro once in each of its turns is a wave of this period itself, and cannot be told from it."""
 POWERFUL = 2  # rates at which larger bands must be rejected, of those that carry news
 BETWEEN = 3.0
 """Standard deviations of OP's innovations by which the band may be larger than the record shows: a
@@ -110,19 +111,17 @@ def identify(
 def doubted(valve: ValveEstimate) -> ValveEstimate:
     """Return the estimate, no longer with friction where its loop says otherwise.
 
-    A wave of one period that explains the record nearly as well comes from outside, and a
-    friction without which OP would move all the same is not what moves it; the latter holds where
-    the controller is known and the evidence not overwhelming.
+    A friction without which OP would move all the same is not what moves it, where the controller
+    is known and the evidence not overwhelming.
     """
     if not valve.verdict.has_friction:
         return valve
     told = valve.evidence
-    wave = told.get("line_rivalry", 0.0) > RIVAL and told.get("outside_line", 0.0) > LINE
     known = told.get("controller_fit", 0.0) > OPEN
     endless = told.get("moved_with", 0.0) >= ENDLESS
     idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
     idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
-    if not (wave or idle):
+    if not idle:
         return valve
     return dataclasses.replace(
         valve,
@@ -142,6 +141,8 @@ def _judged(
     figures = evidence_of(agreed, valve)
     for look in seen:
         figures[f"gain_{look.problem.rate}"] = look.accepted[valve].gain
+        if look.wave_gain is not None:
+            figures[f"wave_{look.problem.rate}"] = look.wave_gain
         figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
     verdict = _verdict(figures, agreed, seen, valve, options)
     believed = verdict.has_friction
@@ -183,7 +184,8 @@ def _stability(
     for look in seen:
         held = look.accepted[valve]
         near = max(band[0], held.band[0]) <= ALIKE * min(band[1], held.band[1])
-        agrees = held.gain < PRICE if healthy else held.gain > PRICE and near
+        finds = look.beyond_price(valve) > 0.0
+        agrees = not finds if healthy else finds and near
         name = f"rows of {look.problem.rate * sample_time:g} s"
         shown = held.times(float(look.problem.span[valve]))
         views.append(View(name, held.gain, agrees, shown.band))
@@ -200,7 +202,7 @@ def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
         for one, other in zip(best.fits, without.fits, strict=True)
     )
     return {
-        "delta_bic": agreed.gain - PRICE,
+        "delta_bic": agreed.gain,
         "free_run_ratio": _free_run(problem, without) / _free_run(problem, best),
         "half_1": halves[0],
         "half_2": halves[1],
@@ -236,6 +238,8 @@ def _verdict(
     slips = figures["moves"] >= options.min_moves
     if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL:
         both = min(figures["half_1"], figures["half_2"]) > 0.0
+        if agreed.look.wave_gain is not None:  # a stem that stays for half a wave is one itself
+            both = both and float(agreed.look.found.best.friction[valve].sum()) < WIDEST
         kind = kind_of(held.deadband_loss, held.static, held.dynamic)
         return kind if both and slips else VerdictKind.UNDECIDED
     quiet = max(look.accepted[valve].gain for look in seen) < PRICE

@@ -13,6 +13,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
@@ -32,6 +33,8 @@ from stiction_ros.identification.kernels.lags import (
     step_products,
     whitened,
 )
+
+ComplexArray = NDArray[np.complex128]
 
 ROUNDS = 6
 SETTLED = 0.2  # of −2 log likelihood: a round that gains less is the last
@@ -88,7 +91,9 @@ class Whitened:
     Attributes:
         noise: D.
         seen: the output, shape (n,).
-        known: a constant, shape (1, n).
+        known: a constant and waves from outside, shape (1 + 2 H, n): a wave stays one when it is
+            whitened.
+        passed: what D makes of each harmonic, complex, shape (H,).
         stems: scaled, shape (m, N).
         lags: of the stems, with each other and with ``known`` and the output.
         products: of ``known`` and of the lags of every stem with each other, shape (q, q).
@@ -99,6 +104,7 @@ class Whitened:
     noise: FloatArray
     seen: FloatArray
     known: FloatArray
+    passed: ComplexArray
     stems: FloatArray
     lags: Products
     products: FloatArray
@@ -110,7 +116,7 @@ class Whitened:
         """Whiten an output and ``stems``, scaled, shape (m, N); m may be 0."""
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[problem.first :]
-        known = np.full((1, len(seen)), 1.0 / np.sqrt(len(seen)))
+        known = problem.known[output]
         lags = products_of(noise, stems, np.vstack([known, seen]), problem.edges)
         count = len(known)
         products = np.empty((count + len(lags.shared),) * 2)
@@ -119,11 +125,20 @@ class Whitened:
         products[count:, :count] = lags.beside[:count].T
         products[count:, count:] = lags.shared
         seen_products = np.concatenate([known @ seen, lags.beside[count]])
-        return cls(noise, seen, known, stems, lags, products, seen_products, problem.edges)
+        turns = np.outer(problem.turns(output), np.arange(len(noise)))
+        passed = np.exp(-1j * turns) @ noise
+        return cls(noise, seen, known, passed, stems, lags, products, seen_products, problem.edges)
+
+    def wave_variances(self, prior: ResponsePrior) -> FloatArray:
+        """Return the variances of the sines and cosines, whitened, over σ², shape (2 H,)."""
+        harmonics = np.arange(1, len(self.passed) + 1)
+        return np.tile(prior.wave_variances(harmonics) * np.abs(self.passed) ** 2, 2)
 
     def with_precision(self, prior: ResponsePrior) -> FloatArray:
         """Return the products and what is known before the record, shape (q, q)."""
         out, precision = self.products.copy(), prior.precision(self.edges)
+        waves = np.arange(1, len(self.known))
+        out[waves, waves] += 1.0 / self.wave_variances(prior)
         for start in range(len(self.known), len(out), len(precision)):
             block = slice(start, start + len(precision))
             out[block, block] += precision
@@ -131,7 +146,8 @@ class Whitened:
 
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
-        return len(self.stems) * prior.log_determinant(self.edges)
+        waves = float(np.log(self.wave_variances(prior)).sum())
+        return waves + len(self.stems) * prior.log_determinant(self.edges)
 
     def loss(self, prior: ResponsePrior) -> tuple[float, FloatArray]:
         """Return the loss, and what multiplies ``known`` and each lag, shape (q,)."""
@@ -236,8 +252,11 @@ def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
             met[one] = whole.loss(one)[0]
         return met[one]
 
+    beside = len(whole.known) > 1
     while True:
         better = min(prior.neighbours(), key=loss)
+        if beside:
+            better = min(better.neighbours(waves=True), key=loss)
         if better == prior:
             return prior
         prior = better
@@ -245,10 +264,15 @@ def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
 
 def _fitted(problem: Problem, output: int, whole: Whitened, prior: ResponsePrior) -> OutputFit:
     loss, weights = whole.loss(prior)
-    responses = weights[1:].reshape(len(whole.stems), len(problem.edges) - 1)
+    known = len(whole.known)
+    responses = weights[known:].reshape(len(whole.stems), len(problem.edges) - 1)
     rest = problem.pv[output].copy()
     for stem, levels in zip(whole.stems, responses, strict=True):
         rest -= answered(stem, np.repeat(levels, np.diff(problem.edges)))
+    if known > 1:
+        sines, cosines = weights[1:known].reshape(2, -1)
+        sizes = (cosines - 1j * sines) / whole.passed
+        rest -= np.concatenate([-sizes.imag, sizes.real]) @ problem.waves[output]
     rest -= rest[problem.first :].mean()
     return OutputFit(whole.noise, prior, loss, responses, rest)
 

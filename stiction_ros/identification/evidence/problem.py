@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -25,6 +26,7 @@ LEFT_OUT = 0.05  # share of the rows at the begin, where a stem may not have fou
 NOISE_ORDER = 6
 MOVES = 6  # of a stem over a whole record, fewest of a friction that is judged
 FEW_MOVES = 2  # of a beginning
+FASTEST = 2.5  # rows of the shortest period of a wave
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Problem:
         least_moves: of a stem, fewest of a friction that is judged.
         further: per valve, values of the law's parameters behind f_S and f_D; empty where it
             has no others.
+        lines: per output, frequencies of a wave from outside, turns per sample; empty for none.
     """
 
     op: FloatArray
@@ -55,6 +58,7 @@ class Problem:
     skipped: int = 0
     least_moves: int = MOVES
     further: tuple[tuple[float, ...], ...] = ()
+    lines: tuple[tuple[float, ...], ...] = ()
 
     @classmethod
     def of(
@@ -98,6 +102,16 @@ class Problem:
             least_moves=FEW_MOVES,
         )
 
+    def with_waves(self, lines: Sequence[Sequence[float]]) -> Problem:
+        """Return the problem beside waves from outside.
+
+        Args:
+            lines: per output, frequencies in turns per sample; those too fast for the rows are
+                left out.
+        """
+        seen = tuple(tuple(f for f in row if f * self.rate < 1.0 / FASTEST) for row in lines)
+        return dataclasses.replace(self, lines=seen)
+
     @property
     def rows(self) -> int:
         """Number of rows of the record."""
@@ -126,6 +140,25 @@ class Problem:
     def taps(self) -> int:
         """M, length of an impulse response."""
         return int(self.edges[-1])
+
+    @functools.cached_property
+    def waves(self) -> tuple[FloatArray, ...]:
+        """Sine and cosine of the lines of each output, shape (2 H, n) each."""
+        middle = self.rate * (np.arange(self.rows) + 0.5)
+        told = self.lines or ((),) * len(self.pv)
+        angles = [2.0 * np.pi * np.outer(lines, middle).reshape(-1, self.rows) for lines in told]
+        return tuple(np.concatenate([np.sin(angle), np.cos(angle)]) for angle in angles)
+
+    @functools.cached_property
+    def known(self) -> tuple[FloatArray, ...]:
+        """A constant and the waves of each output over the rows that count, (1 + 2 H, n) each."""
+        constant = np.full((1, self.count), 1.0 / np.sqrt(self.count))
+        return tuple(np.concatenate([constant, waves[:, self.first :]]) for waves in self.waves)
+
+    def turns(self, output: int) -> FloatArray:
+        """Return the frequencies of the lines of an output, rad per row, shape (H,)."""
+        lines = self.lines[output] if self.lines else ()
+        return np.asarray(2.0 * np.pi * self.rate * np.array(lines, dtype=float))
 
     def ideal_stems(self) -> FloatArray:
         """Return the stems of valves without friction, scaled, shape (m, n)."""

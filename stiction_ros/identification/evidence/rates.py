@@ -9,6 +9,9 @@ neighbouring rates give it. What is best at one rate is tried at the others.
 A rate sees a response for as many rows as it has taps. Where the process goes on beyond that, it
 is no longer among the processes that are tried, and friction makes up for what they lack: such a
 rate has a say only where all coarser ones, one of which sees the end, find friction as well.
+
+Where a wave from outside may be in an output, all this is done once more beside it, and at each
+rate the better of both counts, with and without friction alike.
 """
 
 from __future__ import annotations
@@ -22,11 +25,13 @@ import numpy as np
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.further import settled
+from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.search import (
     APART,
     Found,
     Provider,
+    better,
     heads,
     search,
     search_again,
@@ -49,6 +54,11 @@ row, and the friction with it."""
 PRICE = 15.0
 """−2 log likelihood that friction must gain at two neighbouring rates: what the best of so many
 frictions gains on quiet loops without any."""
+BESIDE = 15.0
+"""What it must gain more where a wave from outside is tried, whose period is chosen as well."""
+INEXACT = 0.05
+"""Share of a wave's own gain that it must gain besides: no wave is one to the letter, and what it
+misses moves in time with it, as a friction may."""
 UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on beyond it
 
 
@@ -61,12 +71,26 @@ class Look:
         found: by the search.
         accepted: per valve, frictions that are not rejected.
         carries_news: whether at least every other row holds a report of its own.
+        wave_gain: −2 log likelihood that waves from outside add where there is no friction; None
+            where none is believed.
     """
 
     problem: Problem
     found: Found
     accepted: tuple[Accepted, ...]
     carries_news: bool = True
+    wave_gain: float | None = None
+
+    @property
+    def price(self) -> float:
+        """−2 log likelihood that friction must gain at this rate to be believed."""
+        if self.wave_gain is None:
+            return PRICE
+        return PRICE + BESIDE + INEXACT * self.wave_gain
+
+    def beyond_price(self, valve: int) -> float:
+        """Return what the friction of a valve gains beyond :attr:`price`."""
+        return self.accepted[valve].gain - self.price
 
     def covers(self, valve: int) -> bool:
         """Return whether responses die away by their last tap, without friction of the valve."""
@@ -80,7 +104,8 @@ class Agreement:
 
     Attributes:
         look: the one of the two with more evidence.
-        gain: the lesser of both gains of friction, −2 log of the marginal likelihood.
+        gain: the lesser of what friction gains at both beyond what it must, −2 log of the marginal
+            likelihood.
         alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
             have a say.
     """
@@ -106,18 +131,41 @@ def looks(
     problems = [Problem.of(record, options, rate) for rate in rates]
     further = settled(problems[0])
     problems = [dataclasses.replace(problem, further=further) for problem in problems]
-    found = [search(problem, providers) for problem in problems]
-    for _ in range(ROUNDS):
-        seeds = [_heads(*one) for one in zip(problems, found, strict=True)]
-        for k, problem in enumerate(problems):
-            others = [seed for other, row in enumerate(seeds) if other != k for seed in row]
-            found[k] = search_again(problem, found[k], others)
-    seen, between = [], samples_between_reports(record)
-    for problem, one in zip(problems, found, strict=True):
+    found = _searched(problems, providers)
+    waves = tuple(outside_wave(problems, i) for i in range(len(record.outputs)))
+    gains: list[float | None] = [None] * len(problems)
+    if any(waves):
+        beside = [problem.with_waves([w.lines if w else () for w in waves]) for problem in problems]
+        also = _searched(beside, providers, _all_heads(problems, found))
+        for k, (plain, waved) in enumerate(zip(found, also, strict=True)):
+            gains[k] = max(plain.ideal.loss - waved.ideal.loss, 0.0)
+            if waved.best.loss < plain.best.loss:
+                problems[k] = beside[k]
+            found[k] = better(plain, waved)
+    between = samples_between_reports(record)
+    seen = []
+    for problem, one, gain in zip(problems, found, gains, strict=True):
         valves = range(len(record.valves))
         held = tuple(accepted(problem, one, j, options.confidence) for j in valves)
-        seen.append(Look(problem, one, held, between <= OLDEST * problem.rate))
+        seen.append(Look(problem, one, held, between <= OLDEST * problem.rate, gain))
     return tuple(seen)
+
+
+def _searched(
+    problems: Sequence[Problem], providers: Sequence[Provider], seeds: Sequence[Candidate] = ()
+) -> list[Found]:
+    """Return what is found at each rate, what is best at one tried at the others, and ``seeds``."""
+    found = [search(problem, providers) for problem in problems]
+    for _ in range(ROUNDS):
+        heads_of = [_heads(*one) for one in zip(problems, found, strict=True)]
+        for k, problem in enumerate(problems):
+            others = [seed for other, row in enumerate(heads_of) if other != k for seed in row]
+            found[k] = search_again(problem, found[k], [*others, *seeds])
+    return found
+
+
+def _all_heads(problems: Sequence[Problem], found: Sequence[Found]) -> list[Candidate]:
+    return [head for one in zip(problems, found, strict=True) for head in _heads(*one)]
 
 
 def liveliest(record: Record) -> Record:
@@ -146,12 +194,12 @@ def _heads(problem: Problem, found: Found) -> list[Candidate]:
 def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
-        return Agreement(seen[0], seen[0].accepted[valve].gain, seen[0].covers(valve))
+        return Agreement(seen[0], seen[0].beyond_price(valve), seen[0].covers(valve))
     say, pairs = _with_a_say(seen, valve), []
     for k, two in enumerate(itertools.pairwise(seen)):
         held = [look.accepted[valve] for look in two]
         low, high = max(one.band[0] for one in held), min(one.band[1] for one in held)
-        gains = [one.gain for one in held]
+        gains = [look.beyond_price(valve) for look in two]
         alike = low <= ALIKE * high and say[k] and say[k + 1]
         pairs.append(Agreement(two[gains.index(max(gains))], min(gains), alike))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
@@ -160,5 +208,5 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
 def _with_a_say(seen: tuple[Look, ...], valve: int) -> list[bool]:
     """Return which rates count: those that cover the process, and those that such confirm."""
     covers = [look.covers(valve) for look in seen]
-    finds = [look.accepted[valve].gain > PRICE for look in seen]
+    finds = [look.beyond_price(valve) > 0.0 for look in seen]
     return [covers[k] or (all(finds[k + 1 :]) and any(covers[k + 1 :])) for k in range(len(seen))]

@@ -18,6 +18,10 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 DECAYS = (0.6, 0.75, 0.85, 0.92, 0.96, 0.98)  # per tap: a time constant of 2 to 50 taps
+WAVES = tuple(10.0**k for k in range(-2, 9))
+"""Of σ²: of the first harmonic of a wave from outside, in PV."""
+SHARPNESSES = (2.0, 4.0, 6.0)
+"""Powers by which the variances of harmonics fall: squares, triangles, and smoother."""
 SIZES = (1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of σ²; per standard deviation of the stem
 
 
@@ -28,10 +32,14 @@ class ResponsePrior:
     Attributes:
         decay: index of λ in :data:`DECAYS`.
         size: index of c in :data:`SIZES`.
+        wave, sharpness: indices in :data:`WAVES` and :data:`SHARPNESSES`; they count where there
+            is a wave.
     """
 
     decay: int = 3
     size: int = 2
+    wave: int = 5
+    sharpness: int = 1
 
     def variances(self, edges: IntArray) -> FloatArray:
         """Return the variances of the differences g over σ², shape (r,).
@@ -45,25 +53,39 @@ class ResponsePrior:
 
     def precision(self, edges: IntArray) -> FloatArray:
         """Return the inverse of K, shape (r, r), not to be written to."""
-        return _inverse(self, edges.tobytes())[0]
+        return _inverse(self.decay, self.size, edges.tobytes())[0]
 
     def log_determinant(self, edges: IntArray) -> float:
         """Return log det K."""
-        return _inverse(self, edges.tobytes())[1]
+        return _inverse(self.decay, self.size, edges.tobytes())[1]
 
-    def neighbours(self) -> list[ResponsePrior]:
-        """Return the members next to this one, itself included."""
+    def wave_variances(self, harmonics: IntArray) -> FloatArray:
+        """Return the variances of a wave's harmonics, numbered from 1, over σ², same shape."""
+        return np.asarray(WAVES[self.wave] * harmonics ** -SHARPNESSES[self.sharpness])
+
+    def neighbours(self, *, waves: bool = False) -> list[ResponsePrior]:
+        """Return the members next to this one, itself included; ``waves`` changes those of it."""
+        if waves:
+            return [
+                dataclasses.replace(self, wave=wave, sharpness=sharpness)
+                for wave in _near(self.wave, len(WAVES))
+                for sharpness in _near(self.sharpness, len(SHARPNESSES))
+            ]
         return [
-            ResponsePrior(decay, size)
-            for decay in range(max(self.decay - 1, 0), min(self.decay + 2, len(DECAYS)))
-            for size in range(max(self.size - 1, 0), min(self.size + 2, len(SIZES)))
+            dataclasses.replace(self, decay=decay, size=size)
+            for decay in _near(self.decay, len(DECAYS))
+            for size in _near(self.size, len(SIZES))
         ]
 
 
+def _near(index: int, count: int) -> range:
+    return range(max(index - 1, 0), min(index + 2, count))
+
+
 @functools.lru_cache(maxsize=1024)
-def _inverse(prior: ResponsePrior, edges: bytes) -> tuple[FloatArray, float]:
+def _inverse(decay: int, size: int, edges: bytes) -> tuple[FloatArray, float]:
     """Return the inverse of K and log det K: few priors and groups serve a whole search."""
-    variances = prior.variances(np.frombuffer(edges, dtype=np.int64))
+    variances = ResponsePrior(decay, size).variances(np.frombuffer(edges, dtype=np.int64))
     weights = 1.0 / variances
     found = np.diag(weights + np.append(0.0, weights[:-1]))
     found -= np.diag(weights[:-1], 1) + np.diag(weights[:-1], -1)

@@ -253,6 +253,14 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
     return found if best is found.best else _concluded(problem, met)
 
 
+def better(plain: Found, other: Found) -> Found:
+    """Return the better of two searches of one record; no valve's rival is worse than in either."""
+    best = min(plain, other, key=lambda found: found.best.loss)
+    pairs = zip(plain.without, other.without, strict=True)
+    without = tuple(min(pair, key=lambda candidate: candidate.loss) for pair in pairs)
+    return dataclasses.replace(best, without=without)
+
+
 def heads(found: Found, valve: int, count: int, distance: float) -> list[Candidate]:
     """Return the best candidates with friction of a valve, apart by ``distance``."""
     met = [one for one in found.met if one.friction[valve, 0] > 0.0]

@@ -1,0 +1,162 @@
+r"""Waves from outside: a clock that is not the loop's, as part of the model of an output.
+
+A load that swings keeps its time, and PV answers it beside all that comes through the valve:
+
+.. math:: y_k = c + \sum_j \sum_i h^{(j)}_i \chi^{(j)}_{k-i}
+          + \sum_{h=1}^{H} (s_h \sin h \omega k + c_h \cos h \omega k) + w_k
+
+A wave that is left out has to be explained by something: by the noise, and by a friction that
+happens to move in time with it. A wave that is tried is tried with and without friction alike.
+Here ω and H are found, friction left out; each sine costs log n, as in BIC.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.evidence.problem import FASTEST, NOISE_ORDER, Problem
+from stiction_ros.identification.kernels.lags import with_past
+
+HARMONICS = 25  # H, at most: corners of a square wave
+LEAST_CYCLES = 4.0  # of a wave, in a record
+BELIEVED = 6.0  # BIC that a wave gains over none: strong evidence by Kass and Raftery
+FINE = 8  # frequencies of lines per line width 1 / n
+FINER = 8  # fundamentals per frequency of lines: the last harmonic is to be met as well
+SHORTEST = 5.0  # rows of a fundamental's period
+ZOOMS = (8.0, 1.0, 0.125)  # steps of fundamentals in which the best is looked for ever closer
+AROUND = range(-4, 5)  # steps to either side
+EXPLAINED = 1e-6  # of the energy: less left than this is none left
+DEPENDENT = 1e-7  # size of a direction, of scaled columns, below which it is rounding
+
+
+@dataclasses.dataclass(frozen=True)
+class OutsideWave:
+    """A wave in one output.
+
+    Attributes:
+        frequency: turns per sample.
+        harmonics: H.
+        gain: BIC without minus BIC with it, both without friction.
+    """
+
+    frequency: float
+    harmonics: int
+    gain: float
+
+    @property
+    def lines(self) -> tuple[float, ...]:
+        """Frequencies of all harmonics, turns per sample."""
+        return tuple(self.frequency * h for h in range(1, self.harmonics + 1))
+
+
+def outside_wave(problems: Sequence[Problem], output: int) -> OutsideWave | None:
+    """Return the wave that gains most at any rate, None where none is believed.
+
+    Args:
+        problems: one record at several rates.
+        output: index.
+    """
+    found = [wave for problem in problems if (wave := _strongest(problem, output)) is not None]
+    best = max(found, key=lambda wave: wave.gain, default=None)
+    return best if best is not None and best.gain > BELIEVED else None
+
+
+def _strongest(problem: Problem, output: int) -> OutsideWave | None:
+    """Return the wave whose harmonics gain most, each that pays for itself counted."""
+    beside = _Beside.of(problem, output)
+    length = FINE << (beside.count - 1).bit_length()
+    slowest = int(np.ceil(LEAST_CYCLES / beside.count * length * FINER))
+    fundamentals = np.arange(slowest, int(length * FINER / SHORTEST))
+    taken = beside.taken_by_lines(length)
+    pays = beside.gain(taken) > 2.0 * np.log(beside.count)
+    total, last = np.zeros(len(fundamentals)), np.zeros(len(fundamentals), dtype=np.int64)
+    for h in range(1, HARMONICS + 1):
+        at = (fundamentals * h + FINER // 2) // FINER
+        counted = (at < int(length / FASTEST)) & pays[np.minimum(at, len(pays) - 1)]
+        total[counted] += taken[at[counted]]
+        last[counted] = h
+    gains = beside.gain(total) - 2.0 * np.log(beside.count) * last
+    best = int(np.argmax(gains)) if len(gains) else 0
+    if not len(gains) or gains[best] <= 0.0:
+        return None
+    harmonics, step = int(last[best]), 1.0 / (length * FINER)
+    middle, gain = float(fundamentals[best]) * step, 0.0
+    for zoom in ZOOMS:
+        tried = [middle + k * zoom * step for k in AROUND]
+        gain, middle = max((beside.gain_of_wave(one, harmonics), one) for one in tried)
+    return OutsideWave(middle / problem.rate, harmonics, gain)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Beside:
+    """What explains an output without any wave, and what it leaves.
+
+    Attributes:
+        plain: orthonormal basis of a constant, the output's past and the valves', shape (n, q).
+        left: of the output, shape (n,).
+    """
+
+    plain: FloatArray
+    left: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, output: int) -> _Beside:
+        """Take an output's last samples and all taps of valves that follow OP."""
+        y, rows = problem.pv[output], np.arange(problem.first, problem.rows)
+        columns = [y[rows - lag] for lag in range(1, NOISE_ORDER + 1)]
+        ends = rows + problem.taps
+        for stem in problem.ideal_stems():
+            sums = np.concatenate([[0.0], np.cumsum(with_past(stem, problem.taps))])
+            for low, high in itertools.pairwise(problem.edges):
+                columns.append(sums[ends - low] - sums[ends - high])
+        table = np.column_stack(columns)
+        table = table - table.mean(axis=0)
+        table /= np.maximum(np.linalg.norm(table, axis=0), 1e-300)
+        directions, sizes, _ = np.linalg.svd(table, full_matrices=False)
+        constant = np.full((len(rows), 1), 1.0 / np.sqrt(len(rows)))
+        plain = np.concatenate([constant, directions[:, sizes > DEPENDENT]], axis=1)
+        return cls(plain, y[rows] - plain @ (plain.T @ y[rows]))
+
+    @property
+    def count(self) -> int:
+        """n, rows."""
+        return len(self.left)
+
+    def gain(self, taken: FloatArray) -> FloatArray:
+        """Return −2 log likelihood gained by an energy that is taken, same shape."""
+        energy = max(float(self.left @ self.left), 1e-300)
+        return np.asarray(-self.count * np.log(np.maximum(1.0 - taken / energy, EXPLAINED)))
+
+    def gain_of_wave(self, frequency: float, harmonics: int) -> float:
+        """Return BIC without minus BIC with a wave of a frequency in turns per row."""
+        rows = np.arange(self.count)
+        turns = 2.0 * np.pi * frequency * np.outer(rows, np.arange(1, harmonics + 1))
+        lines = np.concatenate([np.sin(turns), np.cos(turns)], axis=1)
+        basis = np.linalg.qr(lines - self.plain @ (self.plain.T @ lines))[0]
+        taken = np.array([np.sum((basis.T @ self.left) ** 2)])
+        return float(self.gain(taken)[0] - np.log(self.count) * (1.0 + 2.0 * harmonics))
+
+    def taken_by_lines(self, length: int) -> FloatArray:
+        """Return the energy that one line takes, at k / ``length`` turns a row, (length / 2,).
+
+        Products of sine and cosine with anything come from its Fourier transform, those with each
+        other from that of a constant at twice the frequency.
+        """
+        half = length // 2
+        sums = np.fft.rfft(self.left, length)[:half]
+        double = np.fft.fft(np.ones(self.count), length)[::2]
+        cc, ss = 0.5 * (self.count + double.real), 0.5 * (self.count - double.real)
+        cs = -0.5 * double.imag
+        for column in self.plain.T:
+            known = np.fft.rfft(column, length)[:half]
+            cc, ss = cc - known.real**2, ss - known.imag**2
+            cs = cs + known.real * known.imag
+        c, s = sums.real, -sums.imag
+        determinant = np.maximum(cc * ss - cs**2, 1e-9 * self.count**2)
+        taken = (ss * c**2 - 2.0 * cs * c * s + cc * s**2) / determinant
+        return np.clip(taken, 0.0, float(self.left @ self.left))
