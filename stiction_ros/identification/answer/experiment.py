@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from stiction_ros.identification.answer.step_answer import StepAnswer
-from stiction_ros.identification.closed_loop.explanation import LINE, MATERIAL, RIVAL
+from stiction_ros.identification.closed_loop.explanation import MATERIAL
+from stiction_ros.identification.inference.verdict import WIDEST, beside_wave
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
@@ -65,10 +66,11 @@ def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float
     if short < 0.0:
         if told["moves"] < least_moves:
             return f"By {size} the stem moves {told['moves']:.0f} times only."
-        if told.get("line_rivalry", 0.0) > RIVAL and told.get("outside_line", 0.0) > LINE:
+        band = estimate.static_friction + estimate.dynamic_friction
+        if beside_wave(told) and band > WIDEST * span:
             return (
-                f"A wave from outside explains the record nearly as well as {size}: in manual it "
-                "would go on while OP rests."
+                f"By {size} the stem goes to and fro once in each turn of a wave from outside and "
+                "cannot be told from it: in manual the wave would go on while OP rests."
             )
         if not told.get("alike", 1.0):
             return (
@@ -81,7 +83,8 @@ def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float
             return f"The loop would move nearly as much without {size}."
         return f"The record speaks for {size}, which hardly matters."
     if estimate.static_friction > 0.0 and min(told["half_1"], told["half_2"]) > 0.0:
-        return f"The record speaks for {size}, but not clearly."
+        beside = ", beside a wave from outside" if beside_wave(told) else ""
+        return f"The record speaks for {size}{beside}, but not clearly."
     high = estimate.static_interval[1]
     share = 100.0 * high / span
     return f"The record does not reject f_S up to {high:.2g} %, {share:.0f} % of OP's range."

@@ -11,6 +11,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import (
     ENDLESS,
+    LINE,
     OPEN,
     SURE,
     explained,
@@ -30,7 +31,13 @@ from stiction_ros.identification.evidence.rates import (
     looks,
 )
 from stiction_ros.identification.inference.conclusion import Findings, conclude
-from stiction_ros.identification.inference.verdict import half_gains, is_deadband, kind_of
+from stiction_ros.identification.inference.verdict import (
+    WIDEST,
+    beside_wave,
+    half_gains,
+    is_deadband,
+    kind_of,
+)
 from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
@@ -57,9 +64,6 @@ Progress = Callable[[float], None]
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 HARMLESS = 0.08  # of the range of OP: a valve is healthy when larger bands are rejected
-WIDEST = 0.4
-"""Of the range of OP: a wider band beside a wave from outside is not believed. A stem that goes to
-and fro once in each of its turns is a wave of this period itself, and cannot be told from it."""
 POWERFUL = 2  # rates at which larger bands must be rejected, of those that carry news
 BETWEEN = 3.0
 """Standard deviations of OP's innovations by which the band may be larger than the record shows: a
@@ -112,7 +116,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     """Return the estimate, no longer with friction where its loop says otherwise.
 
     A friction without which OP would move all the same is not what moves it, where the controller
-    is known and the evidence not overwhelming.
+    is known and the evidence not overwhelming. And a stem that goes to and fro once in each turn of
+    a wave from outside is a wave of this period itself, and cannot be told from it.
     """
     if not valve.verdict.has_friction:
         return valve
@@ -121,7 +126,9 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     endless = told.get("moved_with", 0.0) >= ENDLESS
     idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
     idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
-    if not idle:
+    wide = told["share"] * (1.0 + valve.dynamic_friction / valve.static_friction) > WIDEST
+    itself = wide and beside_wave(told) and told.get("outside_line", 0.0) > LINE
+    if not (idle or itself):
         return valve
     return dataclasses.replace(
         valve,
@@ -238,8 +245,6 @@ def _verdict(
     slips = figures["moves"] >= options.min_moves
     if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL:
         both = min(figures["half_1"], figures["half_2"]) > 0.0
-        if agreed.look.wave_gain is not None:  # a stem that stays for half a wave is one itself
-            both = both and float(agreed.look.found.best.friction[valve].sum()) < WIDEST
         kind = kind_of(held.deadband_loss, held.static, held.dynamic)
         return kind if both and slips else VerdictKind.UNDECIDED
     quiet = max(look.accepted[valve].gain for look in seen) < PRICE

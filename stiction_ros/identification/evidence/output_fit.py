@@ -3,8 +3,9 @@ r"""One output under given stems: any smooth process, and autoregressive noise b
 .. math:: y_k = \sum_j \sum_{i=1}^{M} h^{(j)}_i \chi^{(j)}_{k-i} + c + w_k, \qquad
           D(q) w_k = \epsilon_k
 
-with the prior of :mod:`.response_prior` on each h. Level and responses are integrated out, noise
-and prior chosen such that −2 log of the marginal likelihood is least, in turns.
+with the prior of :mod:`..linear.response_prior` on each h, and a wave from outside where the
+problem has one. Level and responses are integrated out, noise and prior chosen such that −2 log of
+the marginal likelihood is least, in turns.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ from stiction_ros.identification.evidence.kernels import (
     solved,
 )
 from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
-from stiction_ros.identification.evidence.response_prior import ResponsePrior
 from stiction_ros.identification.kernels.lags import (
     Products,
     answered,
@@ -33,6 +33,7 @@ from stiction_ros.identification.kernels.lags import (
     step_products,
     whitened,
 )
+from stiction_ros.identification.linear.response_prior import ResponsePrior
 
 ComplexArray = NDArray[np.complex128]
 

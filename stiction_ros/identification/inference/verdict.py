@@ -9,6 +9,8 @@ Evidence, all under the noise model:
 - ``half_1``, ``half_2``: −2 log likelihood gained by friction in either half of the record.
 - ``share``: f_S over the OP span; ``moves``: number of stem moves.
 - ``deadband_loss``: −2 log likelihood lost by J = 0.
+- ``wave_1`` … ``wave_8``: −2 log likelihood that waves from outside add at a rate, where they were
+  tried beside the friction.
 - ``patterns``, ``patterns_closed``: switching patterns enumerated round the best, and whether
   all at the edge were rejected.
 - ``stem_error``: mean squared error of the stem, %², where the record holds the true one (the
@@ -17,7 +19,7 @@ Evidence, all under the noise model:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -33,6 +35,14 @@ one parameter that it has less."""
 SMALL_JUMP = 0.25
 """Jump, as a share of f_S + f_D, up to which friction is a deadband: a stem that is moved by the
 controller's own kicks tells f_S + f_D alone, and any jump may go with it."""
+
+WIDEST = 0.4
+"""Of the range of OP: a wider band is not believed beside a wave from outside."""
+
+
+def beside_wave(figures: Mapping[str, float]) -> bool:
+    """Return whether waves from outside were tried beside the friction of these figures."""
+    return any(name.startswith("wave_") for name in figures)
 
 
 def evidence(

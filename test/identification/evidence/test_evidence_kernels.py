@@ -13,7 +13,6 @@ from stiction_ros.identification.evidence.kernels import (
     factorised,
     solved,
 )
-from stiction_ros.identification.evidence.response_prior import ResponsePrior
 from stiction_ros.identification.kernels.lags import (
     answered,
     grouped,
@@ -26,6 +25,7 @@ from stiction_ros.identification.kernels.lags import (
     whitened,
     with_past,
 )
+from stiction_ros.identification.linear.response_prior import ResponsePrior
 
 
 def _groups(signal: FloatArray, before: float, first: int, edges: IntArray) -> FloatArray:

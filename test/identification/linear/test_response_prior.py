@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiction_ros.identification.evidence.response_prior import DECAYS, SIZES, ResponsePrior
+from stiction_ros.identification.linear.response_prior import DECAYS, SIZES, ResponsePrior
 
 
 @pytest.mark.parametrize("decay", range(len(DECAYS)))
