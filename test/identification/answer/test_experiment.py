@@ -64,12 +64,13 @@ OPTIONS = IdentificationOptions()
     ("evidence", "said"),
     [
         ({"moves": 3.0}, "the stem moves 3 times only"),
-        ({"line_rivalry": 0.9, "outside_line": 40.0}, "wave from outside explains"),
+        ({"wave_1": 40.0}, "hardly matters"),
+        ({"wave_1": 40.0, "delta_bic": 12.0}, "beside a wave from outside, but not clearly"),
         ({"alike": 0.0}, "no two rates that see all"),
         ({"half_1": -2.0}, "One half of the record only"),
         ({"loop_gone": 0.01}, "move nearly as much without f_S 1 %"),
         ({}, "hardly matters"),
-        ({"delta_bic": 12.0}, "but not clearly"),
+        ({"delta_bic": 12.0}, "f_S 1 %, but not clearly"),
         (
             {"delta_bic": -8.0, "half_1": -1.0},
             "f_S up to 1.4 %, 18 % of OP's range",
@@ -83,6 +84,12 @@ def test_the_reason_is_that_of_the_evidence(
     assert span == pytest.approx(8.0)
     text = experiment_for(record, answer(undecided(**evidence)), 0, OPTIONS)
     assert said in text
+
+
+def test_a_stem_that_goes_with_the_wave_cannot_be_told_from_it(record: Record) -> None:
+    valve = dataclasses.replace(undecided(wave_1=40.0), static_friction=3.0)
+    text = experiment_for(record, answer(valve), 0, OPTIONS)
+    assert "f_S 3 % the stem goes to and fro once in each turn of a wave from outside" in text
 
 
 def test_the_travel_test_is_sized_by_band_noise_and_process(record: Record) -> None:

@@ -55,21 +55,22 @@ def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
     ("changes", "verdict"),
     [
         ({}, VerdictKind.STICKY),
-        ({"line_rivalry": 2.0, "outside_line": 50.0}, VerdictKind.UNDECIDED),
-        ({"line_rivalry": 2.0, "outside_line": -5.0}, VerdictKind.STICKY),
-        ({"line_rivalry": 0.1, "outside_line": 50.0}, VerdictKind.STICKY),
+        ({"wave_2": 90.0, "outside_line": 50.0, "share": 0.35}, VerdictKind.UNDECIDED),
+        ({"wave_2": 90.0, "outside_line": 50.0, "share": 0.25}, VerdictKind.STICKY),
+        ({"wave_2": 90.0, "outside_line": -5.0, "share": 0.35}, VerdictKind.STICKY),
+        ({"outside_line": 50.0, "share": 0.35}, VerdictKind.STICKY),
         ({"loop_gone": 0.01, "controller_fit": 0.99}, VerdictKind.UNDECIDED),
         ({"loop_gone": 0.01, "controller_fit": 0.5}, VerdictKind.STICKY),
         ({"loop_gone": 0.01, "delta_bic": 60.0}, VerdictKind.STICKY),
         ({"loop_gone": 0.0, "delta_bic": 60.0, "moved_with": 1e6}, VerdictKind.UNDECIDED),
     ],
 )
-def test_the_loop_takes_back_what_a_wave_or_an_idle_friction_explains(
+def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(
     changes: dict[str, float], verdict: VerdictKind
 ) -> None:
     plain = {
         "delta_bic": 20.0,
-        "line_rivalry": 0.0,
+        "share": 0.1,
         "outside_line": -5.0,
         "loop_gone": 0.5,
         "moved_with": 1.0,

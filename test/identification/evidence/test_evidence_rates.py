@@ -12,6 +12,8 @@ from stiction_ros.identification.evidence.engine import PRICE
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
+    BESIDE,
+    INEXACT,
     UNDIED,
     Agreement,
     Look,
@@ -67,7 +69,7 @@ def test_what_is_best_at_one_rate_is_tried_at_the_others() -> None:
 
 def test_the_pair_with_the_larger_lesser_gain_is_taken(seen: tuple[Look, ...]) -> None:
     found = agreement(changed(seen, (2.0, 1.0, 2.0), (40.0, 1.0, 2.0), (30.0, 1.0, 2.0)), 0)
-    assert (found.gain, found.alike, rate_of(found)) == (30.0, True, 2)
+    assert (found.gain, found.alike, rate_of(found)) == (30.0 - PRICE, True, 2)
 
 
 def test_a_rate_that_does_not_see_the_end_of_a_response_needs_coarser_ones_that_do(
@@ -93,7 +95,14 @@ def test_a_slow_process_without_friction_is_not_called_sticky() -> None:
 
 def test_one_rate_alone_shows_nothing(seen: tuple[Look, ...]) -> None:
     found = agreement(changed(seen, (300.0, 1.0, 2.0), (1.0, 1.0, 2.0), (0.5, 1.0, 2.0)), 0)
-    assert found.gain == 1.0
+    assert found.gain == 1.0 - PRICE
+
+
+def test_beside_a_wave_friction_must_gain_more(seen: tuple[Look, ...]) -> None:
+    (look,) = changed(seen, (300.0, 1.0, 2.0))
+    waved = dataclasses.replace(look, wave_gain=200.0)
+    assert look.beyond_price(0) == 300.0 - PRICE
+    assert waved.beyond_price(0) == 300.0 - PRICE - BESIDE - 200.0 * INEXACT
 
 
 def test_bands_far_apart_do_not_agree_however_large_the_gains(seen: tuple[Look, ...]) -> None:
@@ -108,7 +117,7 @@ def test_a_short_record_has_one_look_and_its_word_counts(seen: tuple[Look, ...])
     short = looks(pi_loop(3.0, 1.0, samples=200), IdentificationOptions())
     found = agreement(short, 0)
     assert len(short) == 1
-    assert found.gain == short[0].accepted[0].gain
+    assert found.gain == short[0].accepted[0].gain - PRICE
 
 
 def test_what_a_valve_gains_is_told_beside_the_friction_of_the_others() -> None:
