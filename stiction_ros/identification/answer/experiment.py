@@ -7,8 +7,11 @@ import math
 import numpy as np
 
 from stiction_ros.identification.answer.step_answer import StepAnswer
-from stiction_ros.identification.closed_loop.explanation import MATERIAL
-from stiction_ros.identification.inference.verdict import WIDEST, beside_wave
+from stiction_ros.identification.closed_loop.explanation import (
+    MATERIAL,
+    beside_wave,
+    is_wave_itself,
+)
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
@@ -67,7 +70,7 @@ def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float
         if told["moves"] < least_moves:
             return f"By {size} the stem moves {told['moves']:.0f} times only."
         band = estimate.static_friction + estimate.dynamic_friction
-        if beside_wave(told) and band > WIDEST * span:
+        if is_wave_itself(told, band / span):
             return (
                 f"By {size} the stem goes to and fro once in each turn of a wave from outside and "
                 "cannot be told from it: in manual the wave would go on while OP rests."

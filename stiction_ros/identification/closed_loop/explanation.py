@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,
@@ -32,6 +33,9 @@ says, unless that grows without end: the linear process and the controller are l
 
 LINE = 6.0
 """BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
+
+WIDEST = 0.4
+"""Of the range of OP: a wider band is not believed beside a wave from outside."""
 
 RIVAL = 0.3
 """BIC gain of a line alone over that of the friction from which on the friction may be fitted to a
@@ -116,6 +120,25 @@ def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
             "loop_gone": loop.gone,
         }
     return {name: max(-ENDLESS, min(value, ENDLESS)) for name, value in told.items()}
+
+
+def beside_wave(told: Mapping[str, float]) -> bool:
+    """Tell whether waves from outside were tried beside the friction of these figures."""
+    return any(name.startswith("wave_") for name in told)
+
+
+def is_wave_itself(told: Mapping[str, float], band_share: float) -> bool:
+    """Tell whether a stem cannot be told from a wave from outside.
+
+    With a band as wide it goes to and fro once in each turn of the wave, and is one of this
+    period itself.
+
+    Args:
+        told: figures of the valve, those of its closed loop included.
+        band_share: f_S + f_D over the range of OP.
+    """
+    line = told.get("outside_line", 0.0) > LINE
+    return line and beside_wave(told) and band_share > WIDEST
 
 
 def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:

@@ -89,7 +89,7 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
     columns = [signal.y[rows - lag] for lag in range(1, ORDER + 1)]
     for x, delay in zip(signal.inputs, signal.delays, strict=True):
         columns += [x[rows - delay - lag] for lag in range(ORDER)]
-    plain = _independent(np.column_stack(columns))
+    plain = independent(np.column_stack(columns))
     left = signal.y[rows] - plain @ (plain.T @ signal.y[rows])
     energy = float(left @ left)
     floor = 1e-12 * float(signal.y[rows] @ signal.y[rows])  # what rounding leaves
@@ -99,7 +99,7 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
         frequency = 1.0 / period + shift / count
         if frequency <= 0.0:
             continue
-        line = _waves(2 * np.pi * frequency * rows, harmonics)
+        line = waves_of(2 * np.pi * frequency * rows, harmonics)
         line = _basis(line - plain @ (plain.T @ line))
         taken = np.cumsum((line.T @ left) ** 2)[1::2]
         rest = np.maximum(energy - taken, floor)
@@ -127,14 +127,14 @@ def beside(signal: Predicted, period: float) -> tuple[FloatArray, FloatArray]:
     for x, delay in zip(signal.inputs, signal.delays, strict=True):
         columns += [x[rows - delay - lag] for lag in range(BESIDE)]
     columns.append(np.ones(len(rows)))
-    wave = _waves(np.asarray(2 * np.pi / period * rows, dtype=np.float64), harmonics)
+    wave = waves_of(np.asarray(2 * np.pi / period * rows, dtype=np.float64), harmonics)
     table = np.column_stack([*columns, wave])
     scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
     theta = np.linalg.lstsq(table / scale, signal.y[rows], rcond=1e-10)[0] / scale
     return -theta[:BESIDE], theta[BESIDE : BESIDE * (1 + len(signal.inputs))].reshape(-1, BESIDE)
 
 
-def _waves(angle: FloatArray, harmonics: int) -> FloatArray:
+def waves_of(angle: FloatArray, harmonics: int) -> FloatArray:
     """Return sine and cosine of one harmonic after the other, shape (N, 2 H)."""
     turns = np.outer(angle, np.arange(1, harmonics + 1))
     return np.stack([np.sin(turns), np.cos(turns)], axis=2).reshape(len(angle), -1)
@@ -145,7 +145,7 @@ def _basis(columns: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(columns)[0])
 
 
-def _independent(columns: FloatArray) -> FloatArray:
+def independent(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of a constant and the columns, shape (N, q).
 
     Directions that are rounding are left out: OP of an exact controller follows from PV.

@@ -11,10 +11,10 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import (
     ENDLESS,
-    LINE,
     OPEN,
     SURE,
     explained,
+    is_wave_itself,
 )
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.candidate import Candidate
@@ -32,8 +32,6 @@ from stiction_ros.identification.evidence.rates import (
 )
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import (
-    WIDEST,
-    beside_wave,
     half_gains,
     is_deadband,
     kind_of,
@@ -116,8 +114,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     """Return the estimate, no longer with friction where its loop says otherwise.
 
     A friction without which OP would move all the same is not what moves it, where the controller
-    is known and the evidence not overwhelming. And a stem that goes to and fro once in each turn of
-    a wave from outside is a wave of this period itself, and cannot be told from it.
+    is known and the evidence not overwhelming. And a stem that is a wave itself cannot be told
+    from one that comes from outside.
     """
     if not valve.verdict.has_friction:
         return valve
@@ -126,9 +124,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     endless = told.get("moved_with", 0.0) >= ENDLESS
     idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
     idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
-    wide = told["share"] * (1.0 + valve.dynamic_friction / valve.static_friction) > WIDEST
-    itself = wide and beside_wave(told) and told.get("outside_line", 0.0) > LINE
-    if not (idle or itself):
+    band_share = told["share"] * (1.0 + valve.dynamic_friction / valve.static_friction)
+    if not (idle or is_wave_itself(told, band_share)):
         return valve
     return dataclasses.replace(
         valve,

@@ -19,19 +19,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.problem import FASTEST, NOISE_ORDER, Problem
+from stiction_ros.identification.closed_loop.explanation import LINE
+from stiction_ros.identification.closed_loop.outside_line import (
+    LEAST_PER_HARMONIC,
+    independent,
+    waves_of,
+)
+from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.kernels.lags import with_past
 
 HARMONICS = 25  # H, at most: corners of a square wave
 LEAST_CYCLES = 4.0  # of a wave, in a record
-BELIEVED = 6.0  # BIC that a wave gains over none: strong evidence by Kass and Raftery
 FINE = 8  # frequencies of lines per line width 1 / n
 FINER = 8  # fundamentals per frequency of lines: the last harmonic is to be met as well
 SHORTEST = 5.0  # rows of a fundamental's period
 ZOOMS = (8.0, 1.0, 0.125)  # steps of fundamentals in which the best is looked for ever closer
 AROUND = range(-4, 5)  # steps to either side
 EXPLAINED = 1e-6  # of the energy: less left than this is none left
-DEPENDENT = 1e-7  # size of a direction, of scaled columns, below which it is rounding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +67,7 @@ def outside_wave(problems: Sequence[Problem], output: int) -> OutsideWave | None
     """
     found = [wave for problem in problems if (wave := _strongest(problem, output)) is not None]
     best = max(found, key=lambda wave: wave.gain, default=None)
-    return best if best is not None and best.gain > BELIEVED else None
+    return best if best is not None and best.gain > LINE else None
 
 
 def _strongest(problem: Problem, output: int) -> OutsideWave | None:
@@ -77,7 +81,7 @@ def _strongest(problem: Problem, output: int) -> OutsideWave | None:
     total, last = np.zeros(len(fundamentals)), np.zeros(len(fundamentals), dtype=np.int64)
     for h in range(1, HARMONICS + 1):
         at = (fundamentals * h + FINER // 2) // FINER
-        counted = (at < int(length / FASTEST)) & pays[np.minimum(at, len(pays) - 1)]
+        counted = (at < int(length / LEAST_PER_HARMONIC)) & pays[np.minimum(at, len(pays) - 1)]
         total[counted] += taken[at[counted]]
         last[counted] = h
     gains = beside.gain(total) - 2.0 * np.log(beside.count) * last
@@ -114,12 +118,7 @@ class _Beside:
             sums = np.concatenate([[0.0], np.cumsum(with_past(stem, problem.taps))])
             for low, high in itertools.pairwise(problem.edges):
                 columns.append(sums[ends - low] - sums[ends - high])
-        table = np.column_stack(columns)
-        table = table - table.mean(axis=0)
-        table /= np.maximum(np.linalg.norm(table, axis=0), 1e-300)
-        directions, sizes, _ = np.linalg.svd(table, full_matrices=False)
-        constant = np.full((len(rows), 1), 1.0 / np.sqrt(len(rows)))
-        plain = np.concatenate([constant, directions[:, sizes > DEPENDENT]], axis=1)
+        plain = independent(np.column_stack(columns))
         return cls(plain, y[rows] - plain @ (plain.T @ y[rows]))
 
     @property
@@ -134,9 +133,8 @@ class _Beside:
 
     def gain_of_wave(self, frequency: float, harmonics: int) -> float:
         """Return BIC without minus BIC with a wave of a frequency in turns per row."""
-        rows = np.arange(self.count)
-        turns = 2.0 * np.pi * frequency * np.outer(rows, np.arange(1, harmonics + 1))
-        lines = np.concatenate([np.sin(turns), np.cos(turns)], axis=1)
+        angle = np.asarray(2.0 * np.pi * frequency * np.arange(self.count), dtype=np.float64)
+        lines = waves_of(angle, harmonics)
         basis = np.linalg.qr(lines - self.plain @ (self.plain.T @ lines))[0]
         taken = np.array([np.sum((basis.T @ self.left) ** 2)])
         return float(self.gain(taken)[0] - np.log(self.count) * (1.0 + 2.0 * harmonics))

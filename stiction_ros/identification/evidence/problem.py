@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
 from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.options import IdentificationOptions, limited
@@ -26,7 +27,6 @@ LEFT_OUT = 0.05  # share of the rows at the begin, where a stem may not have fou
 NOISE_ORDER = 6
 MOVES = 6  # of a stem over a whole record, fewest of a friction that is judged
 FEW_MOVES = 2  # of a beginning
-FASTEST = 2.5  # rows of the shortest period of a wave
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,7 +109,9 @@ class Problem:
             lines: per output, frequencies in turns per sample; those too fast for the rows are
                 left out.
         """
-        seen = tuple(tuple(f for f in row if f * self.rate < 1.0 / FASTEST) for row in lines)
+        seen = tuple(
+            tuple(f for f in row if f * self.rate < 1.0 / LEAST_PER_HARMONIC) for row in lines
+        )
         return dataclasses.replace(self, lines=seen)
 
     @property

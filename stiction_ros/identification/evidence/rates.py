@@ -139,9 +139,9 @@ def looks(
         also = _searched(beside, providers, _all_heads(problems, found))
         for k, (plain, waved) in enumerate(zip(found, also, strict=True)):
             gains[k] = max(plain.ideal.loss - waved.ideal.loss, 0.0)
-            if waved.best.loss < plain.best.loss:
-                problems[k] = beside[k]
             found[k] = better(plain, waved)
+            if found[k].best is waved.best:
+                problems[k] = beside[k]
     between = samples_between_reports(record)
     seen = []
     for problem, one, gain in zip(problems, found, gains, strict=True):

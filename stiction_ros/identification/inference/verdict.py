@@ -19,7 +19,7 @@ Evidence, all under the noise model:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -35,14 +35,6 @@ one parameter that it has less."""
 SMALL_JUMP = 0.25
 """Jump, as a share of f_S + f_D, up to which friction is a deadband: a stem that is moved by the
 controller's own kicks tells f_S + f_D alone, and any jump may go with it."""
-
-WIDEST = 0.4
-"""Of the range of OP: a wider band is not believed beside a wave from outside."""
-
-
-def beside_wave(figures: Mapping[str, float]) -> bool:
-    """Return whether waves from outside were tried beside the friction of these figures."""
-    return any(name.startswith("wave_") for name in figures)
 
 
 def evidence(

@@ -87,7 +87,7 @@ def test_the_reason_is_that_of_the_evidence(
 
 
 def test_a_stem_that_goes_with_the_wave_cannot_be_told_from_it(record: Record) -> None:
-    valve = dataclasses.replace(undecided(wave_1=40.0), static_friction=3.0)
+    valve = dataclasses.replace(undecided(wave_1=40.0, outside_line=50.0), static_friction=3.0)
     text = experiment_for(record, answer(valve), 0, OPTIONS)
     assert "f_S 3 % the stem goes to and fro once in each turn of a wave from outside" in text
 
