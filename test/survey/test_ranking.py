@@ -81,29 +81,24 @@ def test_confidence_falls_with_what_is_not_known() -> None:
     assert confidence({**sure, "stability": half}, "valve", 10**6) == 0.5 * confidence(
         sure, "valve", 10**6
     )
-    shown = {"delta_bic": 1e6, "moved_with": 1.0, "loop_gone": 1.0}
+    shown = {"gain_1": 1e6}
     open_verdict = {**sure, "verdict": "undecided", "evidence": shown}
     assert confidence(open_verdict, "valve", 10**6) < confidence(wide, "valve", 10**6)
 
 
-@pytest.mark.parametrize(
-    "less",
-    [
-        {"delta_bic": 5.0},
-        {"delta_bic": -20.0},
-        {"moved_with": 3.0},
-        {"moved_with": 0.05},
-        {"loop_gone": 0.1},
-    ],
-)
-def test_undecided_valves_stand_by_what_speaks_for_their_friction(less: dict[str, float]) -> None:
-    told = {"delta_bic": 40.0, "moved_with": 0.9, "loop_gone": 0.6}
-    valve = {"verdict": "undecided", "evidence": told}
-    stability = {"tried": [{}, {}], "agreed": ["first half"]}
-    most = confidence(valve, None, 0)
-    assert 0.0 < most <= 0.3
-    assert confidence({**valve, "evidence": {**told, **less}}, None, 0) < most
-    assert confidence({**valve, "stability": stability}, None, 0) < most
+@given(st.dictionaries(st.sampled_from([1, 2, 4, 8]), st.floats(-1e3, 1e6), min_size=1))
+def test_undecided_valves_stand_by_what_their_friction_gains_where_it_gains_most(
+    gains: dict[int, float],
+) -> None:
+    def believed(gains: dict[int, float]) -> float:
+        told = {f"gain_{rate}": gain for rate, gain in gains.items()}
+        return confidence({"verdict": "undecided", "evidence": told}, None, 0)
+
+    most = max(gains.values())
+    assert believed(gains) == believed({1: most})
+    assert 0.0 <= believed(gains) <= 0.3
+    assert (believed(gains) > 0.0) == (most > 0.0)
+    assert believed(gains) < believed({1: max(most, 0.0) + 10.0 + abs(most)})
 
 
 def test_an_undecided_valve_stands_between_found_and_healthy_ones() -> None:
