@@ -97,3 +97,23 @@ def test_nodes_load_nothing_that_they_do_not_use(node: str) -> None:
     above = ("identification", "control", "discrepancy", "report")
     assert not [name for name in above if f"stiction_ros.{name}" in done.stderr]
     assert not loaded(code)[1] & HEAVY
+
+
+def test_an_identification_loads_no_slow_part_of_scipy() -> None:
+    code = (
+        "import sys\n"
+        "from stiction_ros.identification.warm_up import compile_loops\n"
+        "import stiction_ros.nodes.controller, stiction_ros.nodes.estimator\n"
+        "import stiction_ros.survey.engines.local\n"
+        "compile_loops(['exact'])\n"
+        "print(*(f'scipy.{part}' for part in SLOW if f'scipy.{part}' in sys.modules))"
+    )
+    pytest.importorskip("rclpy", reason="no ROS")
+    slow = ["signal", "stats", "interpolate", "optimize"]
+    done = subprocess.run(
+        [sys.executable, "-c", code.replace("SLOW", repr(slow))],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split() == []

@@ -41,6 +41,7 @@ REASONS: dict[str, dict[str, str]] = {
         "processes": "the process as a linear model, and made anew with each effect taken in",
         "effects": "what a search asks of an effect is said in the file of the effect alone: axes, "
         "sizes, waves, whole grids, YAML",
+        "base": "what SciPy has in packages that load slowly is called where it is loaded late",
     },
 }
 

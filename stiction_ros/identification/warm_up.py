@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
 from stiction_ros.effects import HeStiction
+from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.methods import METHODS, identify
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
@@ -24,7 +24,9 @@ def compile_loops(methods: Sequence[str] = tuple(METHODS)) -> None:
     generator = np.random.default_rng(0)
     op = 10.0 * np.sin(0.2 * np.arange(SAMPLES)) + generator.standard_normal(SAMPLES)
     stem = HeStiction(4.0, 1.0).simulate(op)
-    pv = lfilter([0.0, 0.0, 0.2], [1.0, -0.8], stem) + 0.1 * generator.standard_normal(SAMPLES)
+    late = np.concatenate([np.zeros(2), 0.2 * stem[:-2]])
+    pv = recursion(np.array([1.0, -0.8]), late, np.zeros(1))
+    pv += 0.1 * generator.standard_normal(SAMPLES)
     record = Record("made up", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
     for method in methods:
         identify(record, IdentificationOptions(method, output_order=1, input_order=1, delay=(0, 2)))

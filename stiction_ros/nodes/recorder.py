@@ -32,6 +32,7 @@ from stiction_ros.records.run.loop_signals import JOINT_STATE
 from stiction_ros.records.storage.log_time import SIMULATED, LogTime
 
 DISCOVERY_PERIOD = 0.05  # s between two looks at the graph
+BAG_PERIOD = 1.0  # s between two looks at the bag
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 _STAMP = struct.Struct("<iI")  # sec and nanosec behind the 4 bytes of the encapsulation
 
@@ -70,7 +71,7 @@ class RecorderNode(ManagedNode):
         self._clock_runs = False
         self._looking = [
             self.create_timer(DISCOVERY_PERIOD, self._discover, clock=self._steady),
-            self.create_timer(1.0, self._look_at_the_bag, clock=self._steady),
+            self.create_timer(BAG_PERIOD, self._look_at_the_bag, clock=self._steady),
         ]
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:

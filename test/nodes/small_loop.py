@@ -8,8 +8,8 @@ import yaml
 
 from stiction_ros.config_files import find_config
 
-SAMPLES = 700
-SCHEDULE = {"fit_first": 500, "fit_every": 50, "fit_latency": 5}
+SAMPLES = 420
+SCHEDULE = {"fit_first": 300, "fit_every": 50, "fit_latency": 5}
 
 
 def write_small_scenario(directory: Path, samples: int = SAMPLES) -> Path:
@@ -23,7 +23,7 @@ def write_small_scenario(directory: Path, samples: int = SAMPLES) -> Path:
                 values[key] = str(path.parent / values[key])
     nodes["plant"]["ros__parameters"]["samples"] = samples
     nodes["controller"]["ros__parameters"].update(SCHEDULE, horizon=30)
-    nodes["estimator"]["ros__parameters"].update(SCHEDULE, window=500, delay_low=4, delay_high=6)
+    nodes["estimator"]["ros__parameters"].update(SCHEDULE, window=300, delay_low=4, delay_high=6)
     small = directory / "small.scenario.yaml"
     small.write_text(yaml.safe_dump(nodes), encoding="utf-8")
     return small

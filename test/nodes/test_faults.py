@@ -20,8 +20,10 @@ from stiction_ros.faults.fault import Fault, Pace, nothing
 from stiction_ros.faults.kinds.offered_models import aliases, deep
 from stiction_ros.faults.kinds.signal_junk import MALFORMED, STAMPS
 from stiction_ros.faults.loop.setting_up import case_parameters
+from stiction_ros.nodes.shared import managed
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, to_ns, to_stamp
+from stiction_ros.online.health import Noticed
 from stiction_ros.online.session import Scenario, run_live
 
 SAMPLES = 60
@@ -33,6 +35,13 @@ APPLIED = "applied"  # what was heard on op_applied
 OK, ERROR = b"\x00", b"\x02"
 NODES = ("plant", "controller", "estimator")
 Say = Callable[[int], Any]  # what is said when the PV of a stamp comes
+
+
+@pytest.fixture(autouse=True)
+def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five statuses a second, and conditions that are shown for half a second."""
+    monkeypatch.setattr(managed, "LOOKS", 2)
+    monkeypatch.setattr(managed, "Noticed", functools.partial(Noticed, shown=0.5))
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,11 +18,20 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from stiction_ros.nodes import recorder as recorder_module
 from stiction_ros.nodes.recorder import RecorderNode, free_directory
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_stamp
+from stiction_ros.online.health import Noticed
 from stiction_ros.records.bag.messages import read_messages, read_raw
 from stiction_ros.records.run.bag_reader import read_bag_parts
+
+
+@pytest.fixture(autouse=True)
+def _quick_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five looks at the bag a second, and errors that are shown for a second."""
+    monkeypatch.setattr(recorder_module, "BAG_PERIOD", 0.2)
+    monkeypatch.setattr(recorder_module, "Noticed", functools.partial(Noticed, shown=1.0))
 
 
 @pytest.fixture

@@ -112,7 +112,7 @@ def test_it_listens_and_writes_nothing(loop: Loop) -> None:
     node = loop.bridge()
     node.start()
     assert node.failure == ""
-    loop.graph.spin_until(lambda: len(loop.seen("pv")) >= 20, "twenty samples")
+    loop.graph.spin_until(lambda: len(loop.seen("pv")) >= 12, "twelve samples")
     pv, applied = loop.seen("pv"), loop.seen("op_applied")
     stamps = [to_ns(message.header.stamp) for message in pv]
     assert set(np.diff(stamps)) == {60_000_000_000}
@@ -121,9 +121,9 @@ def test_it_listens_and_writes_nothing(loop: Loop) -> None:
     # The first samples may be over before every tag has been reported.
     finite = np.isfinite([message.position for message in pv]).all(axis=1)
     assert finite[np.argmax(finite) :].all()
-    assert finite.sum() >= 15
+    assert finite.sum() >= 8
     assert {tuple(message.name) for message in applied} == {("V1", "V2")}
-    assert len(loop.seen("sp")) >= 15
+    assert len(loop.seen("sp")) >= 8
     outs = {one["stamp"]: one["out"] for one in loop.plant.events("out")}
     for message in applied[3:]:
         assert list(message.position) == outs[to_ns(message.header.stamp)]

@@ -23,6 +23,7 @@ from plant_process import PlantProcess, wait_until
 
 from stiction_ros.cli.main import main
 from stiction_ros.faults.bridge.relay import Relay
+from stiction_ros.opcua import session
 from stiction_ros.opcua.grant import GrantState
 from stiction_ros.opcua.loop_bridge import OrderKind, WriteOrder
 from stiction_ros.opcua.plant_link import LinkSettings, PlantLink, Written
@@ -35,6 +36,7 @@ WATCHDOG = 1.5  # s
 RATE = 0.1 * 60.0  # % a sample, as the tag map says
 MARGIN = 1.0  # s of a busy machine, beside the watchdog's time
 SMOOTH = 1.0  # %
+TAKEN = 4  # OPs before a fault: enough to move OP by more than 1 %
 STILL = {"set_points": None}  # a move of a set-point moves OP as well
 
 
@@ -68,7 +70,7 @@ class Trial:
         runner = self.bridge(url, **options)
         wait_until(lambda: runner.bridge.counts["beat_written"], "the request and a beat")
         self.plant.grant()
-        wait_until(lambda: len(self.ops()) > 10, "OPs that are taken")
+        wait_until(lambda: len(self.ops()) > TAKEN, "OPs that are taken")
         return runner
 
     def events(self) -> list[dict[str, Any]]:
@@ -147,7 +149,7 @@ def test_mode_taken_back_in_mid_move(trial: Trial) -> None:
     wait_until(lambda: runner.state is GrantState.IDLE, "the end of the grant")
     count = len(trial.ops())
     heard = len(runner.samples)
-    wait_until(lambda: len(runner.samples) > heard + 10, "further samples")
+    wait_until(lambda: len(runner.samples) > heard + 5, "further samples")
     assert len(trial.ops()) == count
     trial.judge(refused=1)
 
@@ -190,7 +192,7 @@ def test_a_thousand_changes_a_second(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("BURST", 50.0)  # of two tags, ten times a second
     heard = len(runner.samples)
-    wait_until(lambda: len(runner.samples) > heard + 30, "samples")
+    wait_until(lambda: len(runner.samples) > heard + 15, "samples")
     assert runner.state is GrantState.GRANTED
     steps = np.diff([sample.stamp for sample in runner.samples])
     assert np.abs(steps[heard:] - 60_000_000_000).max() < 6_000_000_000
@@ -242,7 +244,7 @@ def test_the_bridge_is_killed(trial: Trial) -> None:
             return bool(plant.events("target")[-1]["why_not"] == "")
 
         wait_until(granted, "the grant", pause=0.1)
-        wait_until(lambda: len(trial.ops()) > 10, "OPs that are taken")
+        wait_until(lambda: len(trial.ops()) > TAKEN, "OPs that are taken")
         since = time.monotonic()
         process.stop(signal.SIGKILL)
         assert trial.taken_over(since)["alarm"].startswith("watchdog")
@@ -273,7 +275,7 @@ def test_two_bridges_for_one_tag(trial: Trial) -> None:
     second = trial.bridge(identity=8)
     wait_until(lambda: "another" in second.bridge.grant.reason, "the second to see the first")
     heard = len(second.samples)
-    wait_until(lambda: len(second.samples) > heard + 20, "samples of the second")
+    wait_until(lambda: len(second.samples) > heard + 10, "samples of the second")
     assert second.state is GrantState.IDLE
     assert first.state is GrantState.GRANTED
     assert second.bridge.counts == Counter()
@@ -288,7 +290,10 @@ def test_a_user_without_rights(trial: Trial) -> None:
 
 
 @pytest.mark.parametrize("kind", ["server", "stranger", "expired", "word"])
-def test_what_cannot_be_trusted_gets_no_session(trial: Trial, kind: str, tmp_path: Path) -> None:
+def test_what_cannot_be_trusted_gets_no_session(
+    trial: Trial, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "ANSWER", 2.0)  # the server does not answer another's key
     plant = trial.plant
     changes = {}
     if kind == "server":  # another server than the pinned one
@@ -347,24 +352,18 @@ def test_a_request_goes_before_what_its_loop_waits_to_write() -> None:
     assert all(event.failure for event in told)
 
 
-def test_the_server_is_killed_and_starts_again(tmp_path: Path) -> None:
-    plant = PlantProcess(tmp_path / "plant", watchdog=WATCHDOG, **STILL)
+def test_the_server_is_killed_and_starts_again(trial: Trial) -> None:
+    plant = trial.plant
+    runner = trial.granted()
+    plant.stop(signal.SIGKILL)
+    wait_until(lambda: runner.state is GrantState.IDLE, "the end of the grant")
+    count = len(trial.ops())
+    wait_until(lambda: np.isnan(runner.samples[-1].pv).all(), "samples without values")
     plant.start()
-    trial = Trial(plant)
-    try:
-        runner = trial.granted()
-        plant.stop(signal.SIGKILL)
-        wait_until(lambda: runner.state is GrantState.IDLE, "the end of the grant")
-        count = len(trial.ops())
-        wait_until(lambda: np.isnan(runner.samples[-1].pv).all(), "samples without values")
-        plant.start()
-        wait_until(lambda: np.isfinite(runner.samples[-1].pv).all(), "samples again")
-        assert runner.state is GrantState.IDLE
-        assert len(trial.ops()) == count
-        assert plant.events("mode")[-1]["mode"] == "AUTO"
-    finally:
-        trial.close()
-        plant.stop()
+    wait_until(lambda: np.isfinite(runner.samples[-1].pv).all(), "samples again")
+    assert runner.state is GrantState.IDLE
+    assert len(trial.ops()) == count
+    assert plant.events("mode")[-1]["mode"] == "AUTO"
 
 
 def test_the_servers_certificate_is_pinned_by_its_fingerprint(

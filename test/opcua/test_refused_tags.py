@@ -53,7 +53,7 @@ class Listener:
         return [event for event in self.events if isinstance(event, Refused)]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def server() -> Iterator[SmallServer]:
     found = SmallServer(PV=(1.0, "Double"), OP=(40.0, "Double"), REQUEST=(0, "Int32"))
     yield found

@@ -51,12 +51,15 @@ def run_each(work: Callable[[S], T], items: Sequence[S], jobs: int, text: str) -
     Args:
         work: a function that a worker process can be given.
         items: of one run each.
-        jobs: worker processes; one at least.
+        jobs: worker processes; one at most works in this process, which needs no start-up.
         text: of the bar.
     """
+    jobs = min(jobs, len(items))
+    if jobs <= 1:
+        return _one_by_one(work, items, text)
     done: dict[int, T] = {}
     context = multiprocessing.get_context("spawn")
-    with bar(text) as show, ProcessPoolExecutor(max(jobs, 1), mp_context=context) as pool:
+    with bar(text) as show, ProcessPoolExecutor(jobs, mp_context=context) as pool:
         futures = {pool.submit(work, item): place for place, item in enumerate(items)}
         try:
             for future in as_completed(futures):
@@ -66,6 +69,15 @@ def run_each(work: Callable[[S], T], items: Sequence[S], jobs: int, text: str) -
             drop(futures)
             raise
     return [done[place] for place in range(len(items))]
+
+
+def _one_by_one(work: Callable[[S], T], items: Sequence[S], text: str) -> list[T]:
+    done: list[T] = []
+    with bar(text) as show:
+        for item in items:
+            done.append(work(item))
+            show(len(done) / len(items))
+    return done
 
 
 def drop(futures: Iterable[Future[Any]]) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.candidate.output import OutputCandidate
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
@@ -57,6 +56,8 @@ class Trend(_Decoy):
         self.contains = tuple((place, "random_walk") for place in places)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        from scipy.interpolate import BSpline
+
         at = run.runs.time / max(float(run.runs.time.max()), 1e-9)
         knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, KNOTS - 1), np.ones(3)])
         basis = BSpline.design_matrix(np.clip(at, 0.0, 1.0 - 1e-12), knots, 3).toarray()

@@ -7,8 +7,8 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.stats import qmc
 
+from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
@@ -209,7 +209,7 @@ class _Search:
         The optimum of He's law is a needle in a valley: stems that differ in one slip differ
         for long. Points of a lattice miss it however fine they are along the valley.
         """
-        halton = qmc.Halton(len(self.candidate.axes), seed=0)
+        halton = halton_sequence(len(self.candidate.axes), seed=0)
         size = 1.0
         for _ in range(THROWS):
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:CENTRES]

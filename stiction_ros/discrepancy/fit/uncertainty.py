@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.stats import qmc
 
+from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
@@ -178,7 +178,7 @@ def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
         return fit.candidate.values(centre[None, :])
     least = np.array([1.0 if axes[d].whole else 0.0 for d in free])
     width = np.maximum([FIRST_BOX * axes[d].step for d in free], least)
-    halton = qmc.Halton(len(free), seed=0)
+    halton = halton_sequence(len(free), seed=0)
     points, scores = np.zeros((0, len(axes))), np.zeros(0)
     for _ in range(BOXES):
         thrown = np.tile(centre, (SCATTERED + 1, 1))

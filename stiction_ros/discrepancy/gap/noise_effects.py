@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.optimize import minimize
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
@@ -246,6 +245,8 @@ def _declared_block(
 
 
 def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: _Law) -> NoiseEffect | None:
+    from scipy.optimize import minimize
+
     own, values = _declared_block(base, output, declared), _values(base, output)
     blocks = base.blocks[output]
 

@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.kernels import (
     NOTHING,
     best_autoregression,

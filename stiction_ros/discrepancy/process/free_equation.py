@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, fit_noise, whiten
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray

@@ -12,7 +12,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.optimize import minimize_scalar
 
 from stiction_ros.effects import FloatArray
 
@@ -71,6 +70,8 @@ def held(denominator: FloatArray, b: FloatArray) -> Held | None:
         tried = [left(float(each)) for each in grid]
         best, width = float(grid[int(np.argmin(tried))]), float(grid[1])
         inside = (max(best - width, 0.0), min(best + width, 1.0))
+        from scipy.optimize import minimize_scalar
+
         found = minimize_scalar(left, bounds=inside, method="bounded", options={"xatol": 1e-9})
         fraction = float(found.x)
     numerator, missed = _solved(poles, fraction, wanted)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.simulation.response_kernels import filtered, tank_states
 from stiction_ros.effects import Filter, FloatArray, LinearFilter
 from stiction_ros.processes import AlteredProcess, ArxProcess, LinearModel, Process, StirredTank

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.kernels.polynomials import filtered
 from stiction_ros.identification.result.identification import OutputModel
 
 RISEN = 0.632
@@ -48,12 +49,10 @@ class StepAnswer:
             samples: of the record.
             sample_time: s.
         """
-        from scipy.signal import lfilter
-
         wait = model.delay[valve] + 1
         drive = np.zeros(max(samples // 2, wait + 2))
         drive[wait:] = 1.0
-        values = np.asarray(lfilter(model.b[valve], [1.0, *model.a], drive))
+        values = filtered(np.array(model.b[valve]), np.array([1.0, *model.a]), drive)
         reached, before = (np.abs(part).max() for part in (values, values[: len(values) // 2 + 1]))
         lag = None
         if reached <= GROWS * before:

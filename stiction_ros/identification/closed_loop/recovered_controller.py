@@ -23,6 +23,7 @@ import itertools
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.kernels.polynomials import recursion
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 Stretches = list[tuple[int, int]]
@@ -321,9 +322,7 @@ def smoothed(values: FloatArray, share: float) -> FloatArray:
     """Return ``values``, shape (N,), behind a filter that keeps ``share`` of its last value."""
     if share == 0.0:
         return values
-    from scipy.signal import lfilter
-
-    return np.asarray(lfilter([1.0 - share], [1.0, -share], values, zi=[share * values[0]])[0])
+    return recursion(np.array([1.0, -share]), (1.0 - share) * values, values[:1])
 
 
 def _spread(values: FloatArray) -> float:

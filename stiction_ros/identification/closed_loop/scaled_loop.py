@@ -12,6 +12,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.loop_run import Process
+from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.result.identification import OutputModel
 from stiction_ros.records.record import Record
 
@@ -107,8 +108,6 @@ def scaled_process(
 
 def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray:
     """Return PV of the process driven by ``stem`` alone, shape (N, p); NaN outside stretches."""
-    from scipy.signal import lfilter, lfiltic
-
     found = np.full(loop.pv.shape, np.nan)
     for first, last in loop.stretches:
         for i in range(loop.pv.shape[1]):
@@ -118,12 +117,12 @@ def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray
                 moves = np.concatenate(
                     [np.full(shift, stem[first, j]), stem[first : max(last - shift, first), j]]
                 )[: last - first]
-                drive += lfilter(
-                    process.b[i, j], [1.0], moves, zi=_held(process.b[i, j], moves[0])
-                )[0]
+                held, moved = _held(process.b[i, j], moves[0]), np.convolve(process.b[i, j], moves)
+                moved[: len(held)] += held
+                drive += moved[: last - first]
             poles = np.concatenate([[1.0], process.a[i]])
-            rest = lfiltic([1.0], poles, np.full(len(poles) - 1, loop.pv[first, i]))
-            found[first:last, i] = lfilter([1.0], poles, drive, zi=rest)[0]
+            rest = np.full(len(poles) - 1, loop.pv[first, i])
+            found[first:last, i] = recursion(poles, drive, rest)
     return found
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.stats import chi2
 
+from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import losses
 from stiction_ros.identification.evidence.problem import LIMIT, Problem
@@ -63,7 +63,7 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
     """
     best = found.best
     gain = found.without[valve].loss - best.loss
-    slack = float(chi2.ppf(confidence, FREEDOM)) + MISFIT * max(gain, 0.0)
+    slack = chi2_quantile(confidence, FREEDOM) + MISFIT * max(gain, 0.0)
     rows, lost = _looked_at(problem, found, valve)
     lost = lost - lost.min()
     inside = lost <= slack

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.stats import chi2
 
+from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.accepted import FREEDOM, MISFIT
 from stiction_ros.identification.evidence.candidate import Candidate, ideal, losses
@@ -65,7 +65,7 @@ def with_further(
     if not searched(problem.law):
         return dataclasses.replace(valve, further=values)
     gain = max(found.without[j].loss - best.loss, 0.0)
-    slack = float(chi2.ppf(confidence, FREEDOM + len(keys))) + MISFIT * gain
+    slack = chi2_quantile(confidence, FREEDOM + len(keys)) + MISFIT * gain
     span = float(problem.span[j])
     rows = _nearby(problem, best, j).accepted(slack)
     rows = np.column_stack([span * rows[:, :2], rows[:, 2:-1], span * rows[:, -1]])

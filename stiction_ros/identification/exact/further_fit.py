@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.stats import chi2
 
+from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification.exact.pattern_search import nearby_delays
 from stiction_ros.identification.friction.further import FurtherSearch, Judge, Settled, searched
@@ -78,7 +78,7 @@ def with_further_estimates(
     if not data.further:
         return valves
     keys = [entry.key for entry in data.law.parameters()[2:]]
-    slack = float(chi2.ppf(confidence, FREEDOM + len(keys)))
+    slack = chi2_quantile(confidence, FREEDOM + len(keys))
     found = []
     for j, valve in enumerate(valves):
         if model.friction[j, 0] > 0.0 and not searched(data.law):

@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.stats import qmc
 
+from stiction_ros.deferred import halton_sequence
 from stiction_ros.effects import FloatArray, FrictionLaw, Parameter
 from stiction_ros.identification.friction.grid import coarse_grid
 
@@ -157,7 +157,7 @@ class FurtherSearch:
         return self._scattered(size)
 
     def _scattered(self, size: float) -> Settled:
-        halton = qmc.Halton(3 + len(self.ranges), seed=0)
+        halton = halton_sequence(3 + len(self.ranges), seed=0)
         count = CENTRES
         for _ in range(THROWS):
             found = self._found()

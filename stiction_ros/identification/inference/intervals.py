@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
+from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.growing_swarm import swarm_round
 from stiction_ros.identification.exact.neighbourhood import PatternMap
@@ -71,7 +71,7 @@ def friction_intervals(
 ) -> FrictionIntervals:
     """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
-    threshold = float(chi2.ppf(confidence, FREEDOM))
+    threshold = chi2_quantile(confidence, FREEDOM)
     near: PatternMap | PolygonMap | None
     model, near = refine_near(data, model, orders, valve, threshold, wander=0)
     if has_cells(data.law):

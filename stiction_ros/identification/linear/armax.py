@@ -12,8 +12,8 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear.armax_problem import (

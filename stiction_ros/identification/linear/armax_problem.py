@@ -13,8 +13,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.kernels import polynomials
 

@@ -15,12 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import lstsq
-from scipy.signal import lfilter, lfiltic
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.kernels.polynomials import stabilised
+from stiction_ros.identification.kernels.polynomials import recursion, stabilised
 from stiction_ros.records.record import Record
 
 RANK_TOLERANCE = 1e-12
@@ -134,9 +133,7 @@ class ArxFit:
             for lag, gain in enumerate(row, start=1):
                 driven += gain * stem[first - delay - lag : count - delay - lag]
         polynomial = np.concatenate([[1.0], self.a])
-        past = lfiltic([1.0], polynomial, y[first - len(self.a) : first][::-1])
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(lfilter([1.0], polynomial, driven, zi=past)[0])
+        return recursion(polynomial, driven, y[first - len(self.a) : first])
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
+from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel

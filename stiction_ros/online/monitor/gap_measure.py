@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.stats import f as fisher
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import measure_gap
@@ -143,6 +142,8 @@ def look_at(
     Raises:
         InputError: as :func:`baseline_of`.
     """
+    from scipy.stats import f as fisher
+
     run = FreeRun(model, join_records(model, [record]))
     shares = measure_gap(Baseline.of(run))
     looks = []

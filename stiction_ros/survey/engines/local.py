@@ -1,9 +1,10 @@
 """Worker processes of this machine: the engine that needs nothing else.
 
-A process that is killed is replaced and its loop tried once more. One loop is with each worker at
-a time and one more is drawn when it comes back, so memory does not grow with the plant. A worker
-first imports and compiles what it needs and says that it is ready; only then is it sent its loop,
-and the loop's time begins: what a busy machine takes to start is no loop's fault.
+Workers are forked from one process that has imported what they need. One that is killed is replaced
+and its loop tried once more. One loop is with each worker at a time and one more is drawn when it
+comes back, so memory does not grow with the plant. A worker first loads or compiles its machine
+code and says that it is ready; only then is it sent its loop, and the loop's time begins: what a
+busy machine takes to start is no loop's fault.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import signal
 import time
 from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.context import ForkServerContext, SpawnContext
+from multiprocessing.process import BaseProcess
 
 from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.intake.loop import Loop
@@ -35,7 +37,7 @@ ENDS_WITHIN = 2.0
 
 @dataclasses.dataclass
 class _Worker:
-    process: SpawnProcess
+    process: BaseProcess
     pipe: Connection
     task: Task | None = None
     attempt: int = 1
@@ -104,7 +106,7 @@ class LocalEngine:
             if worker.process.is_alive():
                 return worker
             self._drop(worker)  # killed while it had nothing to do: no loop's fault
-        context = multiprocessing.get_context("spawn")
+        context = _context()
         here, there = context.Pipe()
         process = context.Process(target=_work, args=(there, options), daemon=True)
         process.start()
@@ -165,6 +167,15 @@ class LocalEngine:
                 worker.process.join(timeout=ENDS_WITHIN)
             _end(worker)
         self._workers.clear()
+
+
+def _context() -> ForkServerContext | SpawnContext:
+    """Return how processes are started here; there is no such server on every system."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
+    return context
 
 
 def _end(worker: _Worker) -> None:
