@@ -127,7 +127,7 @@ class _Search:
         self.base, self.gap, self.candidate = base, gap, candidate
         self.found: CandidateFit | None = None
         self.judged: dict[tuple[float, ...], CandidateFit] = {}
-        self.white = np.zeros(0)
+        self.white = np.zeros(0)  # misfits of the first grid under white noise
 
     def coarse(self) -> list[FloatArray]:
         """Return the best points of the first grid, under several guesses of the noise."""
