@@ -38,14 +38,16 @@ class _Chain:
     ) -> None:
         self.effects = effects
         self.memories: list[Memory] = [effect.rest(start) for effect in effects]
+        # Asked once: to look at a protocol costs more than a step.
+        self._drawn = [effect if isinstance(effect, DrivenByNoise) else None for effect in effects]
         self._random = random
 
     def step(self, value: float, time: float) -> float:
-        for i, effect in enumerate(self.effects):
+        for i, (effect, drawn) in enumerate(zip(self.effects, self._drawn, strict=True)):
             memory = self.memories[i]
-            if isinstance(effect, DrivenByNoise):
+            if drawn is not None:
                 normal = float(self._random.standard_normal())
-                self.memories[i], value = effect.step_with(memory, value, time, normal)
+                self.memories[i], value = drawn.step_with(memory, value, time, normal)
             else:
                 self.memories[i], value = effect.step(memory, value, time)
         return value

@@ -105,7 +105,7 @@ def test_the_law_is_simulated_and_survives_yaml() -> None:
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("method", ["exact", "evidence"])
 def test_all_three_parameters_are_identified_and_nothing_is_certified(method: str) -> None:
-    record = record_of(loop().with_valve_effects({"V1": (lopsided(),)}))
+    record = record_of(loop().with_valve_effects({"V1": (lopsided(),)}), 450)
     found = identify(record, IdentificationOptions(law="lopsided", method=method))
     valve = found.valves[0]
     assert valve.verdict is VerdictKind.STICKY

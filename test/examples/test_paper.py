@@ -43,9 +43,9 @@ def test_a_longer_example1_goes_on_with_the_same_set_points(first: Example) -> N
 
 
 def test_example1_is_the_same_for_the_same_seed(first: Example) -> None:
-    again, other = (example1(seed, first.variant) for seed in (3, 4))
-    assert np.array_equal(again.record.pv, first.record.pv)
-    assert not np.array_equal(other.record.pv, first.record.pv)
+    again, other = (example1(seed, first.variant, samples=600).record for seed in (3, 4))
+    assert np.array_equal(again.pv, first.record.pv[:600])
+    assert not np.array_equal(other.pv, again.pv)
 
 
 def test_example1_cycles(first: Example) -> None:
@@ -59,7 +59,7 @@ def test_example1_cycles(first: Example) -> None:
 
 def test_example1_noise_enters_where_asked() -> None:
     for noise in NOISES:
-        std = example1(1, noise).truth.process.noise_std(NoiseEntry(noise))
+        std = example1(1, noise, samples=20).truth.process.noise_std(NoiseEntry(noise))
         assert std == pytest.approx([0.01])
 
 
@@ -90,8 +90,8 @@ def test_example2_has_one_sticky_valve_that_cycles(second: Example) -> None:
 
 
 def test_example2_runs_on_either_plant() -> None:
-    assert isinstance(example2(1, "tank").truth.process, StirredTank)
-    gain = example2(1, "linear").truth.process.linear(60.0).gain
+    assert isinstance(example2(1, "tank", 20).truth.process, StirredTank)
+    gain = example2(1, "linear", 20).truth.process.linear(60.0).gain
     assert gain == pytest.approx(np.array([[0.02424, -0.00054], [-0.19005, 0.29754]]), abs=1e-5)
 
 

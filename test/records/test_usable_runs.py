@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_cutting import SECOND, copy_bag
+from bag_cutting import SECOND, copy_bag, cut_bag
 from bag_making import joint_state
 
 from stiction_ros.cli.main import main
@@ -27,18 +27,18 @@ def whole() -> RunLog:
     return read_run(LIVE)
 
 
-def paused(target: Path, first: float, last: float) -> Path:
-    """The live bag without what came from ``first`` to ``last`` s."""
+def paused(target: Path, first: float, last: float, bag: Path = LIVE) -> Path:
+    """A bag without what came from ``first`` to ``last`` s."""
 
     def outside(raw: RawMessage) -> RawMessage | None:
         return None if first * SECOND <= raw.log_time < last * SECOND else raw
 
-    return copy_bag(LIVE, target, outside)
+    return copy_bag(bag, target, outside)
 
 
-def restarted(target: Path) -> Path:
-    """The beginning of the live bag, and then all of it, as when a plant is started again."""
-    messages = list(read_raw(LIVE))
+def restarted(target: Path, bag: Path = LIVE) -> Path:
+    """The beginning of a bag, and then all of it, as when a plant is started again."""
+    messages = list(read_raw(bag))
     with BagWriter(target) as writer:
         for raw in [*(m for m in messages if m.log_time < 150 * SECOND), *messages]:
             topic = raw.topic
@@ -123,11 +123,18 @@ def test_a_bad_message_of_a_live_run(tmp_path: Path, whole: RunLog) -> None:
     ("fault", "words"),
     [
         (restarted, "holds 2 runs, a replay needs one run from its first sample"),
-        (lambda target: paused(target, 400.0, 460.0), "samples are missing within the bag"),
+        (
+            lambda target, bag: paused(target, 400.0, 460.0, bag),
+            "samples are missing within the bag",
+        ),
     ],
 )
 def test_a_replay_says_what_stands_in_its_way(
-    fault: Callable[[Path], Path], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    fault: Callable[[Path, Path], Path],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["replay", str(fault(tmp_path / "bag"))]) == 1
+    begun = cut_bag(LIVE, tmp_path / "begun", last=1200.0)  # two fits, and the swap
+    assert main(["replay", str(fault(tmp_path / "bag", begun))]) == 1
     assert words in " ".join(capsys.readouterr().out.split())

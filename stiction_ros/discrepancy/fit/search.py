@@ -127,15 +127,17 @@ class _Search:
         self.base, self.gap, self.candidate = base, gap, candidate
         self.found: CandidateFit | None = None
         self.judged: dict[tuple[float, ...], CandidateFit] = {}
+        self.white = np.zeros(0)  # misfits of the first grid under white noise
 
     def coarse(self) -> list[FloatArray]:
         """Return the best points of the first grid, under several guesses of the noise."""
         grid = self.candidate.grid()
         values = self.candidate.values(grid)
         response = self.candidate.respond(self.base.run, values)
+        white: Mapping[int, FloatArray] = {i: np.zeros(0) for i in response.outputs}
         guesses: list[Mapping[int, FloatArray]] = [
             {i: self.base.noise[i].ar for i in response.outputs},
-            {i: np.zeros(0) for i in response.outputs},
+            white,
             dict.fromkeys(response.outputs, SLOW),
         ]
         guesses += [
@@ -143,25 +145,27 @@ class _Search:
             for _ in range(all(len(forms) and len(forms[0]) for forms in self.base.declared))
         ]
         leaders: dict[int, float] = {}
+        before: CandidateFit | None = None
         for _ in range(3):
             for ar in guesses:
                 squares = misfit(self.base, self.gap, response, ar)
+                if ar is white:
+                    self.white = squares
                 for point in self.candidate.apart(grid, squares, LEADERS):
                     if point not in leaders:
                         fit = self.judge(values[point], response.pick(point))
                         leaders[point] = fit.delta_bic
-            best = self.best()
-            guesses = [{i: fit.ar for i, fit in best.noise.items()}]
+            if self.best() is before:  # its noise has been a guess
+                break
+            before = self.best()
+            guesses = [{i: fit.ar for i, fit in before.noise.items()}]
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
 
     def coarse_white(self) -> list[FloatArray]:
-        """Return the best points of the first grid under white noise."""
+        """Return the best points of the first grid, looked at before, under white noise."""
         grid = self.candidate.grid()
-        response = self.candidate.respond(self.base.run, self.candidate.values(grid))
-        white = {i: np.zeros(0) for i in response.outputs}
-        squares = misfit(self.base, self.gap, response, white)
-        return [grid[point] for point in self.candidate.apart(grid, squares, STARTS)]
+        return [grid[point] for point in self.candidate.apart(grid, self.white, STARTS)]
 
     def refine(self, centre: FloatArray, size: float, white: bool = False) -> None:
         """Search smaller and smaller grids around a point.

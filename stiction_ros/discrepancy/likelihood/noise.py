@@ -134,8 +134,8 @@ def fit_noise(
         best = (score, beta, fitted)
         ar = fitted
     assert best is not None
-    found = _result(target - columns @ best[1], best[1], best[2], blocks)
-    return dataclasses.replace(found, price=len(found.ar) * math.log(max(found.rows, 2)))
+    _, beta, ar = best
+    return _result(target - columns @ beta, beta, ar, blocks, own=True)
 
 
 def noise_forms(
@@ -187,7 +187,10 @@ def whitened_columns(columns: FloatArray, ar: FloatArray, rows: BoolArray) -> Fl
     return np.asarray(block.T)
 
 
-def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks) -> NoiseFit:
+def _result(
+    residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Blocks, own: bool = False
+) -> NoiseFit:
+    """Return what a fit left; its φ cost something where they are its own."""
     rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
     variance = max(inside / max(rows, 1), _TINY)
     log = math.log(2.0 * math.pi * variance)
@@ -200,7 +203,7 @@ def _result(residual: FloatArray, beta: FloatArray, ar: FloatArray, blocks: Bloc
         rows,
         held * log + outside / variance,
         held,
-        0.0,
+        len(ar) * math.log(max(rows, 2)) if own else 0.0,
     )
 
 

@@ -22,4 +22,6 @@ class SquareDisturbance(PeriodicDisturbance):
 
     @staticmethod
     def wave(angle: FloatArray) -> FloatArray:
-        return np.where(np.mod(angle, 2.0 * math.pi) < math.pi, 1.0, -1.0)
+        turn = angle / (2.0 * math.pi)
+        turn -= np.floor(turn)
+        return np.where(turn < 0.5, 1.0, -1.0)

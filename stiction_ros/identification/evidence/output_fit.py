@@ -182,7 +182,7 @@ class Whitened:
                 others=self.stems,
                 beside=self.lags.past,
                 others_first=self.lags.first,
-                root=root,
+                root=np.ascontiguousarray(root),
                 target=step_products(noise, target, rows, taps),
                 energy=energy,
                 edges=self.edges,

@@ -27,39 +27,39 @@ def lagging() -> Discrepancy:
     return discrepancy("process:PV1", effect="pole", tau=6.0)
 
 
-def words(folder: Path, found: Discrepancy) -> str:
-    page = report_gap(found, folder).read_text(encoding="utf-8")
-    body = re.sub(r"<details>.*?</details>", "", page, flags=re.DOTALL)
+@pytest.fixture(scope="module")
+def page(lagging: Discrepancy, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return report_gap(lagging, tmp_path_factory.mktemp("gap"))
+
+
+@pytest.fixture(scope="module")
+def said(page: Path) -> str:
+    """The words of the page that are not folded away."""
+    body = re.sub(r"<details>.*?</details>", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     return re.sub(r"<style>.*?</style>|<[^>]*>", " ", body, flags=re.DOTALL)
 
 
-def test_every_figure_has_a_name_and_a_unit(tmp_path: Path, lagging: Discrepancy) -> None:
-    said = words(tmp_path, lagging)
+def test_every_figure_has_a_name_and_a_unit(said: str, lagging: Discrepancy) -> None:
     for effect in lagging.effects:
         for key in effect.parameters:
             assert re.search(rf"{key} = [-\d.e]+ s, 95 % between", said)
 
 
-def test_no_internal_words(tmp_path: Path, lagging: Discrepancy) -> None:
-    said = words(tmp_path, lagging)
+def test_no_internal_words(said: str) -> None:
     for word in ("not_asked", "bias_step", "time_shift", "valve:V1", "process:PV1"):
         assert word not in said
 
 
-def test_it_shows_what_the_effect_does_and_what_would_decide(
-    tmp_path: Path, lagging: Discrepancy
-) -> None:
-    said = words(tmp_path, lagging)
+def test_it_shows_what_the_effect_does_and_what_would_decide(said: str, page: Path) -> None:
     assert "What it does" in said
     assert "What would decide" in said
-    assert (tmp_path / "effect_1.png").stat().st_size > 1000
-    assert (tmp_path / "preview.png").stat().st_size > 1000
+    assert (page.parent / "effect_1.png").stat().st_size > 1000
+    assert (page.parent / "preview.png").stat().st_size > 1000
 
 
-def test_an_effect_is_listed_once_in_each_look(tmp_path: Path, lagging: Discrepancy) -> None:
-    report_gap(lagging, tmp_path)
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    for look in page.split("the candidates</h2>")[1:]:
+def test_an_effect_is_listed_once_in_each_look(page: Path) -> None:
+    assert page.name == "report.html"
+    for look in page.read_text(encoding="utf-8").split("the candidates</h2>")[1:]:
         names = re.findall(r'<tr><td class="text">([^<]*)</td>', look.split("</table>")[0])
         assert len(names) > 5
         assert len(set(names)) == len(names)

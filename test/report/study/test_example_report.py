@@ -19,7 +19,7 @@ FAST = IdentificationOptions(output_order=1, input_order=1, delay=(0, 0))
 
 @pytest.fixture(scope="module")
 def tank() -> Example:
-    return example2(1, "tank")
+    return example2(1, "tank", 620)
 
 
 @pytest.fixture(scope="module")
