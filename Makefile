@@ -70,9 +70,15 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
-test: lint
+# Both workers would make the same machine code at once; the linters leave a core for that.
+test: setup
+	$(MAKE) -j2 lint compiled
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? -eq 5  # 5: ARGS picks none of them
+
+.PHONY: compiled
+compiled: setup
+	$(BIN)/python -c "from stiction_ros.identification.warm_up import compile_loops; compile_loops()"
 
 docs: setup
 	$(BIN)/mkdocs build --strict --clean
