@@ -8,8 +8,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# A domain of its own keeps a test run apart from nodes that run on the same host.
-os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randint(1, 100))
+# A domain of its own keeps a test run apart from nodes that run on the same host, and the workers
+# of one run, which share its identity, from each other.
+run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
+worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+first = (random.Random(run) if run else random.SystemRandom()).randrange(100)
+os.environ["ROS_DOMAIN_ID"] = str(1 + (first + int(worker.removeprefix("gw"))) % 100)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # Without it rclpy sends Float64(data=1) as 5e-324 and says nothing.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"

@@ -132,6 +132,8 @@ class Whitened:
 
     def wave_variances(self, prior: ResponsePrior) -> FloatArray:
         """Return the variances of the sines and cosines, whitened, over σ², shape (2 H,)."""
+        if not len(self.passed):  # most records, tens of thousands of times
+            return np.empty(0)
         harmonics = np.arange(1, len(self.passed) + 1)
         return np.tile(prior.wave_variances(harmonics) * np.abs(self.passed) ** 2, 2)
 
