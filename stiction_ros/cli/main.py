@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = next((word for word in given if not word.startswith("-")), "")
     try:
-        options = parser(command).parse_args(given)
+        options = parser(command).parse_args(given, argparse.Namespace(words=given))
         return int(options.run(options))
     except InputError as error:
         print(f"stiction: {error}", file=sys.stderr)

@@ -6,12 +6,15 @@ import argparse
 import dataclasses
 import os
 import platform
+import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli.benches import against
 from stiction_ros.cli.benches.accuracy import field as bench_field
 from stiction_ros.cli.benches.accuracy import gap as bench_gap
 from stiction_ros.cli.benches.accuracy import stability as bench_stability
@@ -82,6 +85,15 @@ def add(commands: Any) -> None:
     bench_world.add_options(parser)
     bench_field.add_options(parser)
     bench_stability.add_options(parser)
+    turns = parser.add_argument_group("another version, side by side")
+    turns.add_argument(
+        "--against",
+        type=Path,
+        metavar="DIR",
+        help="run both this tree and the worktree DIR, which has its own .venv, in turns; the "
+        "other is the baseline",
+    )
+    turns.add_argument("--turns", type=int, metavar="N", help="runs of each of the two (3)")
     parser.add_argument("--json", metavar="F", help="write the rows as JSON; - for stdout")
     parser.set_defaults(run=run)
 
@@ -97,12 +109,34 @@ def run(options: argparse.Namespace) -> int:
                 where=f"--{key}",
                 fix="leave it out, or measure another",
             )
+    if options.against is not None:
+        return _in_turns(name, options)
+    if options.turns is not None:
+        raise InputError(
+            "there is nothing to take turns with", where="--turns", fix="use --against"
+        )
     if name == "gap":
         return bench_gap.run(options)
     if name in COUNTS:
         return COUNTS[name](options, machine())
     with bar(f"bench {name}") as show:
         rows = BENCHMARKS[name](options, show)
+    _hand_over(name, options, rows)
+    return 0
+
+
+def _in_turns(name: str, options: argparse.Namespace) -> int:
+    turns = against.TURNS if options.turns is None else options.turns
+    with bar(f"bench {name}") as show:
+        ran = against.alternate(against.repeated(options.words), options.against, turns, show)
+    _hand_over(name, options, ran.rows())
+    for said in ran.alone():
+        print(said, file=sys.stderr)
+    return 0
+
+
+def _hand_over(name: str, options: argparse.Namespace, rows: Sequence[Row]) -> None:
+    """Write the rows as JSON where that is asked for, and print them."""
     if options.json is not None:
         document = {
             "name": name,
@@ -112,7 +146,6 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, document)
     if options.json != "-":
         _print(rows)
-    return 0
 
 
 def _world_for_physics(options: argparse.Namespace) -> str:
