@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 
 
 def is_finite(value: float) -> bool:
@@ -37,3 +39,19 @@ class InputError(ValueError):
         """Return the same error with ``place`` put before where it was found."""
         where = f"{place}: {self.where}" if self.where else place
         return InputError(self.what, where=where, fix=self.fix)
+
+
+@contextlib.contextmanager
+def storing(where: object, *, what: str = "written", fix: str = "") -> Iterator[None]:
+    """Tell what the storage refuses inside the block as an :class:`InputError`.
+
+    Args:
+        where: the file or folder.
+        what: that cannot be done: ``written``, ``made``.
+        fix: how to mend it.
+    """
+    try:
+        yield
+    except OSError as error:
+        said = f"cannot be {what} ({error.strerror or error})"
+        raise InputError(said, where=str(where), fix=fix) from None

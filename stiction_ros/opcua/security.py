@@ -10,7 +10,7 @@ import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -219,11 +219,9 @@ def make_certificate(identity: Identity, certificate: Path, private_key: Path) -
 
 def write_secret(path: Path, content: bytes) -> None:
     """Write a new file that only its owner may read; InputError when it cannot be made."""
-    try:
+    with storing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(path)) from None
     with os.fdopen(handle, "wb") as file:
         file.write(content)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from stiction_ros import __version__
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.paper.exhibit import Exhibit
 from stiction_ros.paper.figures import controllers, diagrams, responses, trends
 from stiction_ros.paper.sources import Sources
@@ -79,12 +79,8 @@ def draw(
         show(place / len(names), name)
         made += [maker(sources) for maker in MAKERS[name]]
     show(1.0, "writing")
-    try:
+    with storing(directory, fix="choose another"):
         return _write(made, directory), tuple(made)
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=str(directory), fix="choose another"
-        ) from None
 
 
 def _write(made: Sequence[Exhibit], directory: Path) -> Path:

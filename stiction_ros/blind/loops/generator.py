@@ -26,7 +26,7 @@ from stiction_ros.effects import (
     TimeShift,
     Tuning,
 )
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.json_values import json_text
 from stiction_ros.loop import LoopModel, PiTuning, SetPoints, simulate_closed_loop
 from stiction_ros.records import Record
@@ -207,12 +207,10 @@ def write_blind_loop(seed: int, family: str, folder: Path, answers: Path) -> Non
         InputError: as :func:`blind_loop`; a folder that cannot be written.
     """
     seen, truth = blind_loop(seed, family)
-    try:
+    with storing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         answers.mkdir(parents=True, exist_ok=True)
         write_csv(seen.record, folder / "record.csv")
         seen.model.save(folder / "model.loop.yaml")
         answer = answers / f"{family}_{seed}.json"
         answer.write_text(json_text(truth.to_mapping()) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(folder)) from None

@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 from typing import Any
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.finish import Packing
 from stiction_ros.records.bag.repair import Repair, RepairStatus, repair_bag
@@ -47,10 +47,11 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"cannot be rewritten ({error.strerror or error})", where=str(error.filename)
         ) from None
-    if options.json is not None:
-        write_json(options.json, {"bag": str(options.bag)} | dataclasses.asdict(done))
-    if options.json != "-":
-        _print(options.bag, done)
+    hand_over(
+        options.json,
+        {"bag": str(options.bag)} | dataclasses.asdict(done),
+        lambda: _print(options.bag, done),
+    )
     return 0
 
 

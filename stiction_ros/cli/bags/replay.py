@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.records.storage.files import storage_files
 
@@ -36,10 +36,11 @@ def run(options: argparse.Namespace) -> int:
 
     with bar("replaying") as show:
         found = replay(options.bag, namespace=options.namespace, progress=show)
-    if options.json is not None:
-        write_json(options.json, found.to_json() | {"bag": str(options.bag)})
-    if options.json != "-":
-        _print(str(options.bag), found)
+    hand_over(
+        options.json,
+        found.to_json() | {"bag": str(options.bag)},
+        lambda: _print(str(options.bag), found),
+    )
     return 1 if found.match is Match.DIFFERENT else 0
 
 

@@ -14,7 +14,7 @@ from stiction_ros.cli.options.intake import (
     show_loops,
     tell,
 )
-from stiction_ros.errors import InputError
+from stiction_ros.errors import storing
 from stiction_ros.intake.intake import is_bag
 from stiction_ros.records.parts import longest_part
 
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out)
     if options.dry_run:
         return show_loops([Path(options.record)], intake_options(options))
-    try:
+    with storing(out, fix="choose another --out"):
         if is_bag(options.record) and holds_live_run(options.record):
             from stiction_ros.report.run.report import report_run
 
@@ -65,8 +65,4 @@ def run(options: argparse.Namespace) -> int:
 
             found = identify(record, IdentificationOptions())
             print(report_record(record, found, out, parts))
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=str(out), fix="choose another --out"
-        ) from None
     return 0

@@ -22,7 +22,7 @@ from stiction_ros.cli.benches.accuracy import world as bench_world
 from stiction_ros.cli.benches.speed.row import Row
 from stiction_ros.cli.options import choices
 from stiction_ros.cli.options.searches import add_search_options
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import Bar, bar
 from stiction_ros.errors import InputError
 
@@ -137,15 +137,9 @@ def _in_turns(name: str, options: argparse.Namespace) -> int:
 
 def _hand_over(name: str, options: argparse.Namespace, rows: Sequence[Row]) -> None:
     """Write the rows as JSON where that is asked for, and print them."""
-    if options.json is not None:
-        document = {
-            "name": name,
-            "machine": machine(),
-            "rows": [dataclasses.asdict(row) for row in rows],
-        }
-        write_json(options.json, document)
-    if options.json != "-":
-        _print(rows)
+    told = [dataclasses.asdict(row) for row in rows]
+    document = {"name": name, "machine": machine(), "rows": told}
+    hand_over(options.json, document, lambda: _print(rows))
 
 
 def _world_for_physics(options: argparse.Namespace) -> str:

@@ -16,7 +16,7 @@ from stiction_ros.cli.output.progress import Bar, bar
 from stiction_ros.cli.runs.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.runs.scenarios import SCENARIOS, find, loop_nodes
 from stiction_ros.cli.studies import compare
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
@@ -157,10 +157,8 @@ def _make_empty(directory: Path) -> None:
                 "holds other files", where=str(directory), fix="choose another folder by --out"
             )
         shutil.rmtree(directory)
-    try:
+    with storing(directory, what="made"):
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made ({error.strerror})", where=str(directory)) from None
 
 
 def _speed(text: str) -> float | None:

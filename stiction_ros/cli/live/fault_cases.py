@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import storing
 
 
 def keep(folder: Path, target: Path) -> None:
@@ -14,12 +14,10 @@ def keep(folder: Path, target: Path) -> None:
     Raises:
         InputError: the target cannot be written.
     """
-    try:
+    with storing(target):
         if target.exists():
             shutil.rmtree(target)
         shutil.copytree(folder, target)
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
 
 
 def shown_seconds(value: float | None) -> str:

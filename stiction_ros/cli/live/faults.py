@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stiction_ros.cli.live.fault_cases import keep, shown_seconds
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.node_processes import require_ros, ros_environment
 from stiction_ros.cli.runs.seeds import run_each
 from stiction_ros.errors import InputError
@@ -91,10 +91,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"{options.speed:g} is not positive", where="--speed")
     require_ros()
     outcomes = run_cases(cases, options)
-    if options.json is not None:
-        write_json(options.json, [outcome.to_json() for outcome in outcomes])
-    if options.json != "-":
-        _print(outcomes)
+    hand_over(options.json, [outcome.to_json() for outcome in outcomes], lambda: _print(outcomes))
     return 0 if outcomes and all(outcome.passed for outcome in outcomes) else 1
 
 

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.cli.runs.node_processes import require_ros
 from stiction_ros.cli.runs.scenarios import find, node_parameters
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.faults.fault import Pace
 from stiction_ros.settings import settings_of
 
@@ -65,10 +65,7 @@ def run(options: argparse.Namespace) -> int:
             found = _soak(options, Path(folder))
     else:
         found = _soak(options, _made(Path(options.out)))
-    if options.json is not None:
-        write_json(options.json, found.to_json())
-    if options.json != "-":
-        _print(options.scenario, found)
+    hand_over(options.json, found.to_json(), lambda: _print(options.scenario, found))
     return 1 if found.reasons else 0
 
 
@@ -101,14 +98,8 @@ def _soak(options: argparse.Namespace, directory: Path) -> Soaked:
 
 
 def _made(directory: Path) -> Path:
-    try:
+    with storing(directory, what="made", fix="choose another folder by --out"):
         directory.mkdir(parents=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot be made ({error.strerror})",
-            where=str(directory),
-            fix="choose another folder by --out",
-        ) from None
     return directory
 
 

@@ -21,7 +21,7 @@ from stiction_ros.cli.options.intake import (
 )
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.output.progress import bar
-from stiction_ros.errors import InputError
+from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
 
 if TYPE_CHECKING:
@@ -95,10 +95,8 @@ def run(options: argparse.Namespace) -> int:
         return 1
     if options.out is not None:
         name = Path(options.out).name.removesuffix(".yaml").removesuffix(".loop")
-        try:
+        with storing(options.out):
             found.loop_model(name or "loop", options.limits).save(options.out)
-        except OSError as error:
-            raise InputError(f"cannot be written ({error.strerror})", where=options.out) from None
     return 0
 
 

@@ -17,7 +17,7 @@ from stiction_ros.cli.options.intake import (
     show_loops,
     tell,
 )
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -55,10 +55,7 @@ def run(options: argparse.Namespace) -> int:
     if options.dry_run:
         return show_loops([Path(options.record)], intake_options(options))
     found: Gain = _of_model(options) if _is_model(options.record) else _of_record(options)
-    if options.json is not None:
-        write_json(options.json, {"record": str(options.record)} | found.to_json())
-    if options.json != "-":
-        show(found)
+    hand_over(options.json, {"record": str(options.record)} | found.to_json(), lambda: show(found))
     return 0
 
 

@@ -19,9 +19,9 @@ from stiction_ros.cli.options.intake import (
     opened,
     show_loops,
 )
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.records.parts import longest_part, only_part
@@ -93,10 +93,7 @@ def run(options: argparse.Namespace) -> int:
     )
     with bar("comparing") as show:
         found = find_discrepancy(model, records, settings, progress=show)
-    if options.json is not None:
-        write_json(options.json, found.to_json())
-    if options.json != "-":
-        _print(found)
+    hand_over(options.json, found.to_json(), lambda: _print(found))
     if options.out is not None:
         _write(found, Path(options.out))
     return EXIT_CODES[found.verdict]
@@ -126,10 +123,8 @@ def _record(path: str, options: argparse.Namespace) -> Record:
 def _write(found: Discrepancy, directory: Path) -> None:
     from stiction_ros.report.gap.report import report_gap
 
-    try:
+    with storing(directory, what="made"):
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made ({error.strerror})", where=str(directory)) from None
     found.model_after.save(directory / "model_after.loop.yaml")
     print(f"report: {report_gap(found, directory)}", file=sys.stderr)
 

@@ -30,7 +30,7 @@ from stiction_ros.cli.options.searches import (
 )
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.output.progress import bar
-from stiction_ros.errors import InputError
+from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
 
 if TYPE_CHECKING:
@@ -136,10 +136,8 @@ def run(options: argparse.Namespace) -> int:
         from stiction_ros.report.record.report import report_record
 
         directory = Path(options.out)
-        try:
+        with storing(options.out, what="made"):
             directory.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"cannot be made ({error.strerror})", where=options.out) from None
         page = report_record(record, found, directory, parts)
         print(f"report: {page}", file=sys.stderr)
     return 0
@@ -150,10 +148,8 @@ def _write_model(record: Record, found: Identification, target: str) -> None:
 
     name = Path(target).name.removesuffix(".yaml").removesuffix(".loop")
     model = identified_loop(record, found, name or "loop")
-    try:
+    with storing(target):
         model.save(target)
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=target) from None
 
 
 def _print(document: Mapping[str, Any], found: Identification) -> None:

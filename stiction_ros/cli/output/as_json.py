@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import storing
 from stiction_ros.json_values import json_text
 
 
@@ -15,7 +16,19 @@ def write_json(target: str, value: Any) -> None:
     if target == "-":
         print(text)
         return
-    try:
+    with storing(target):
         Path(target).write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=target) from None
+
+
+def hand_over(target: str | None, value: Any, show: Callable[[], object]) -> None:
+    """Write a result as JSON where ``--json`` asks for it, and show it to people.
+
+    Args:
+        target: what ``--json`` names, ``-`` for standard output; None where it is not given.
+        value: the result.
+        show: prints it; not called where standard output holds the JSON.
+    """
+    if target is not None:
+        write_json(target, value)
+    if target != "-":
+        show()

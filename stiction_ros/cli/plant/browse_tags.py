@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from stiction_ros.cli.plant.opcua_session import add_session, credentials_of
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.tag_map import TagMap, check_address
 
@@ -62,9 +62,7 @@ def run(options: argparse.Namespace) -> int:
             where=options.url,
             fix="say by --pv and --op how they are called",
         )
-    try:
+    with storing(options.out):
         path.write_text(yaml.safe_dump({"server": options.url, "loops": loops}, sort_keys=False))
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=options.out) from None
     print(f"{path}: {len(TagMap.load(path).loops)} loops")
     return 0

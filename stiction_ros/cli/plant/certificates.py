@@ -8,7 +8,7 @@ import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.opcua import require_asyncua
 
 if TYPE_CHECKING:
@@ -88,11 +88,9 @@ def _pin(options: argparse.Namespace) -> int:
     from cryptography.hazmat.primitives.serialization import Encoding
 
     path = Path(options.to)
-    try:
+    with storing(options.to):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(found.public_bytes(Encoding.DER))
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=options.to) from None
     print(f"pinned: {options.to}")
     return 0
 

@@ -21,7 +21,7 @@ from stiction_ros.cli.loop.identify import delay_range
 from stiction_ros.cli.options.intake import add_columns, add_intake, intake_options, show_loops
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.output.progress import Bar, bar
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 SHOWN = 30
 """Rows of the list that are printed."""
@@ -161,7 +161,7 @@ def _write(found: Any, out: Path, trends: Any) -> None:
     from stiction_ros.survey.listing.tables import write_csv, write_xlsx
     from stiction_ros.survey.pages.loop_page import with_trend
 
-    try:
+    with storing(out):
         (out / PAGE).write_text(list_page(found, trends), encoding="utf-8")
         write_csv(out / CSV, found.entries)
         write_xlsx(out / XLSX, found.entries)
@@ -172,8 +172,6 @@ def _write(found: Any, out: Path, trends: Any) -> None:
                 page = out / entry.report
                 told = with_trend(page.read_text(encoding="utf-8"), [*past, *now])
                 page.write_text(told, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(out)) from None
 
 
 def _pairs(file: str | None) -> list[tuple[str, str]]:

@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.scenarios import find
 from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.effects import Behaviour, HeStiction
@@ -208,10 +208,11 @@ def run(options: argparse.Namespace) -> int:
     changed(scenario, options.change)  # refuses before anything is run
     work = functools.partial(run_seed, scenario, options.change)
     outcomes = run_seeds(work, options.seeds, options.jobs, f"{scenario.name} {options.change}")
-    if options.json is not None:
-        write_json(options.json, [dataclasses.asdict(outcome) for outcome in outcomes])
-    if options.json != "-":
-        _print(scenario, options.change, outcomes)
+    hand_over(
+        options.json,
+        [dataclasses.asdict(outcome) for outcome in outcomes],
+        lambda: _print(scenario, options.change, outcomes),
+    )
     return 0 if all(outcome.good for outcome in outcomes) else 1
 
 

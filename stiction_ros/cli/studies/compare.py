@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.options import choices
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over, write_json
 from stiction_ros.cli.runs.seeds import run_seeds, seed_range
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
     from stiction_ros.examples.control_study import StudyOptions, Trial
@@ -121,10 +121,7 @@ def run(options: argparse.Namespace) -> int:
     page = report_study(studies, directory)
     document = {study.options.plant: study.to_json() for study in studies}
     write_json(str(directory / "compare.json"), document)
-    if options.json is not None:
-        write_json(options.json, document)
-    if options.json != "-":
-        _print(studies, page)
+    hand_over(options.json, document, lambda: _print(studies, page))
     return 0
 
 
@@ -163,10 +160,8 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _make(directory: Path) -> None:
-    try:
+    with storing(directory, what="made"):
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made ({error.strerror})", where=str(directory)) from None
 
 
 def _print(studies: Sequence[Any], page: Path) -> None:

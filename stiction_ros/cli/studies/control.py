@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.options import choices
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
@@ -165,10 +165,11 @@ def run(options: argparse.Namespace) -> int:
     work = functools.partial(run_seed, names)
     seeds = run_seeds(work, options.seeds, options.jobs, "tank")
     found = [scores(name, [seed[name] for seed in seeds]) for name in names]
-    if options.json is not None:
-        write_json(options.json, [{**dataclasses.asdict(s), "met": s.met} for s in found])
-    if options.json != "-":
-        _print(found, options.seeds)
+    hand_over(
+        options.json,
+        [{**dataclasses.asdict(s), "met": s.met} for s in found],
+        lambda: _print(found, options.seeds),
+    )
     if options.floor:
         _print_floor([seed[TWO] for seed in seeds])
     return 0 if all(score.met for score in found) else 1

@@ -13,11 +13,11 @@ from rich.console import Console
 
 from stiction_ros.cli.options import choices
 from stiction_ros.cli.options.searches import add_search_options, identify_by, search_options
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over, write_json
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.cli.studies.example_tables import print_outcome, print_study
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.records.csv.writer import write_csv
 
 if TYPE_CHECKING:
@@ -177,10 +177,11 @@ def _run_one(choice: Choice, options: argparse.Namespace) -> int:
         show(0.1, f"{choice.name}: identifying")
         found = choice.identify(example, lambda share: show(0.1 + 0.9 * share))
     outcome = Outcome(example, found, compare(example, found))
-    if options.json is not None:
-        write_json(options.json, outcome.to_json())
-    if options.json != "-":
-        print_outcome(Console(), outcome.example, outcome.comparison, outcome.found)
+    hand_over(
+        options.json,
+        outcome.to_json(),
+        lambda: print_outcome(Console(), outcome.example, outcome.comparison, outcome.found),
+    )
     if options.out is not None:
         print(f"report: {_write(outcome, Path(options.out))}", file=sys.stderr)
     return 0
@@ -193,34 +194,25 @@ def _run_many(choice: Choice, options: argparse.Namespace) -> int:
     title = f"{choice.name}, {choice.variant}"
     outcomes = run_seeds(work, options.seeds, options.jobs, title)
     findings = tally(choice.name, [outcome.comparison for outcome in outcomes])
-    if options.json is not None:
-        document = {
-            "example": choice.name,
-            "variant": choice.variant,
-            "findings": [finding.to_json() for finding in findings],
-            "runs": [outcome.to_json() for outcome in outcomes],
-        }
-        write_json(options.json, document)
-    if options.json != "-":
-        rows = [(o.example.seed, o.comparison, o.found) for o in outcomes]
-        print_study(Console(), title, rows, findings)
+    document = {
+        "example": choice.name,
+        "variant": choice.variant,
+        "findings": [finding.to_json() for finding in findings],
+        "runs": [outcome.to_json() for outcome in outcomes],
+    }
+    rows = [(o.example.seed, o.comparison, o.found) for o in outcomes]
+    hand_over(options.json, document, lambda: print_study(Console(), title, rows, findings))
     return 0
 
 
 def _write(outcome: Outcome, directory: Path) -> Path:
     from stiction_ros.report.study.example_report import report_example
 
-    try:
+    with storing(directory, fix="choose another --out"):
         directory.mkdir(parents=True, exist_ok=True)
         write_csv(outcome.example.record, directory / "record.csv")
         page = report_example(
             outcome.example, outcome.found, outcome.comparison, directory / "report.html"
         )
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})",
-            where=str(directory),
-            fix="choose another --out",
-        ) from None
     write_json(str(directory / "result.json"), outcome.to_json())
     return page

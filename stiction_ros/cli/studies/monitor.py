@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
@@ -48,10 +48,7 @@ def run(options: argparse.Namespace) -> int:
         rule = dataclasses.replace(rule, monitor_false_alarm=options.false_alarm)
     work = functools.partial(run_seed, rule, options.healthy)
     outcomes = run_seeds(work, options.seeds, options.jobs, "monitor")
-    if options.json is not None:
-        write_json(options.json, [_document(one) for one in outcomes])
-    if options.json != "-":
-        _print(outcomes)
+    hand_over(options.json, [_document(one) for one in outcomes], lambda: _print(outcomes))
     return 0
 
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from stiction_ros.cli.options import choices
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.cli.runs.seeds import run_seeds, seed_range
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 
 def add(commands: Any) -> None:
@@ -63,10 +63,8 @@ def run(options: argparse.Namespace) -> int:
             raise InputError("says nothing to draw", where="paper", fix="use --all, or --figure 2")
     elif wanted:
         raise InputError("counts alone", where="--success", fix="leave figures and tables out")
-    try:
+    with storing(options.out, what="made"):
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made ({error.strerror})", where=options.out) from None
     return _count(options, directory) if options.success else _draw(options, directory)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.scenarios import find
 from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
 
@@ -89,10 +89,9 @@ def run(options: argparse.Namespace) -> int:
     scenario = Scenario.load(path)
     work = functools.partial(run_seed, scenario, ideal_valves=options.ideal_valves)
     outcomes = run_seeds(work, options.seeds, options.jobs, scenario.name)
-    if options.json is not None:
-        write_json(options.json, [outcome.summary for outcome in outcomes])
-    if options.json != "-":
-        _print(scenario, outcomes)
+    hand_over(
+        options.json, [outcome.summary for outcome in outcomes], lambda: _print(scenario, outcomes)
+    )
     swapped = sum(outcome.summary["swap_time"] is not None for outcome in outcomes)
     return 0 if swapped == (0 if options.ideal_valves else len(outcomes)) else 1
 

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.scenarios import find
 from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError
@@ -82,10 +82,11 @@ def run(options: argparse.Namespace) -> int:
     runs = run_seeds(work, options.seeds, options.jobs, scenario.name)
     means = [mean_score([run[i] for run in runs]) for i in range(len(candidates))]
     names = [candidate.name for candidate in candidates]
-    if options.json is not None:
-        write_json(options.json, [_row(n, m, means[0]) for n, m in zip(names, means, strict=True)])
-    if options.json != "-":
-        _print(scenario, options.seeds, names, means)
+    hand_over(
+        options.json,
+        [_row(n, m, means[0]) for n, m in zip(names, means, strict=True)],
+        lambda: _print(scenario, options.seeds, names, means),
+    )
     if options.floor:
         _print_floor(scenario, options.seeds, means[0])
     free, unaware, exact = means[:3]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.field.exports.formats import (
     STYLES,
     Form,
@@ -83,7 +83,7 @@ def export_plant(loops: Sequence[PlantLoop], seed: int, folder: Path) -> Path:
     Raises:
         InputError: the folder is not empty, cannot be made, or a package is missing.
     """
-    try:
+    with storing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise InputError("is not empty", where=str(folder), fix="choose another --out")
@@ -92,8 +92,6 @@ def export_plant(loops: Sequence[PlantLoop], seed: int, folder: Path) -> Path:
         told = [_truth(one, files[one.tag], folder) for one in loops]
         text = json.dumps({"seed": seed, "loops": told}, indent=1, allow_nan=False)
         truth.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(folder)) from None
     return truth
 
 

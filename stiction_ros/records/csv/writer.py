@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.records.csv.names import (
     DEFAULT_OUTPUT,
     DEFAULT_VALVE,
@@ -75,15 +75,12 @@ def write_csv(
     if record.mask is not None:
         header.append(QUALITY)
         columns.append([Quality(number).word for number in record.mask.tolist()])
-    try:
-        with Path(path).open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
-            # A semicolon in a name must not be taken for what separates the columns.
-            (quoted if ";" in "".join(header) else writer).writerow(header)
-            writer.writerows(zip(*columns, strict=True))
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(path)) from None
+    with storing(path), Path(path).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
+        # A semicolon in a name must not be taken for what separates the columns.
+        (quoted if ";" in "".join(header) else writer).writerow(header)
+        writer.writerows(zip(*columns, strict=True))
 
 
 def _cell(value: float) -> str:

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.options import choices
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import run_seeds
 from stiction_ros.errors import InputError
 from stiction_ros.records.parts import longest_part
@@ -301,10 +301,7 @@ def run(options: argparse.Namespace, machine: str) -> int:
     rows = run_seeds(
         functools.partial(judge, options.method or METHOD), seeds, options.jobs or 1, "field"
     )
-    if options.json is not None:
-        write_json(options.json, document(rows, machine))
-    if options.json != "-":
-        show(rows)
+    hand_over(options.json, document(rows, machine), lambda: show(rows))
     return 0
 
 

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from stiction_ros.cli.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_ros.cli.options import choices
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.cli.runs.seeds import drop
 
@@ -112,10 +112,7 @@ def run(options: argparse.Namespace) -> int:
         start_log(log)
     judge_all(todo, bench.full, options.jobs or 1, functools.partial(_keep, rows, log, bench.full))
     ordered = [rows[case] for case in bench.cases]
-    if options.json is not None:
-        write_json(options.json, {"name": "gap"} | report(ordered))
-    if options.json != "-":
-        show(ordered)
+    hand_over(options.json, {"name": "gap"} | report(ordered), lambda: show(ordered))
     return 0
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 
 Row = TypeVar("Row")
 
@@ -26,10 +26,8 @@ def check_seeds(first: int, loops: int) -> None:
 
 def start_log(path: Path) -> None:
     """Begin an empty log."""
-    try:
+    with storing(path):
         path.write_text("", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(path)) from None
 
 
 def logged_rows(path: Path, full: bool, row_of: Callable[[Mapping[str, Any]], Row]) -> list[Row]:

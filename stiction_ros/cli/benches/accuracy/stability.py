@@ -24,7 +24,7 @@ from stiction_ros.cli.benches.accuracy.field import (
     answer_of,
     shares_table,
 )
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import run_each
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import CsvColumns, open_parts
@@ -275,10 +275,7 @@ def run(options: argparse.Namespace, machine: str) -> int:
     wanted = sources(seeds, folder)
     work = functools.partial(hold, options.method or METHOD)
     rows = run_each(work, wanted, options.jobs or 1, f"stability: {len(wanted)} records")
-    if options.json is not None:
-        write_json(options.json, document(rows, machine))
-    if options.json != "-":
-        show(rows)
+    hand_over(options.json, document(rows, machine), lambda: show(rows))
     return 0
 
 

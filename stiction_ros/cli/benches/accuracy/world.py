@@ -17,9 +17,9 @@ from rich.table import Table
 from stiction_ros.cli.benches.accuracy.gap import matrix_table, rate_table
 from stiction_ros.cli.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_ros.cli.options import choices
-from stiction_ros.cli.output.as_json import write_json
+from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import run_each
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, storing
 from stiction_ros.json_values import json_text
 
 if TYPE_CHECKING:
@@ -101,10 +101,9 @@ def run(options: argparse.Namespace, machine: str) -> int:
     )
     rows |= dict(zip(todo, judged, strict=True))
     ordered = [rows[case] for case in bench.cases]
-    if options.json is not None:
-        write_json(options.json, {"name": "world", "machine": machine} | report(ordered))
-    if options.json != "-":
-        show(ordered)
+    hand_over(
+        options.json, {"name": "world", "machine": machine} | report(ordered), lambda: show(ordered)
+    )
     return 0
 
 
@@ -145,14 +144,12 @@ def write_loops(bench: WorldBench, folder: Path) -> None:
             "also": sorted(loop.also),
             "surroundings": dataclasses.asdict(loop.surroundings),
         }
-        try:
+        with storing(seen):
             seen.mkdir(parents=True, exist_ok=True)
             answers.mkdir(parents=True, exist_ok=True)
             write_csv(loop.record, seen / "record.csv")
             LoopModel.from_mapping(loop.given).save(seen / "model.loop.yaml")
             (answers / f"{name}.json").write_text(json_text(answer) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"cannot be written ({error.strerror})", where=str(seen)) from None
 
 
 def show(rows: Sequence[WorldScore]) -> None:
