@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.examples.example import Example
 from stiction_ros.examples.one_step import square_error
 from stiction_ros.identification import Identification, OutputModel, ValveEstimate
@@ -156,16 +155,6 @@ def identified_process(found: Identification) -> LinearModel:
     return ArxProcess(equations, valves, *zero).model
 
 
-def step_responses(model: LinearModel, samples: int) -> FloatArray:
-    """Return responses to stem steps of 1 %, shape (samples, p, m)."""
-    state = np.zeros(model.b.shape)
-    out = np.empty((samples, *model.c.shape[:1], model.b.shape[1]))
-    for k in range(samples):
-        out[k] = model.c @ state
-        state = model.a @ state + model.b
-    return out
-
-
 def _compare_valve(example: Example, valve: ValveEstimate, stem_error: float) -> ValveComparison:
     static, dynamic = example.friction(valve.name)
     return ValveComparison(
@@ -180,7 +169,7 @@ def _compare_valve(example: Example, valve: ValveEstimate, stem_error: float) ->
 def _compare_channels(example: Example, found: Identification) -> tuple[ChannelComparison, ...]:
     truth = example.truth.process.linear(example.truth.sample_time)
     model = identified_process(found)
-    apart = step_responses(model, RESPONSE_SAMPLES) - step_responses(truth, RESPONSE_SAMPLES)
+    apart = model.step_responses(RESPONSE_SAMPLES) - truth.step_responses(RESPONSE_SAMPLES)
     gain, true_gain = model.gain, truth.gain
     return tuple(
         ChannelComparison(

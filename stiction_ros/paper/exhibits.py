@@ -8,7 +8,6 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from stiction_ros import __version__
 from stiction_ros.errors import InputError, storing
 from stiction_ros.paper.exhibit import Exhibit
 from stiction_ros.paper.figures import controllers, diagrams, responses, trends
@@ -92,16 +91,15 @@ def _write(made: Sequence[Exhibit], directory: Path) -> Path:
     for exhibit in made:
         parts.append(f"<h2>{text(exhibit.title)}</h2>")
         if exhibit.drawing is not None:
-            png = exhibit.drawing.png()
-            (directory / f"{exhibit.drawing.name}.png").write_bytes(png)
-            parts.append(embedded(exhibit.drawing, png))
+            exhibit.drawing.save(directory)
+            parts.append(embedded(exhibit.drawing))
         if exhibit.rows:
             rows = [(row.what, row.printed, row.ours, row.remark) for row in exhibit.rows]
             parts.append(table(HEAD, rows, texts=4))
         if exhibit.remark:
             parts.append(f'<p class="note">{text(exhibit.remark)}</p>')
     target = directory / PAGE
-    target.write_text(page("The paper", parts, f"stiction_ros {__version__}"), encoding="utf-8")
+    target.write_text(page("The paper", parts), encoding="utf-8")
     document = [
         {
             "name": exhibit.name,

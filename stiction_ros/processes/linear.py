@@ -68,3 +68,19 @@ class LinearModel:
             return np.asarray(self.c @ np.linalg.solve(np.eye(self.order) - self.a, self.b))
         except np.linalg.LinAlgError:
             return np.full((len(self.pv0), len(self.stem0)), np.inf)
+
+    def step_responses(self, samples: int) -> FloatArray:
+        """Return the responses of outputs to stem steps of 1 % at sample 0, without ``constant``.
+
+        Args:
+            samples: N.
+
+        Returns:
+            Shape (N, p, m), engineering units.
+        """
+        state = np.zeros(self.b.shape)
+        out = np.empty((samples, len(self.c), self.b.shape[1]))
+        for k in range(samples):
+            out[k] = self.c @ state
+            state = self.a @ state + self.b
+        return out

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import io
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -71,8 +73,9 @@ class Drawing:
     caption: str
     figure: Figure
 
+    @functools.cached_property
     def png(self) -> bytes:
-        """Return the figure as PNG of at most 128 colours, which line drawings do not miss."""
+        """The figure as PNG of at most 128 colours, which line drawings do not miss."""
         with style():
             canvas: Any = FigureCanvasAgg(self.figure)  # type: ignore[no-untyped-call,unused-ignore]
             canvas.draw()
@@ -80,6 +83,12 @@ class Drawing:
         target = io.BytesIO()
         pixels.quantize(128, dither=Image.Dither.NONE).save(target, "png", optimize=True)
         return target.getvalue()
+
+    def save(self, folder: Path) -> Path:
+        """Write the figure into a folder, by its name, and return the file."""
+        path = folder / f"{self.name}.png"
+        path.write_bytes(self.png)
+        return path
 
 
 @contextlib.contextmanager

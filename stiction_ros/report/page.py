@@ -6,8 +6,10 @@ import base64
 import html
 import math
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from string import Template
 
+from stiction_ros import __version__
 from stiction_ros.report.drawing import Drawing
 
 _PAGE = Template(
@@ -84,10 +86,27 @@ Cell = str | tuple[str, str]
 """Text of a table cell, or its class and its text."""
 
 
-def page(title: str, parts: Iterable[str], footer: str) -> str:
+def page(title: str, parts: Iterable[str]) -> str:
     """Return the whole page."""
     body = "\n".join(part for part in parts if part)
-    return _PAGE.substitute(title=text(title), body=body, footer=text(footer))
+    footer = f"stiction_ros {__version__}"
+    return _PAGE.substitute(title=text(title), body=body, footer=footer)
+
+
+def page_file(out: str | Path) -> tuple[Path, Path | None]:
+    """Return the file of a page, and the folder for what stands beside it.
+
+    Args:
+        out: a folder, or an ``.html`` file that stands alone; folders are made.
+
+    Returns:
+        The file, and the folder; None for a page that stands alone.
+    """
+    out = Path(out)
+    alone = out.suffix.lower() == ".html"
+    folder = out.parent if alone else out
+    folder.mkdir(parents=True, exist_ok=True)
+    return (out, None) if alone else (folder / "report.html", folder)
 
 
 def text(value: object) -> str:
@@ -135,9 +154,9 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], texts: int = 1) -
     return "".join([*lines, "</table></div>"])
 
 
-def embedded(drawing: Drawing, png: bytes) -> str:
+def embedded(drawing: Drawing) -> str:
     """Return a figure with its picture inside the page."""
-    data = base64.b64encode(png).decode("ascii")
+    data = base64.b64encode(drawing.png).decode("ascii")
     return (
         f'<figure id="{text(drawing.name)}"><div class="scroll"><img alt="{text(drawing.title)}" '
         f'src="data:image/png;base64,{data}"></div><figcaption><b>{text(drawing.title)}.</b> '

@@ -16,8 +16,10 @@ from stiction_ros.report.drawing import (
     GREY,
     INK,
     ORANGE,
+    Drawing,
     TimeAxis,
     data_limits,
+    legend,
     panels,
 )
 
@@ -168,12 +170,35 @@ def fitted_start(
 
 def true_response(model: LoopModel, output: int, valve: int, samples: int) -> FloatArray:
     """Return the response, shape (N,), of the true loop, linearised, to a stem step of 1 %."""
-    linear = model.process.linear(model.sample_time)
-    state, y = np.zeros(linear.order), np.zeros(samples)
-    for k in range(samples):
-        y[k] = linear.c[output] @ state
-        state = linear.a @ state + linear.b[:, valve]
-    return y
+    return model.process.linear(model.sample_time).step_responses(samples)[:, output, valve]
+
+
+def draw_curves(record: Record, estimate: FloatArray, true: FloatArray | None = None) -> Drawing:
+    """Return the stems of all valves against OP.
+
+    Args:
+        record: whose OP it is.
+        estimate, true: stems, shape (N, m), %; ``true`` None where it is not known.
+    """
+    figure, axes = panels(1, 4.4, len(record.valves))
+    for j, name in enumerate(record.valves):
+        axis, op = axes[0, j], record.op[:, j]
+        ends = np.array([op.min(), op.max()])
+        axis.plot(ends, ends, color=GREY, linestyle=(0, (5, 3)), label="ideal valve")
+        if true is not None:
+            axis.plot(op, true[:, j], color=ORANGE, linewidth=2.4, alpha=0.85, label="χ, true")
+        axis.plot(op, estimate[:, j], color=BLUE, linewidth=0.8, label="χ̂, estimated")
+        axis.set_title(name)
+        axis.set_xlabel("OP u (%)")
+        axis.set_aspect("equal", adjustable="box")
+        axis.locator_params(nbins=6)
+        legend(axis)
+    axes[0, 0].set_ylabel("stem (%)")
+    caption = (
+        "Stem against OP: a sticky valve rests while OP travels (level lines) and then jumps; "
+        "a healthy one stays on the diagonal."
+    )
+    return Drawing("valve_curves", "Valve curves", caption, figure)
 
 
 def _settling(outputs: Sequence[Mapping[str, Any]], truth: LoopModel | None) -> int:

@@ -9,7 +9,7 @@ import pytest
 from known_answers import moved, perfect
 
 from stiction_ros.examples import Example, compare, example1, healthy_loop, tally
-from stiction_ros.examples.comparison import Against, identified_process, step_responses
+from stiction_ros.examples.comparison import Against, identified_process
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_a_wrong_delay_has_the_larger_square_error(example: Example) -> None:
 
 def test_step_responses_end_at_the_gain(example: Example) -> None:
     model = identified_process(perfect(example))
-    response = step_responses(model, 400)
+    response = model.step_responses(400)
     assert response[:6].max() == 0.0
     assert response[6, 0, 0] == pytest.approx(0.002445)
     assert response[-1] == pytest.approx(model.gain, rel=1e-6)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from stiction_ros import __version__
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
 from stiction_ros.discrepancy.answer.preview import preview
 from stiction_ros.effects import FloatArray
@@ -56,17 +55,16 @@ def report_gap(found: Discrepancy, out: str | Path) -> Path:
             drawings.append(preview_drawing(decides))
         for k, look in enumerate(found.looks):
             drawings += [*_tracks(found, look, k), _rivals(look, k)]
-    drawn = [(drawing, drawing.png()) for drawing in drawings]
-    for drawing, png in drawn:
-        (folder / f"{drawing.name}.png").write_bytes(png)
+    for drawing in drawings:
+        drawing.save(folder)
     target = folder / "report.html"
-    target.write_text(gap_page(found, drawn), encoding="utf-8")
+    target.write_text(gap_page(found, drawings), encoding="utf-8")
     return target
 
 
-def gap_page(found: Discrepancy, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
+def gap_page(found: Discrepancy, drawings: Sequence[Drawing]) -> str:
     """Return the report as HTML."""
-    pictures = {drawing.name: embedded(drawing, png) for drawing, png in drawings}
+    pictures = {drawing.name: embedded(drawing) for drawing in drawings}
     names = ", ".join(record.name for record in found.runs.records)
     headline = _headline(found)
     parts = [
@@ -91,7 +89,7 @@ def gap_page(found: Discrepancy, drawings: Sequence[tuple[Drawing, bytes]]) -> s
     if listed:
         parts.append("<h2>What was not considered</h2>" + _listed(listed))
     parts += [folded("The loop model with what was found", found.model_after.to_yaml())]
-    return page(f"{names}: {headline}", parts, f"stiction_ros {__version__}")
+    return page(f"{names}: {headline}", parts)
 
 
 def _headline(found: Discrepancy) -> str:

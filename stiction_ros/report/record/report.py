@@ -7,15 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from stiction_ros import __version__
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
 from stiction_ros.json_values import finite
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
 from stiction_ros.report.drawing import (
-    BLUE,
-    GREY,
     INK,
     VERMILION,
     Drawing,
@@ -24,11 +21,12 @@ from stiction_ros.report.drawing import (
     panels,
     style,
 )
-from stiction_ros.report.page import Cell, duration, embedded, number, page, table, text
+from stiction_ros.report.page import Cell, duration, embedded, number, page, page_file, table, text
 from stiction_ros.report.record.cycles import Window, draw_plane, draw_window
 from stiction_ros.report.record.sections import lead, stability_table, work_table
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
 from stiction_ros.report.shapes import (
+    draw_curves,
     draw_output,
     draw_responses,
     draw_valve,
@@ -91,22 +89,16 @@ def report_record(
         >>> report_record(record, found, "report.html").name
         'report.html'
     """
-    out = Path(out)
-    alone = out.suffix.lower() == ".html"
-    folder = out.parent if alone else out
-    folder.mkdir(parents=True, exist_ok=True)
-    drawings = [(drawing, drawing.png()) for drawing in draw_record(record, identification, parts)]
-    target = out if alone else folder / "report.html"
+    target, folder = page_file(out)
+    drawings = draw_record(record, identification, parts)
     target.write_text(record_page(record, identification, drawings), encoding="utf-8")
-    if not alone:
-        for drawing, png in drawings:
-            (folder / f"{drawing.name}.png").write_bytes(png)
+    if folder is not None:
+        for drawing in drawings:
+            drawing.save(folder)
     return target
 
 
-def record_page(
-    record: Record, identification: Identification, drawings: Sequence[tuple[Drawing, bytes]]
-) -> str:
+def record_page(record: Record, identification: Identification, drawings: Sequence[Drawing]) -> str:
     """Return the report of a record as HTML."""
     found = finite(identification.to_json())
     headline = verdict_line(found["valves"])
@@ -126,13 +118,13 @@ def record_page(
         lead(identification),
         valve_cards(found["valves"]),
         work_table(record, identification),
-        *[embedded(drawing, png) for drawing, png in drawings],
+        *map(embedded, drawings),
         stability_table(identification),
         evidence_table(identification.valves),
         process_table(found["outputs"], record.sample_time),
         f"<h2>Notes</h2><ul>{listed}</ul>" if notes else "",
     ]
-    return page(f"{record.name}: {headline}", parts, f"stiction_ros {__version__}")
+    return page(f"{record.name}: {headline}", parts)
 
 
 def evidence_table(valves: Sequence[ValveEstimate]) -> str:
@@ -159,7 +151,7 @@ def draw_record(
             _signals(record, identification, joined(parts) if parts else record),
         ]
         if identification.stem.shape == record.op.shape:
-            drawn += [_curves(record, identification)]
+            drawn += [draw_curves(record, identification.stem)]
             if identification.outputs:
                 drawn += [_free_runs(record, identification)]
         if identification.outputs:
@@ -215,28 +207,6 @@ def _stem_within(
             stem[rows[begin:end]] = identification.stem
             return stem
     return None
-
-
-def _curves(record: Record, identification: Identification) -> Drawing:
-    count = len(record.valves)
-    figure, axes = panels(1, 4.4, count)
-    for j, name in enumerate(record.valves):
-        axis = axes[0, j]
-        op, stem = record.op[:, j], identification.stem[:, j]
-        ends = np.array([op.min(), op.max()])
-        axis.plot(ends, ends, color=GREY, linestyle=(0, (5, 3)), label="ideal valve")
-        axis.plot(op, stem, color=BLUE, linewidth=0.8, label="stem χ̂")
-        axis.set_title(name)
-        axis.set_xlabel("OP u (%)")
-        axis.set_aspect("equal", adjustable="box")
-        axis.locator_params(nbins=6)
-        legend(axis)
-    axes[0, 0].set_ylabel("stem χ̂ (%)")
-    caption = (
-        "Estimated stem against OP: a sticky valve rests while OP travels (level lines) and then "
-        "jumps; a healthy one stays on the diagonal."
-    )
-    return Drawing("valve_curves", "Valve curves", caption, figure)
 
 
 def _free_runs(record: Record, identification: Identification) -> Drawing:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros import __version__
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.json_values import finite
 from stiction_ros.opcua.plant.journal import transfer_steps
@@ -176,9 +175,8 @@ def report_opcua(
     }
     summary["story"] = _story(summary, found)
     drawing = draw_bridged(run, transfers)
-    png = drawing.png()
-    (out / f"{drawing.name}.png").write_bytes(png)
-    (out / "report.html").write_text(_page(summary, drawing, png), encoding="utf-8")
+    drawing.save(out)
+    (out / "report.html").write_text(_page(summary, drawing), encoding="utf-8")
     told = dict(finite(summary))
     write_json(told, out / "summary.json")
     return told
@@ -276,7 +274,7 @@ def draw_bridged(run: BridgedRun, transfers: Sequence[Transfer]) -> Drawing:
     return Drawing("control", "Who had the valves", caption, figure)
 
 
-def _page(summary: Mapping[str, Any], drawing: Drawing, png: bytes) -> str:
+def _page(summary: Mapping[str, Any], drawing: Drawing) -> str:
     good = summary["status"] == "ok"
     parts = [
         "<h1>A loop bridged by OPC UA</h1>",
@@ -297,7 +295,7 @@ def _page(summary: Mapping[str, Any], drawing: Drawing, png: bytes) -> str:
         parts.append(
             card(smooth, f"to the {one['to']}", f"{one['step']:.2f} % step of OP", one["reason"])
         )
-    parts += ["</div>", embedded(drawing, png), "<h2>The loop</h2>"]
+    parts += ["</div>", embedded(drawing), "<h2>The loop</h2>"]
     rows = [
         (name, key, *(number(summary["phases"][p][name][key]) for p in ("before", "after")))
         for name in summary["phases"].get("before", {})
@@ -312,4 +310,4 @@ def _page(summary: Mapping[str, Any], drawing: Drawing, png: bytes) -> str:
     parts.append("<h2>The handshake</h2>")
     told = [(duration(one["time"]), one["state"], one["reason"]) for one in summary["grants"]]
     parts.append(table(("time", "grant", "reason"), told, 3))
-    return page("A loop bridged by OPC UA", parts, f"stiction_ros {__version__}")
+    return page("A loop bridged by OPC UA", parts)

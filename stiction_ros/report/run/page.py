@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stiction_ros import __version__
 from stiction_ros.records.run.log import ModeChange
 from stiction_ros.report.drawing import Drawing
 from stiction_ros.report.page import (
@@ -41,12 +40,12 @@ _SCORES = (
 )
 
 
-def run_page(story: Story, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
+def run_page(story: Story, drawings: Sequence[Drawing]) -> str:
     """Return the report of a run as HTML.
 
     Args:
         story: of the run.
-        drawings: every figure with its PNG.
+        drawings: every figure.
     """
     record = story.record
     kicker = (
@@ -63,7 +62,7 @@ def run_page(story: Story, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
         valve_cards(story.identified.get("valves", []), story),
         _gain(story),
         _work(story),
-        *[embedded(drawing, png) for drawing, png in drawings],
+        *map(embedded, drawings),
         _fits(story),
         monitor_section(story.log),
         process_table(story.identified.get("outputs", []), record.sample_time),
@@ -71,7 +70,7 @@ def run_page(story: Story, drawings: Sequence[tuple[Drawing, bytes]]) -> str:
         _configuration(story),
         _notes(story),
     ]
-    return page(f"{story.name}: {headline(story)}", parts, f"stiction_ros {__version__}")
+    return page(f"{story.name}: {headline(story)}", parts)
 
 
 def headline(story: Story) -> str:

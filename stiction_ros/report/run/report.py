@@ -8,6 +8,7 @@ from typing import Any
 
 from stiction_ros.online.session import Scenario
 from stiction_ros.records.run.log import read_run
+from stiction_ros.report.page import page_file
 from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.page import run_page
 from stiction_ros.report.run.story import Story, tell
@@ -63,19 +64,13 @@ def write_run(
     story: Story, out: str | Path, seconds: float | None = None, load: float | None = None
 ) -> RunReport:
     """Write what :func:`report_run` writes of a run that has been scored."""
-    out = Path(out)
-    alone = out.suffix.lower() == ".html"
-    folder = out.parent if alone else out
-    folder.mkdir(parents=True, exist_ok=True)
-    drawings = [(drawing, drawing.png()) for drawing in draw_run(story)]
-    target = out if alone else folder / "report.html"
+    target, folder = page_file(out)
+    drawings = draw_run(story)
     target.write_text(run_page(story, drawings), encoding="utf-8")
     figures = summary(story, seconds, load)
     files = [target]
-    if not alone:
+    if folder is not None:
         write_json(figures, folder / "summary.json")
         files.append(folder / "summary.json")
-        for drawing, png in drawings:
-            files.append(folder / f"{drawing.name}.png")
-            files[-1].write_bytes(png)
+        files += [drawing.save(folder) for drawing in drawings]
     return RunReport(story, figures, target, tuple(files))

@@ -11,7 +11,6 @@ from typing import Any
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from stiction_ros import __version__
 from stiction_ros.control.problem.paper_weights import ProgrammeCost
 from stiction_ros.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
 from stiction_ros.report.drawing import (
@@ -116,8 +115,7 @@ def report_study(studies: Sequence[PlantStudy], directory: Path) -> Path:
     ]
     for study in studies:
         drawing = draw_study(study)
-        png = drawing.png()
-        (directory / f"{drawing.name}.png").write_bytes(png)
+        drawing.save(directory)
         (directory / f"{drawing.name}.svg").write_bytes(svg(drawing))
         title = PLANT_TITLES[study.options.plant]
         rows: list[list[Cell]] = [list(row) for row in rows_of(study)]
@@ -125,11 +123,11 @@ def report_study(studies: Sequence[PlantStudy], directory: Path) -> Path:
             f"<h2>{text(title[0].upper() + title[1:])}</h2>",
             table(HEAD, rows, texts=2),
             f"<p>{text(_choices(study))}</p>",
-            embedded(drawing, png),
+            embedded(drawing),
         ]
     parts.append(f'<p class="note">{text(_NOTE)}</p>')
     target = directory / "compare.html"
-    page_text = page("Example 2: controllers compared", parts, f"stiction_ros {__version__}")
+    page_text = page("Example 2: controllers compared", parts)
     target.write_text(page_text, encoding="utf-8")
     return target
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros import __version__
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.examples.comparison import Against, Comparison, ValveComparison
 from stiction_ros.examples.example import Example
@@ -19,9 +18,7 @@ from stiction_ros.loop.set_points import set_point_moves
 from stiction_ros.processes import StirredTank
 from stiction_ros.report.drawing import (
     BLUE,
-    GREY,
     INK,
-    ORANGE,
     SKY,
     VERMILION,
     Drawing,
@@ -35,7 +32,13 @@ from stiction_ros.report.page import Cell, card, duration, embedded, number, pag
 from stiction_ros.report.record.report import evidence_table
 from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
 from stiction_ros.report.run.story import TANK_UNITS
-from stiction_ros.report.shapes import draw_responses, draw_valve, fitted_start, free_run
+from stiction_ros.report.shapes import (
+    draw_curves,
+    draw_responses,
+    draw_valve,
+    fitted_start,
+    free_run,
+)
 
 TITLES = {"example1": "Example 1", "example2": "Example 2", "healthy": "Without friction"}
 VARIANTS = {
@@ -60,7 +63,6 @@ def report_example(
         comparison: of the two.
         target: the ``.html`` file; its folder is there.
     """
-    drawings = [(drawing, drawing.png()) for drawing in draw_example(example, found)]
     values = finite(found.to_json())
     headline = f"{TITLES[example.name]}: {verdict_line(values['valves'])}"
     record = example.record
@@ -74,11 +76,11 @@ def report_example(
         f'<div class="cards">{"".join(map(_card, comparison.valves))}</div>',
         comparison_table(comparison),
         _errors(comparison),
-        *[embedded(drawing, png) for drawing, png in drawings],
+        *map(embedded, draw_example(example, found)),
         evidence_table(found.valves),
         process_table(values["outputs"], record.sample_time),
     ]
-    target.write_text(page(headline, parts, f"stiction_ros {__version__}"), encoding="utf-8")
+    target.write_text(page(headline, parts), encoding="utf-8")
     return target
 
 
@@ -128,7 +130,7 @@ def draw_example(example: Example, found: Identification) -> tuple[Drawing, ...]
                 "The same signals over all samples.",
                 _trends(example, found, slice(0, len(record))),
             ),
-            _curves(example, found),
+            draw_curves(record, found.stem, record.stem),
         ]
     return tuple(drawn)
 
@@ -192,29 +194,6 @@ def _draw_estimates(
     data_limits(axis, [measured[part], run])
     axis.set_title(output.name)
     axis.set_ylabel(f"{output.name} ({_units(example).get(output.name, 'PV units')})")
-
-
-def _curves(example: Example, found: Identification) -> Drawing:
-    record = example.record
-    assert record.stem is not None
-    figure, axes = panels(1, 4.4, len(record.valves))
-    for j, name in enumerate(record.valves):
-        axis, op = axes[0, j], record.op[:, j]
-        ends = np.array([op.min(), op.max()])
-        axis.plot(ends, ends, color=GREY, linestyle=(0, (5, 3)), label="ideal valve")
-        axis.plot(op, record.stem[:, j], color=ORANGE, linewidth=2.4, alpha=0.85, label="χ, true")
-        axis.plot(op, found.stem[:, j], color=BLUE, linewidth=0.8, label="χ̂, estimated")
-        axis.set_title(name)
-        axis.set_xlabel("OP u (%)")
-        axis.set_aspect("equal", adjustable="box")
-        axis.locator_params(nbins=6)
-        legend(axis)
-    axes[0, 0].set_ylabel("stem (%)")
-    caption = (
-        "Stem against OP: a sticky valve rests while OP travels (level lines) and then jumps; "
-        "a healthy one stays on the diagonal."
-    )
-    return Drawing("valve_curves", "Valve curves", caption, figure)
 
 
 def _card(valve: ValveComparison) -> str:

@@ -243,7 +243,7 @@ def grow_samples(plan: Plan, lengths: Sequence[int], begin: Callable[[str], Prog
             note += f"; N = {', '.join(map(str, left))} left out"
         names = (EXACT, f"N = {lengths[0]}, scaled")
         case = f"N = {count}, delay {low} to {high}"
-        rows.append(row(case, names, exact.times, [base * count / lengths[0]], note))
+        rows.append(row(case, names, exact.times, [base * (count / lengths[0])], note))
     return rows
 
 
