@@ -26,13 +26,11 @@ from stiction_ros.identification.problem.equation_error import (
     EquationError,
     fit_outputs,
 )
-from stiction_ros.identification.result.identification import FitStatus, Identification
-from stiction_ros.identification.result.search_log import SearchLog
+from stiction_ros.identification.result.identification import Identification
 from stiction_ros.paper.one_step_result import (
     Answer,
     check_record,
     delay_choices,
-    evaluated,
     friction_limits,
     result,
 )
@@ -101,23 +99,11 @@ def identify(
     orders = check_record(record, options)
     best = search(record, options, orders, progress or (lambda share: None))
     stable = all(fit.largest_root < 1.0 for fit in best.found.fits)
+    reason = "" if stable else "the process at the best point is unstable"
     answer = Answer(
-        FitStatus.OK if stable else FitStatus.NO_MODEL,
-        "" if stable else "the process at the best point is unstable",
-        best.friction,
-        best.found.fits,
-        best.found.stems,
+        reason, best.friction, best.delays, best.found.squared_error, best.points, best.found
     )
-    log = SearchLog(
-        squared_error=evaluated(record, options, best.friction, best.delays).squared_error,
-        objective=best.found.squared_error,
-        output_order=orders.output,
-        input_order=orders.input,
-        first=orders.first,
-        points=best.points,
-        delays_tried=len(delay_choices(record, options, MAX_CHOICES)),
-    )
-    return result(record, options, answer, log, time.perf_counter() - begun)
+    return result(record, options, answer, time.perf_counter() - begun)
 
 
 def search(

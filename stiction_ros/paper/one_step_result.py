@@ -30,7 +30,7 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.result.search_log import SearchLog
+from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
 from stiction_ros.paper.options import PaperOptions
 from stiction_ros.paper.smoothed.laws import smooth_law
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
@@ -49,17 +49,22 @@ class Answer:
     """Where a method ended.
 
     Attributes:
-        status, reason: ok, or why the answer is not to be trusted.
+        reason: why the answer is not to be trusted; empty when it is.
         friction: rows (f_S, f_D), shape (m, 2), %.
-        fits: the ARX model of every output.
-        stems: stem positions that go with them, shape (m, N), %.
+        delays: t_d per output and valve, samples.
+        objective: (12a) as the method has it; None for that of the hard law.
+        points: frictions at which it was evaluated.
+        found: models and stems that go with it; None for those of the hard law.
+        starts: every run of a solver.
     """
 
-    status: FitStatus
     reason: str
     friction: FloatArray
-    fits: tuple[ArxFit, ...]
-    stems: FloatArray
+    delays: Delays
+    objective: float | None
+    points: int
+    found: EquationError | None = None
+    starts: tuple[SolvedStart, ...] = ()
 
 
 def check_record(record: Record, options: PaperOptions) -> ArxOrders:
@@ -147,20 +152,15 @@ def delay_choices(record: Record, options: PaperOptions, most: int) -> list[Dela
     ]
 
 
-def result(
-    record: Record,
-    options: PaperOptions,
-    answer: Answer,
-    log: SearchLog,
-    seconds: float,
-) -> Identification:
+def result(record: Record, options: PaperOptions, answer: Answer, seconds: float) -> Identification:
     """Return the result of a one-step method in the form of all methods."""
-    limits = friction_limits(record, options)
-    stem = answer.stems.T.copy()
+    limits, orders = friction_limits(record, options), orders_of(record, options)
+    hard = evaluated(record, options, np.maximum(answer.friction, 0.0), answer.delays)
+    found = answer.found or hard
+    stem = found.stems.T.copy()
     stem.flags.writeable = False
     outputs = tuple(
-        output_model(record, i, fit, answer.stems, orders_of(record, options))
-        for i, fit in enumerate(answer.fits)
+        output_model(record, i, fit, found.stems, orders) for i, fit in enumerate(found.fits)
     )
     notes = [*record.notes, NO_EVIDENCE]
     if options.friction_limit is None:
@@ -168,6 +168,16 @@ def result(
     if options.output_order is None:
         notes.append(f"orders were not given: n_a = {DEFAULT_ORDER} was taken")
     low, high = options.delay
+    log = SearchLog(
+        squared_error=hard.squared_error,
+        objective=hard.squared_error if answer.objective is None else answer.objective,
+        output_order=orders.output,
+        input_order=orders.input,
+        first=orders.first,
+        points=answer.points,
+        delays_tried=(high - low + 1) ** (len(record.valves) * len(record.outputs)),
+        starts=answer.starts,
+    )
     notes += [
         f"delay of {valve} to {output.name} is the longest tried, try a wider range"
         for output in outputs
@@ -175,7 +185,7 @@ def result(
         if delay == high > low
     ]
     return Identification(
-        status=answer.status,
+        status=FitStatus.NO_MODEL if answer.reason else FitStatus.OK,
         reason=answer.reason,
         method=options.method,
         samples=len(record),
@@ -183,7 +193,7 @@ def result(
         seconds=seconds,
         valves=tuple(
             valve_estimate(
-                record, j, answer.friction[j], answer.stems[j], float(limits[j]), options.law
+                record, j, answer.friction[j], found.stems[j], float(limits[j]), options.law
             )
             for j in range(len(record.valves))
         ),

@@ -7,23 +7,20 @@ import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import yaml
 
-from stiction_ros.cli.runs.node_processes import ros_environment
 from stiction_ros.cli.runs.scenarios import find, node_parameters
 from stiction_ros.config_files import find_config
 from stiction_ros.faults.bridge.relay import Relay
+from stiction_ros.faults.loop.faulted import LOOK, FaultedLoop
 from stiction_ros.faults.loop.node_process import NodeProcess
 from stiction_ros.loop import LoopModel
 from stiction_ros.opcua.plant.control_system import AUTO, REMOTE
 from stiction_ros.opcua.plant.journal import Allowed, Written, written
 from stiction_ros.opcua.plant.process import PlantOptions, PlantProcess
-
-if TYPE_CHECKING:
-    from stiction_ros.nodes.probes.fault_probe import Probe
 
 SPEED = 600.0  # ten samples a second
 WATCHDOG = 5.0  # s
@@ -41,7 +38,6 @@ STARTED = ("recorder", "controller", "opcua")
 ENDED = ("opcua", "controller", "recorder")
 HEARD = ("pv", "op", "op_applied")
 SCANS = 3  # of the plant under its own controllers, before control is asked for again
-LOOK = 0.01  # s between two looks at what has come
 START = 90.0  # s until the first samples
 SOON = 20.0  # s for what must happen
 STATUS = "opcua: loop tank"
@@ -57,33 +53,28 @@ class NotSeenError(Exception):
     """What a case waits for did not come; it ends there."""
 
 
-class BridgedLoop:
+class BridgedLoop(FaultedLoop):
     """The loop of one case, as the functions of the catalogue see it."""
 
     def __init__(self, directory: Path, seed: int) -> None:
         """Make certificates, accounts and parameters, and join the domain."""
         from stiction_ros.nodes.probes.fault_probe import Probe
 
-        self.directory = directory
-        self.remarks: list[str] = []
-        self.begun = 0.0
+        super().__init__(directory)
         self.limited = 0
-        self.bag = directory / "bag"
         schedule = directory / "moves.set_points.yaml"
         schedule.write_text(yaml.safe_dump(SET_POINTS), encoding="utf-8")
         options = PlantOptions(SPEED, WATCHDOG, RATE, LIMITS, seed, set_points=str(schedule))
         self.plant = PlantProcess(directory / "plant", options)
         self.period = self.plant.model.sample_time / SPEED
         self.relay = Relay(self.plant.port)
-        self.environment = ros_environment()
         self._own = directory / "bridge"  # what the bridge is given, so that it can be changed
         self._own.mkdir()
         self.nodes = {
             name: NodeProcess(name, values, directory, self.environment)
             for name, values in self._parameters().items()
         }
-        self._beside: list[NodeProcess] = []
-        self.probe: Probe = Probe(self.environment, topics=HEARD)
+        self.probe = Probe(self.environment, topics=HEARD)
 
     def _parameters(self) -> dict[str, dict[str, Any]]:
         nodes = node_parameters(find("tank"), self.directory)
@@ -122,11 +113,7 @@ class BridgedLoop:
 
     def stop(self) -> None:
         """End everything."""
-        for process in self._beside:
-            process.end()
-        for name in ENDED:
-            if self.nodes[name].code is None and not self.nodes[name].end():
-                self.remark(f"{name} did not end when it was asked to")
+        self.end_nodes(ENDED)
         self.plant.stop()
         self.relay.close()
         self.probe.close()
@@ -134,10 +121,6 @@ class BridgedLoop:
     def kill(self, name: str) -> None:
         """Kill a node."""
         self.nodes[name].kill()
-
-    def restart(self, name: str) -> None:
-        """Start a node again that was killed."""
-        self.nodes[name].start()
 
     def second_bridge(self) -> None:
         """Start another bridge for the same tags, in a namespace of its own; it asks at once."""
@@ -257,19 +240,6 @@ class BridgedLoop:
 
     # ---- time ------------------------------------------------------------------------------
 
-    def begins(self) -> None:
-        """Say that the fault begins now, and not when it was prepared."""
-        self.begun = time.monotonic()
-
-    def wait_until(self, condition: Callable[[], object], seconds: float) -> bool:
-        """Wait for ``condition``, at most ``seconds``; return whether it came true."""
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() > end:
-                return False
-            time.sleep(LOOK)
-        return True
-
     def wait_samples(self, count: int) -> None:
         """Wait until ``count`` more samples have come."""
         heard = self.probe.heard["pv"]
@@ -279,7 +249,3 @@ class BridgedLoop:
     def _must(self, condition: Callable[[], object], what: str, seconds: float = SOON) -> None:
         if not self.wait_until(condition, seconds):
             raise NotSeenError(f"{what} not seen within {seconds:g} s")
-
-    def remark(self, text: str) -> None:
-        """Note something that is wrong: the case fails."""
-        self.remarks.append(text)

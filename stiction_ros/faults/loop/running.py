@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from stiction_ros.cli.runs.node_processes import ros_environment
 from stiction_ros.faults.fault import Fault, Pace, Phase
 from stiction_ros.faults.judgement.observation import Known, Sampled
+from stiction_ros.faults.loop.faulted import FaultedLoop
 from stiction_ros.faults.loop.node_process import NodeProcess
 from stiction_ros.faults.loop.setting_up import NAMES, case_parameters, plant_model
 from stiction_ros.loop import LoopModel
 
-if TYPE_CHECKING:
-    from stiction_ros.nodes.probes.fault_probe import Probe
-
 STARTED = ("recorder", "estimator", "controller", "plant")
 ENDED = ("plant", "controller", "estimator", "recorder")  # who still has readers goes first
 TALKER = {"pv": "plant", "sp": "plant", "op": "controller", "op_applied": "plant"}
-LOOK = 0.02  # s between two looks at what has come
 
 
-class RunningLoop:
+class RunningLoop(FaultedLoop):
     """The loop of one case, as the functions of the catalogue see it."""
 
     def __init__(
@@ -32,24 +28,20 @@ class RunningLoop:
         """Prepare parameters and join the domain; :meth:`start` starts the nodes."""
         from stiction_ros.nodes.probes.fault_probe import Probe
 
-        self.pace, self.phase, self.directory = pace, phase, directory
+        super().__init__(directory)
+        self.pace, self.phase = pace, phase
         self.model: LoopModel = plant_model()
         self.step = round(self.model.sample_time * 1e9)
         self.period = self.model.sample_time / speed if pace is Pace.REALTIME else 0.0
-        self.remarks: list[str] = []
-        self.begun = 0.0
-        self.bag = directory / "bag"
-        self._environment = ros_environment()
         self._parameters = case_parameters(fault, pace, seed, speed, self.bag)
         remaps: dict[str, list[str]] = {name: [] for name in NAMES}
         for topic in fault.relayed:
             remaps[TALKER[topic]] += ["-r", f"{topic}:={topic}_direct"]
         self.nodes = {
-            name: NodeProcess(name, values, directory, self._environment, remaps[name])
+            name: NodeProcess(name, values, directory, self.environment, remaps[name])
             for name, values in self._parameters.items()
         }
-        self._extra: list[NodeProcess] = []
-        self.probe: Probe = Probe(self._environment)
+        self.probe = Probe(self.environment)
         for topic in fault.relayed:
             self.probe.relay(topic)
 
@@ -62,21 +54,8 @@ class RunningLoop:
 
     def stop(self) -> None:
         """End every node and leave the domain."""
-        for process in self._extra:
-            process.end()
-        for name in ENDED:
-            node = self.nodes[name]
-            if node.code is None and not node.end():
-                self.remark(f"{name} did not end when it was asked to")
+        self.end_nodes(ENDED)
         self.probe.close()
-
-    def begins(self, earlier: float = 0.0) -> None:
-        """Say that the fault begins now, and not when it was prepared.
-
-        Args:
-            earlier: s by which the nodes may have seen it before the suite did.
-        """
-        self.begun = time.monotonic() - earlier
 
     def beside(self, kind: str, name: str, parameters: Mapping[str, Any] | None = None) -> None:
         """Start one more node of ``kind`` that nobody has asked for."""
@@ -84,37 +63,18 @@ class RunningLoop:
         extra = NodeProcess(
             kind,
             values,
-            self._folder(f"beside_{len(self._extra)}"),
-            self._environment,
+            self._folder(f"beside_{len(self._beside)}"),
+            self.environment,
             name="" if name == kind else name,
         )
         extra.start()
-        self._extra.append(extra)
-
-    def end_beside(self) -> None:
-        """End what :meth:`beside` has started."""
-        for process in self._extra:
-            process.end()
-        self._extra.clear()
-
-    def restart(self, name: str) -> None:
-        """Start a node again that was killed."""
-        self.nodes[name].start()
+        self._beside.append(extra)
 
     # ---- time ------------------------------------------------------------------------------
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of wall time pass."""
         time.sleep(seconds)
-
-    def wait_until(self, condition: Callable[[], object], seconds: float) -> bool:
-        """Wait for ``condition``, at most ``seconds``; return whether it came true."""
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() > end:
-                return False
-            time.sleep(LOOK)
-        return True
 
     def wait_samples(self, count: int, seconds: float = 20.0) -> bool:
         """Wait until ``count`` more measurements have come."""
@@ -187,10 +147,6 @@ class RunningLoop:
     def offer_text(self, text: str) -> None:
         """Publish any text as a loop model."""
         self.probe.text("loop_model", text)
-
-    def remark(self, text: str) -> None:
-        """Note something that is wrong: the case fails."""
-        self.remarks.append(text)
 
     def _folder(self, name: str) -> Path:
         folder = self.directory / name

@@ -23,8 +23,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.problem.equation_error import Delays
-from stiction_ros.identification.result.identification import FitStatus, Identification
-from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
+from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.result.search_log import SolvedStart
 from stiction_ros.paper.one_step_result import (
     Answer,
     check_record,
@@ -41,6 +41,7 @@ from stiction_ros.paper.programme.starts import Start, StartKind, around, candid
 from stiction_ros.records import Record
 
 MAX_CHOICES = 500
+NO_END = "no start ended feasible with a stable process"
 POINTS = 2000  # inside the widest triangle, to choose starts from
 OPENING = 3  # the first runs are a third of all
 WIDTH = 0.05  # of f_max: first difference quotients from a start
@@ -91,28 +92,15 @@ def identify(
     options = options or PaperOptions()
     search = _Search(record, options, progress or (lambda share: None))
     best = search.run()
-    accepted = best is not None and best.accepted
-    friction = best.solution.friction if best else np.zeros((len(record.valves), 2))
-    delays = best.delays if best else search.choices[0]
-    found = evaluated(record, options, friction, delays)
     answer = Answer(
-        FitStatus.OK if accepted else FitStatus.NO_MODEL,
-        "" if accepted else "no start ended feasible with a stable process",
-        friction,
-        found.fits,
-        found.stems,
-    )
-    log = SearchLog(
-        squared_error=found.squared_error,
-        objective=best.solution.objective if best else found.squared_error,
-        output_order=search.table.orders.output,
-        input_order=search.table.orders.input,
-        first=search.table.orders.first,
-        points=sum(one.criterion.evaluations for one in search.programmes.values()),
-        delays_tried=len(search.choices),
+        "" if best else NO_END,
+        best.solution.friction if best else np.zeros((len(record.valves), 2)),
+        best.delays if best else search.choices[0],
+        best.solution.objective if best else None,
+        sum(one.criterion.evaluations for one in search.programmes.values()),
         starts=tuple(search.log),
     )
-    return result(record, options, answer, log, time.perf_counter() - begun)
+    return result(record, options, answer, time.perf_counter() - begun)
 
 
 class _Search:

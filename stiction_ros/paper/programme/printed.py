@@ -13,20 +13,19 @@ from collections.abc import Callable
 import numpy as np
 
 from stiction_ros.identification.problem.equation_error import Delays
-from stiction_ros.identification.result.identification import FitStatus, Identification
-from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
+from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.result.search_log import SolvedStart
 from stiction_ros.paper.one_step_result import (
     Answer,
     check_record,
     delay_choices,
-    evaluated,
     friction_limits,
     result,
 )
 from stiction_ros.paper.options import PaperOptions
 from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
-from stiction_ros.paper.programme.nlp import MAX_CHOICES, pairs
+from stiction_ros.paper.programme.nlp import MAX_CHOICES, NO_END, pairs
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.starts import draw_starts
 from stiction_ros.paper.smoothed.stems import final_smoothing
@@ -73,22 +72,6 @@ def identify(
     accepted = [one for one in ends if one[1].accepted]
     delays, best = min(accepted or ends, key=lambda one: one[1].objective)
     friction = best.friction if accepted else np.zeros((len(limits), 2))
-    found = evaluated(record, options, np.maximum(friction, 0.0), delays)
-    answer = Answer(
-        FitStatus.OK if accepted else FitStatus.NO_MODEL,
-        "" if accepted else "no start ended feasible with a stable process",
-        friction,
-        found.fits,
-        found.stems,
-    )
-    search = SearchLog(
-        squared_error=found.squared_error,
-        objective=best.objective,
-        output_order=orders.output,
-        input_order=orders.input,
-        first=orders.first,
-        points=len(ends),
-        delays_tried=len(choices),
-        starts=tuple(log),
-    )
-    return result(record, options, answer, search, time.perf_counter() - begun)
+    reason = "" if accepted else NO_END
+    answer = Answer(reason, friction, delays, best.objective, len(ends), starts=tuple(log))
+    return result(record, options, answer, time.perf_counter() - begun)
