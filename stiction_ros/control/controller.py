@@ -99,11 +99,6 @@ class MpcController:
         """Half-widths of the intervals of the frictions, per valve, None where unknown."""
         return self.valves.spreads
 
-    @property
-    def stem_interval(self) -> FloatArray:
-        """Lowest and highest stem position that the past OP allows, shape (m, 2), %."""
-        return self.valves.intervals(self.stem)
-
     def start(self, op: FloatArray, pv: FloatArray) -> None:
         """Start from rest at the applied ``op`` (m,) and the outputs ``pv`` (p,).
 

@@ -334,21 +334,3 @@ class DrivenByNoise(Protocol):
     ) -> tuple[Memory, float]:
         """Advance one sample with ``normal`` drawn from N(0, 1)."""
         ...
-
-
-@runtime_checkable
-class Invertible(Protocol):
-    """A behaviour whose input can be chosen so that its output takes a wanted value."""
-
-    def inverse(self, memory: Memory, wanted: float) -> float:
-        """Return the input that brings the output as near to ``wanted`` as it can be."""
-        ...
-
-
-@runtime_checkable
-class Symbolic(Protocol):
-    """A behaviour with a differentiable CasADi expression of its step."""
-
-    def expression(self, memory: Any, value: Any) -> Any:
-        """Return the next output as a CasADi expression."""
-        ...

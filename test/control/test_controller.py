@@ -334,5 +334,7 @@ def test_an_unknown_start_is_found_by_the_first_far_jump() -> None:
     loop = Loop(model, controller, FRICTION)
     loop.stem = np.array([44.0])
     loop.run(2, np.array([25.0]))
-    assert np.diff(controller.stem_interval[0])[0] == pytest.approx(0.0, abs=1e-9)
+    assert np.diff(controller.valves.intervals(controller.stem)[0])[0] == pytest.approx(
+        0.0, abs=1e-9
+    )
     assert controller.stem == pytest.approx(loop.stem, abs=1e-9)

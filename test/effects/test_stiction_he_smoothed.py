@@ -10,7 +10,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import HeStiction, SmoothedHeStiction
-from stiction_ros.effects.behaviour import Symbolic
 
 percent = st.floats(-100.0, 100.0)
 frictions = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 1.0)).map(lambda p: (p[0], p[0] * p[1]))
@@ -63,8 +62,3 @@ def test_at_the_default_tau_the_signature_is_that_of_he() -> None:
     op = 50.0 + 12.0 * np.sin(np.arange(400) / 17.0)
     smooth = SmoothedHeStiction(5.0, 2.0).simulate(op)
     assert np.abs(smooth - HeStiction(5.0, 2.0).simulate(op)).max() < 1e-9
-
-
-def test_it_is_symbolic_and_he_is_not() -> None:
-    assert isinstance(SmoothedHeStiction(5.0, 2.0), Symbolic)
-    assert not isinstance(HeStiction(5.0, 2.0), Symbolic)

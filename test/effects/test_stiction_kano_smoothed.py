@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import KanoStiction, SmoothedHeStiction, SmoothedKanoStiction
-from stiction_ros.effects.behaviour import SimulatesGrid, Symbolic
+from stiction_ros.effects.behaviour import SimulatesGrid
 
 percent = st.floats(-100.0, 100.0)
 bands = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
@@ -134,7 +134,5 @@ def test_a_grid_simulates_as_each_of_its_points(
     assert first == pytest.approx(np.array(single), abs=1e-9)
 
 
-def test_it_is_symbolic_and_kano_is_not() -> None:
-    assert isinstance(SmoothedKanoStiction(6.0, 2.0), Symbolic)
+def test_it_offers_a_grid() -> None:
     assert isinstance(SmoothedKanoStiction(6.0, 2.0), SimulatesGrid)
-    assert not isinstance(KanoStiction(6.0, 2.0), Symbolic)

@@ -86,20 +86,3 @@ class HeStiction(FrictionPair):
         static, dynamic = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
         starts = np.broadcast_to(np.asarray(start, dtype=float), static.shape)
         return he_stems(static, dynamic, np.asarray(values, dtype=float), starts.copy())
-
-    def inverse(self, memory: Memory, wanted: float) -> float:
-        """Return the OP that moves the stem to ``wanted`` if the valve can go there.
-
-        The stem moves by at least J, so for 0 < |wanted − χ| < J the nearer of staying
-        and the smallest jump is taken; staying returns the stem position itself.
-
-        Args:
-            memory: stem position χ, %.
-            wanted: where the stem should be, %.
-        """
-        assert isinstance(memory, float | int)
-        move = wanted - memory
-        if abs(move) < max(self.jump / 2.0, 1e-12):
-            return float(memory)
-        size = max(abs(move), self.jump * (1.0 + 1e-9) + 1e-9)
-        return float(memory + np.copysign(size + self.dynamic_friction, move))

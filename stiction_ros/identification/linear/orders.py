@@ -119,11 +119,6 @@ class OrderChoice:
     criterion: OrderCriterion
     judged: JudgedError
 
-    @property
-    def best_one_step(self) -> OrderRow:
-        """The rival with the lowest one-step criterion, for comparison."""
-        return min(self.rows, key=lambda row: row.aic if self.criterion == "aic" else row.bic)
-
     def best_of_each_order(self) -> list[OrderRow]:
         """Return for each (n_a, n_b, n_c) the row with the delays that do best."""
         best: dict[ArmaxOrders, OrderRow] = {}

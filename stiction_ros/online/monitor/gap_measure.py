@@ -24,7 +24,6 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 
 BATCHES = 24  # of the baseline, whose spread tells how much its mean square can be trusted
-SHORTEST = 60  # rows that an output needs
 CLEARED = 0.05  # a healthy window exceeds the limit of the way back this often
 
 
