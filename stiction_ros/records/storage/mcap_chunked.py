@@ -1,4 +1,8 @@
-"""Writes a finished MCAP file: chunked, compressed, indexed, with every checksum."""
+"""Writes a finished MCAP file: chunked, compressed, indexed, with every checksum.
+
+``mcap.writer.Writer`` does the same with an object for each message, which takes 2 to 5 times as
+long, and a recorder finishes its bag while others still control.
+"""
 
 from __future__ import annotations
 
