@@ -235,7 +235,7 @@ class EmbeddingMpc(Formulation):
         problem = self._problems[i]
         stem = solution.plan + target.stem
         cost += self.cost.constant(state - target.state, last - target.stem, target.path)
-        pv = predicted_outputs(self.cost, state, target, solution.plan)
+        pv = predicted_outputs(self.cost, state, target, solution)
         op = self.op_of(last, stem[0])
         return Plan(op, stem, pv, solution.slack, problem.jumps, converged, cost)
 

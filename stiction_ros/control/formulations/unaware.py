@@ -10,7 +10,7 @@ from stiction_ros.control.problem.horizon import (
     HorizonLimits,
     HorizonWeights,
 )
-from stiction_ros.control.problem.horizon_qp import HorizonQp
+from stiction_ros.control.problem.horizon_qp import HorizonQp, HorizonSolution
 from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.effects.behaviour import FloatArray
@@ -58,7 +58,7 @@ class UnawareMpc(Formulation):
         if solution is not None:
             constant = self.cost.constant(state - target.state, deviation, target.path)
             cost = solution.cost + constant
-            return self._plan(state, target, solution.plan, solution.slack, cost)
+            return self._plan(state, target, solution, cost)
         if self._qp.limit_reached:
             return self._cut_plan(state, target, last)
         return None
@@ -67,16 +67,15 @@ class UnawareMpc(Formulation):
         self,
         state: FloatArray,
         target: Target,
-        moved: FloatArray,
-        slack: FloatArray,
+        found: HorizonSolution,
         cost: float,
         converged: bool = True,
     ) -> Plan:
-        stem = moved + target.stem
+        stem = found.plan + target.stem
         low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
         op = np.minimum(np.maximum(stem[0], low), high)
-        pv = predicted_outputs(self.cost, state, target, moved)
-        return Plan(op, stem, pv, slack, converged=converged, cost=cost)
+        pv = predicted_outputs(self.cost, state, target, found)
+        return Plan(op, stem, pv, found.slack, converged=converged, cost=cost)
 
     def _cost(
         self,
@@ -108,7 +107,8 @@ class UnawareMpc(Formulation):
         for v in (cut, stay):
             slack = self._qp.slack(state - target.state, v, target.pv)
             cost = self._cost(state, target, last, v, slack)
-            both.append(self._plan(state, target, v, slack, cost, converged=False))
+            found = HorizonSolution(v, cost, slack, v.reshape(-1))
+            both.append(self._plan(state, target, found, cost, converged=False))
         if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
             return None
         return both[0]
@@ -125,11 +125,14 @@ class UnawareMpc(Formulation):
 
 
 def predicted_outputs(
-    cost: HorizonCost, state: FloatArray, target: Target, plan: FloatArray
+    cost: HorizonCost, state: FloatArray, target: Target, found: HorizonSolution
 ) -> FloatArray:
-    """Return outputs at samples 0 … N, shape (N + 1, p), for stems ``plan`` off the target."""
+    """Return outputs at samples 0 … N, shape (N + 1, p), of the plan ``found``."""
     deviation = state - target.state
     pv = np.empty((cost.horizon + 1, len(target.pv)))
-    pv[0] = cost.model.c @ deviation
-    pv[1:] = cost.outputs(deviation, plan)
-    return np.asarray(pv + target.pv)
+    pv[0] = cost.model.c @ deviation + target.pv
+    if found.pv is None:
+        pv[1:] = cost.outputs(deviation, found.plan) + target.pv
+    else:
+        pv[1:] = found.pv
+    return pv

@@ -17,12 +17,21 @@ OUT_OF_ITERATIONS = -4  # exit flag of daqp
 
 @dataclasses.dataclass(frozen=True)
 class HorizonSolution:
-    """A plan, stems in deviations from the target, shape (N, m); its cost; the largest slack."""
+    """A plan of one pattern of moves.
+
+    Attributes:
+        plan: stems in deviations from the target, shape (N, m).
+        cost: of the plan.
+        slack: by how much outputs break their soft bounds at most, shape (p,).
+        variables: r.
+        pv: outputs at samples 1 … N, shape (N, p), where soft bounds have asked for them.
+    """
 
     plan: FloatArray
     cost: float
     slack: FloatArray
     variables: FloatArray
+    pv: FloatArray | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,6 +128,7 @@ class HorizonQp:
         self.size = shape.shape[1]
         self._bounded = np.flatnonzero(np.isfinite(output_bounds).any(axis=1))
         self._output_bounds = output_bounds[self._bounded]
+        self._lowest, self._highest = output_bounds[:, 0], output_bounds[:, 1]
         self._slack_weight = slack_weights(cost)[self._bounded]
         self._hard = _Programme(shape.T @ cost.hessian @ shape, rows, iterations)
 
@@ -181,8 +191,10 @@ class HorizonQp:
             return None
         variables, value = found
         plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
-        slack = np.zeros(len(target_pv))
-        if len(self._bounded) and self.slack(state, plan, target_pv).any():
+        slack, pv = np.zeros(len(target_pv)), None
+        if len(self._bounded):
+            pv = self.cost.outputs(state, plan) + target_pv
+        if pv is not None and ((pv > self._highest).any() or (pv < self._lowest).any()):
             self._fill_bounds(state, offset, lower, upper, target_pv)
             found = self._solved(self._soft, np.append(linear, np.zeros(len(self._bounded))))
             if found is None:
@@ -190,7 +202,8 @@ class HorizonQp:
             variables, value = found[0][: self.size], found[1]
             slack[self._bounded] = found[0][self.size :]
             plan = (self.shape @ variables + offset).reshape(self.cost.horizon, -1)
-        return HorizonSolution(plan, value + base, slack, variables)
+            pv = None
+        return HorizonSolution(plan, value + base, slack, variables, pv)
 
     def _solved(self, programme: _Programme, linear: FloatArray) -> tuple[FloatArray, float] | None:
         found = programme.solve(linear)
