@@ -1,7 +1,8 @@
 """The house in figures: files per folder, documentation, public names, examples.
 
 Run from anywhere: ``python tools/house.py [--check]``. With ``--check`` the exit code is 1 when a
-figure misses its aim. Shares of docstrings and comments are shown, not judged.
+figure misses its aim. Judged are functions and methods of the public names, which the package says
+are all that it promises; those of the floors below, docstrings and comments are shown.
 """
 
 from __future__ import annotations
@@ -167,12 +168,7 @@ def rows(root: Path) -> list[Row]:
             bool(public) and sum(public.values()) >= EXPLAINED * len(public),
         ),
         *(Row(f"  {name}", "not explained") for name, told in public.items() if not told),
-        Row(
-            "arguments explained, all functions",
-            _share(sum(functions), len(functions)),
-            f"≥ {EXPLAINED:.0%}",
-            sum(functions) >= EXPLAINED * len(functions),
-        ),
+        Row("arguments explained, all functions", _share(sum(functions), len(functions))),
         Row("public names", f"{names}", f"≥ {NAMES}", names >= NAMES),
         Row("examples", f"{examples}", f"≥ {EXAMPLES}", examples >= EXAMPLES),
         Row("documents", ", ".join(there), "all", len(there) == len(DOCUMENTS)),
