@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.blind.loops.base_loops import PiControllers, base_loop
+from stiction_ros.blind.loops.base_loops import base_loop
 from stiction_ros.blind.loops.causes import CAUSES, Draw
 from stiction_ros.blind.loops.circumstances import (
     drawn_noise,
@@ -111,7 +111,7 @@ def late_loop(seed: int, *, healthy: bool = False) -> LateLoop:
 
     def run(model: LoopModel) -> Record:
         record = simulate_closed_loop(
-            model, PiControllers(loop), set_points, SAMPLES, simulation
+            model, loop.controllers(), set_points, SAMPLES, simulation
         ).record
         return dataclasses.replace(record, stem=None)
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.examples.example import Example
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.loop import (
     LoopModel,
-    Measurement,
     PiController,
+    PiControllers,
     PiTuning,
     SetPoints,
     simulate_closed_loop,
@@ -55,30 +53,14 @@ def coupled_loop(seed: int, valves: int = 3, samples: int = SAMPLES) -> Example:
         raise InputError(f"{valves} lies outside 1 to {len(FRICTIONS)}", where="valves")
     loop = _loop(valves)
     schedule = _set_points(np.random.default_rng([seed, 1]), loop.outputs, samples)
-    run = simulate_closed_loop(loop, _Controllers(valves), schedule, samples, seed)
+    run = simulate_closed_loop(loop, _controllers(valves), schedule, samples, seed)
     options = IdentificationOptions("exact", output_order=2, input_order=2, delay=(0, 4))
     return Example("coupled", f"{valves} valves", seed, run.record, loop, options)
 
 
-class _Controllers:
-    """One PI controller per output, each with its own valve."""
-
-    def __init__(self, valves: int) -> None:
-        self._controllers = [
-            PiController(
-                PiTuning(0.9 / GAINS[i][i], TIME_CONSTANTS[i][0]), 1.0, MIDDLE, (0.0, 100.0)
-            )
-            for i in range(valves)
-        ]
-
-    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
-        parts = [
-            controller(
-                dataclasses.replace(measurement, pv=measurement.pv[i : i + 1]), sp[i : i + 1]
-            )
-            for i, controller in enumerate(self._controllers)
-        ]
-        return np.concatenate(parts)
+def _controllers(valves: int) -> PiControllers:
+    tunings = [PiTuning(0.9 / GAINS[i][i], TIME_CONSTANTS[i][0]) for i in range(valves)]
+    return PiControllers([PiController(each, 1.0, MIDDLE, (0.0, 100.0)) for each in tunings])
 
 
 def _loop(count: int) -> LoopModel:

@@ -11,7 +11,7 @@ from stiction_ros.field import loads
 from stiction_ros.field.circumstances import Circumstances, Friction, Outside, Sampling
 from stiction_ros.field.kernels import FloatArray
 from stiction_ros.field.loads import Wave
-from stiction_ros.field.plants import Plant, Process, draw_process
+from stiction_ros.field.plants import Plant, Process, draw_process, log_uniform
 from stiction_ros.field.simulation import FRICTIONLESS, Clock, Loop, Signals, run
 from stiction_ros.field.truth import Cause
 from stiction_ros.field.tuning import (
@@ -124,11 +124,11 @@ def _valve(
 ) -> tuple[float, Valve]:
     """Return about how wide the band is, %, and the valve."""
     if c.friction is Friction.MUCH:
-        band = _log(random, 1.0, 10.0)
+        band = log_uniform(random, 1.0, 10.0)
     elif c.friction is Friction.FEW_SLIPS:
-        band = _log(random, 3.0, 12.0)
+        band = log_uniform(random, 3.0, 12.0)
     else:
-        band = _log(random, 0.02, 0.2) * float(random.random() < 0.7)
+        band = log_uniform(random, 0.02, 0.2) * float(random.random() < 0.7)
     band *= shrink
     scan = clock.step * clock.scan
     natural = scan / random.uniform(10.0, 25.0)
@@ -146,13 +146,9 @@ def _valve(
         damping=random.uniform(0.7, 2.0),
         lag=random.uniform(0.1, 0.7) * scan,
         positioner=positioner,
-        stribeck=max(_log(random, 7e-4, 1.2e-3) * static / natural, 1e-9),
+        stribeck=max(log_uniform(random, 7e-4, 1.2e-3) * static / natural, 1e-9),
     )
     return band, Valve(c.law, static, share * static, stem)
-
-
-def _log(random: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 class _Acting:
@@ -216,21 +212,23 @@ class _Acting:
         if self.band:
             size = random.uniform(0.1, 0.5) * self.band
         elif self.c.outside is Outside.NOTHING:
-            size = _log(random, 0.5, 4.0)
+            size = log_uniform(random, 0.5, 4.0)
         else:
-            size = _log(random, 0.1, 0.6)
+            size = log_uniform(random, 0.1, 0.6)
         slow = 1.0 if self.c.outside is Outside.RINGING else 3.0
         if self.c.friction is Friction.FEW_SLIPS:
             slow = 15.0
         drift = size * loads.coloured(
-            random, self.count, slow * _log(random, 1.0, 10.0) * self.time
+            random, self.count, slow * log_uniform(random, 1.0, 10.0) * self.time
         )
         drift[: int(0.4 * self.warm)] += random.uniform(1.5, 4.0) * self.band
         return drift
 
     def _noise(self) -> FloatArray:
         random, clock = self.random, self.loop.clock
-        level = random.uniform(0.02, 0.25) * self.band if self.band else _log(random, 0.03, 0.5)
+        level = (
+            random.uniform(0.02, 0.25) * self.band if self.band else log_uniform(random, 0.03, 0.5)
+        )
         if self.band:
             passed_on = abs(self.loop.controller.gain) * self.pv_size
             level *= min(1.0, NOISE_IN_OP / (0.25 * passed_on))
@@ -240,13 +238,13 @@ class _Acting:
 
     def _period(self, low: float, high: float) -> float:
         """Return the period of an outer cycle, steps."""
-        wanted = _log(self.random, low, high) * self.time
+        wanted = log_uniform(self.random, low, high) * self.time
         least = PER_PERIOD * self.loop.clock.sample
         return min(max(wanted, least), self.recorded / PERIODS)
 
     def _amplitude(self) -> float:
         if not self.band:
-            return _log(self.random, 2.0, 10.0)
+            return log_uniform(self.random, 2.0, 10.0)
         if self.c.law is Law.BACKLASH:
             return self.random.uniform(1.0, 3.0) * self.band
         return self.random.uniform(0.3, 1.5) * self.band

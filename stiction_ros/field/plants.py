@@ -85,7 +85,8 @@ def _process(name: Plant, code: int, numbers: list[float], **rest: object) -> Pr
     return Process(name, code, parameters, guess, **rest)  # type: ignore[arg-type]
 
 
-def _log(random: np.random.Generator, low: float, high: float) -> float:
+def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    """Return a number drawn evenly over its logarithm."""
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
@@ -106,8 +107,8 @@ def flow(random: np.random.Generator) -> Process:
         C. A. Smith, A. B. Corripio: Principles and Practice of Automatic Process Control, 3rd
         ed., Wiley 2006, chapter 5 (installed characteristic).
     """
-    inertia, sensor = _log(random, 0.3, 3.0), _log(random, 0.3, 2.0)
-    full = _log(random, 10.0, 500.0)
+    inertia, sensor = log_uniform(random, 0.3, 3.0), log_uniform(random, 0.3, 2.0)
+    full = log_uniform(random, 10.0, 500.0)
     numbers = [_trim(random), random.uniform(0.15, 0.6), full, inertia, sensor]
     return _process(
         Plant.FLOW,
@@ -134,7 +135,7 @@ def pressure(random: np.random.Generator) -> Process:
         McGraw-Hill 1990, chapter 3 (gas-phase vessels).
     """
     upstream, downstream = random.uniform(8.0, 15.0), random.uniform(1.0, 3.0)
-    capacity, sensor = _log(random, 4.0, 60.0), _log(random, 0.3, 2.0)
+    capacity, sensor = log_uniform(random, 4.0, 60.0), log_uniform(random, 0.3, 2.0)
     numbers = [_trim(random), upstream, downstream, 1.0, 0.35, capacity, sensor]
     middle = 0.5 * (upstream + downstream)
     if numbers[0] > 1.0:
@@ -152,11 +153,11 @@ def pressure(random: np.random.Generator) -> Process:
 
 
 def _vessel(random: np.random.Generator, name: Plant) -> Process:
-    area = _log(random, 0.5, 8.0)  # share of the tank, %, per unit of flow and second
-    throughput = _log(random, 0.1, 1.0)
+    area = log_uniform(random, 0.5, 8.0)  # share of the tank, %, per unit of flow and second
+    throughput = log_uniform(random, 0.1, 1.0)
     trim = float(random.choice([1.0, 1.0, 30.0]))
     residence = 50.0 * area / throughput
-    stem, sensor = random.uniform(35.0, 65.0), _log(random, 0.003, 0.03) * residence
+    stem, sensor = random.uniform(35.0, 65.0), log_uniform(random, 0.003, 0.03) * residence
     share = stem / 100.0 if trim == 1.0 else trim ** (stem / 100.0 - 1.0)
     gravity = 0.0 if name is Plant.LEVEL else 1.0
     numbers = [trim, throughput / share, throughput, area, gravity, 1.0, sensor]
@@ -212,7 +213,7 @@ def four_tanks(random: np.random.Generator) -> Process:
         K. H. Johansson: The quadruple-tank process. IEEE Trans. Control Syst. Technol. 8,
         2000, 456-465.
     """
-    stretch = _log(random, 0.3, 4.0)
+    stretch = log_uniform(random, 0.3, 4.0)
     stem = random.uniform(35.0, 65.0)
     nominal = 10.0 / (stem / 100.0)
     numbers = [1.0, nominal, 10.05, 0.70, 0.60, stretch, 28.0, 32.0, 0.071, 0.057]
@@ -244,7 +245,7 @@ def reactor(random: np.random.Generator) -> Process:
         D. E. Seborg and others, as :func:`tank`, example 2.5 (tank and kinetics).
         B. W. Bequette: Process Dynamics, Prentice Hall 1998, module 9 (jacket).
     """
-    pace = _log(random, 0.5, 3.0) / 60.0  # published in minutes
+    pace = log_uniform(random, 0.5, 3.0) / 60.0  # published in minutes
     numbers = [
         1.0,
         pace,
@@ -286,7 +287,7 @@ def exchanger(random: np.random.Generator) -> Process:
         K. M. Hangos, J. Bokor, G. Szederkényi: Analysis and Control of Nonlinear Process
         Systems, Springer 2004, chapter 4 (heat exchanger cells).
     """
-    residence = _log(random, 5.0, 40.0)  # s of the cold side
+    residence = log_uniform(random, 5.0, 40.0)  # s of the cold side
     per_cell = kernels.CELLS / residence
     numbers = [
         float(random.choice([1.0, 30.0])),

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import cont2discrete
 
 from stiction_ros.effects import FloatArray
-from stiction_ros.loop import LoopModel, Measurement, PiController, PiTuning
+from stiction_ros.loop import LoopModel, PiController, PiControllers, PiTuning
 from stiction_ros.loop.pi_stability import largest_gains
 
 MIDDLE = 50.0  # OP and PV of the operating point
@@ -42,24 +42,11 @@ class BaseLoop:
         """Return the same loop under other controllers."""
         return dataclasses.replace(self, tunings=tunings)
 
-
-class PiControllers:
-    """One PI controller per output, each with its own valve."""
-
-    def __init__(self, loop: BaseLoop) -> None:
-        self._controllers = [
-            PiController(tuning, loop.model.sample_time, float(op), LIMITS)
-            for tuning, op in zip(loop.tunings, loop.model.stem_start, strict=True)
-        ]
-
-    def __call__(self, measurement: Measurement, sp: FloatArray) -> FloatArray:
-        parts = [
-            controller(
-                dataclasses.replace(measurement, pv=measurement.pv[i : i + 1]), sp[i : i + 1]
-            )
-            for i, controller in enumerate(self._controllers)
-        ]
-        return np.concatenate(parts)
+    def controllers(self) -> PiControllers:
+        """Return its controllers, at rest where the loop begins."""
+        model = self.model
+        pairs = zip(self.tunings, model.stem_start.tolist(), strict=True)
+        return PiControllers([PiController(t, model.sample_time, op, LIMITS) for t, op in pairs])
 
 
 def base_loop(random: np.random.Generator, kind: str, *, tight: bool) -> BaseLoop:

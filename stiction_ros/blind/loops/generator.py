@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stiction_ros.blind.loops.base_loops import BaseLoop, PiControllers, base_loop
+from stiction_ros.blind.loops.base_loops import BaseLoop, base_loop
 from stiction_ros.blind.loops.causes import CAUSES, FIRST_OF_TWO, SECOND_OF_TWO, Cause, Draw
 from stiction_ros.blind.loops.circumstances import (
     drawn_noise,
@@ -64,7 +64,7 @@ class _Scene:
 
     def run(self, model: LoopModel, tunings: tuple[PiTuning, ...]) -> Record:
         """Return the record after the lead, its time from zero, without stems."""
-        controllers = PiControllers(self.loop.with_tunings(tunings))
+        controllers = self.loop.with_tunings(tunings).controllers()
         count = LEAD + self.samples
         run = simulate_closed_loop(model, controllers, self.set_points, count, self.seed)
         record = run.record.part(LEAD, count)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.blind.scores.scoring import Score, Scored
+from stiction_ros.blind.scores.world_scores import WorldScore
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +91,7 @@ def coverage(rows: Sequence[Scored]) -> list[Rate]:
     return [whole, *(Rate(key, sum(v), len(v)) for key, v in sorted(counts.items()))]
 
 
-def matrix(rows: Sequence[Scored]) -> dict[str, Counter[str]]:
+def matrix(rows: Sequence[Scored | WorldScore]) -> dict[str, Counter[str]]:
     """Return, per cause, how often each thing was said."""
     found: dict[str, Counter[str]] = {}
     for row in sorted(rows, key=lambda row: row.cause):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from stiction_ros.blind.scores.tally import Rate
+from stiction_ros.blind.scores.tally import Rate, matrix
 from stiction_ros.blind.scores.world_scores import WorldScore
 
 TESTABLE = 20.0
@@ -66,14 +65,6 @@ def seconds(rows: Sequence[WorldScore]) -> tuple[float, float]:
     """Return median and largest processor time of the workflow."""
     times = [row.seconds for row in rows]
     return float(np.median(times)), float(np.max(times))
-
-
-def matrix(rows: Sequence[WorldScore]) -> dict[str, Counter[str]]:
-    """Return, per cause, how often each thing was said."""
-    found: dict[str, Counter[str]] = {}
-    for row in sorted(rows, key=lambda row: row.cause):
-        found.setdefault(row.cause, Counter())[row.said] += 1
-    return found
 
 
 def splits(rows: Sequence[WorldScore]) -> dict[str, list[WorldScore]]:

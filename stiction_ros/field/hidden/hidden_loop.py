@@ -16,12 +16,13 @@ from stiction_ros.field.drawing import INTERVALS
 from stiction_ros.field.hidden.effect import OUTPUT, SENSOR, Effect, Name
 from stiction_ros.field.hidden.given import Kept, Noise, given_model, off
 from stiction_ros.field.hidden.hiding import KINDS, MECHANICS, Draw
-from stiction_ros.field.hidden.plants import Plant, drawn_plant, log_uniform
+from stiction_ros.field.hidden.plants import Plant, drawn_plant
 from stiction_ros.field.hidden.simulation import AT_REST, LEAD, Base, Run, Signals, run
 from stiction_ros.field.hidden.surroundings import Surroundings, draw_surroundings
 from stiction_ros.field.hidden.tuning import calmed, simc, tight
 from stiction_ros.field.historian import excepted, rounded, swinging_door
 from stiction_ros.field.kernels import FlagArray, FloatArray
+from stiction_ros.field.plants import log_uniform
 from stiction_ros.records.record import Record
 
 FAMILIES = ("single", "two", "physics")

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from stiction_ros.field.kernels import FloatArray
+from stiction_ros.field.plants import log_uniform
 
 FINE = 8
 """Steps of integration in a sample; dead times are whole numbers of them."""
@@ -102,11 +103,6 @@ class Plant:
         if abs(numerator[-1]) < 1e-9 * np.abs(numerator).max():
             numerator = numerator[:-1]
         return denominator[1:], numerator, whole
-
-
-def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
-    """Return a number drawn evenly over its logarithm."""
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 def _gain(random: np.random.Generator) -> float:

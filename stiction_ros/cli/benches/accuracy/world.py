@@ -154,7 +154,8 @@ def write_loops(bench: WorldBench, folder: Path) -> None:
 
 def show(rows: Sequence[WorldScore]) -> None:
     """Print the matrix and the rates of every family and kind of model."""
-    from stiction_ros.blind.scores.world_tally import matrix, median_closed, rates, seconds
+    from stiction_ros.blind.scores.tally import matrix
+    from stiction_ros.blind.scores.world_tally import median_closed, rates, seconds
 
     console = Console()
     for family, given in dict.fromkeys((row.family, row.given) for row in rows):
