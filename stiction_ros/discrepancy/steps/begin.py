@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.controller_check import check_controller
+from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
 from stiction_ros.discrepancy.data.effects import add_data_effects, corrected
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.data.long_records import liveliest_parts
@@ -49,7 +50,8 @@ def begin(
     controller = check_controller(model, runs)
     found = controller.finding
     data = (*((found,) if found else ()), *gate.findings)
-    runs, bare, longest = corrected(runs, found), add_data_effects(model, data), 0
+    runs = dataclasses.replace(corrected(runs, found), unseen=unseen_of(runs, controller))
+    bare, longest = add_data_effects(model, data), 0
     if options.free_process:
         longest = longest_delay(model)
         runs = with_common_rows(runs, model)

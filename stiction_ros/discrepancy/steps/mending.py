@@ -37,7 +37,8 @@ def mended(task: Task, state: State) -> State | None:
     due = margin if state.added else 0.0
     if found is None or found.worth >= now.worth(margin) + _price(task, state, now) - due:
         return None
-    if same_thing(found.changed.changes, [each.effect for each in state.added]):
+    names = [each.effect for each in state.added] or _left_in_doubt(state)
+    if same_thing(found.changed.changes, names):
         return None
     other = dataclasses.replace(
         state,
@@ -66,7 +67,9 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     gained = 0.0 if best is None else best.evidence
     if found is None or found.worth >= now.worth(margin) - gained:
         return None
-    if best is not None and same_thing(found.changed.changes, [best.candidate.effect]):
+    explained = now.worth(margin) - found.worth  # one figure alone is what an effect says
+    rivals = [fit.candidate.effect for fit in inside if fit.evidence > explained - margin]
+    if best is not None and same_thing(found.changed.changes, [best.candidate.effect, *rivals]):
         return None
     return _behind(state, found)
 
@@ -92,6 +95,18 @@ def singles(state: State) -> list[AddedEffect]:
         if behaviour is not None and fit.evidence > 0.0 and large_enough(fit):
             found.append(AddedEffect(fit, behaviour, fit.candidate.twins))
     return found
+
+
+def _left_in_doubt(state: State) -> list[str]:
+    """Return the effects of the set that the last look left in doubt; none where it left none.
+
+    Where another figure of the process is in the set, the others explain as much: it is no
+    correction of the model.
+    """
+    last = state.looks[-1].decision
+    if last.chosen is None:
+        return []
+    return [last.chosen.candidate.effect, *(effect for _, effect in last.alternatives)]
 
 
 def _behind(state: State, found: Mended) -> State:
