@@ -64,7 +64,7 @@ def test_a_sine_is_the_same_wherever_it_enters() -> None:
 
 def test_the_response_to_a_load_is_that_of_its_stem() -> None:
     run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
-    candidate = LoadCandidate(run, 0, StepWave(run, np.zeros(0)))
+    candidate = LoadCandidate.beside(run, 0, StepWave.of(run, np.zeros(0)))
     response = candidate.respond(run, np.array([[120.0]]))
     moved = FreeRun(loop().with_effect("load:V1", StepDisturbance(120.0, 2.5)), run.runs)
     assert 2.5 * response.sizes[0][:, 0, 0] == pytest.approx(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -70,8 +70,22 @@ class GridBehaviour(SimulatesGrid, Protocol):
         ...
 
 
+class Identity(NamedTuple):
+    """Which change of a model a candidate is, whatever its figures and the model behind it.
+
+    Attributes:
+        place, effect: as loop models name them.
+        law: where the effect has several; None elsewhere.
+    """
+
+    place: str
+    effect: str
+    law: str | None
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate(ABC):
-    """One change of the current model.
+    """One change of the current model; the same one beside another model has its ``identity``.
 
     Attributes:
         place, effect: as loop models name them, such as ``valve:V1`` and ``stiction``.
@@ -204,6 +218,11 @@ class Candidate(ABC):
         return None
 
     @property
+    def identity(self) -> Identity:
+        """Which change it is."""
+        return Identity(self.place, self.effect, self.law)
+
+    @property
     def key(self) -> tuple[str, str]:
         """Place and effect."""
         return self.place, self.effect
@@ -212,6 +231,10 @@ class Candidate(ABC):
     def keys(self) -> tuple[tuple[str, str], ...]:
         """Place and effect, its own first, of all that it stands for."""
         return (self.key, *self.twins)
+
+    def or_else(self, place: str, effect: str) -> Self:
+        """Return the same with one more effect that no record of OP and PV tells from it."""
+        return dataclasses.replace(self, twins=(*self.twins, (place, effect)))
 
     @property
     def name(self) -> str:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Self
+
 import numpy as np
 
 from stiction_ros.deferred import lfilter
@@ -14,28 +17,33 @@ KNOTS = 6
 LAGS = (0.0, 2.0, 6.0, 18.0)  # samples
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class _Decoy(OutputCandidate):
-    inside = False
+    inside: bool = False
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
         return None
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class GainChange(_Decoy):
     """A process whose gain changes at one moment."""
 
-    factors = 2
-    dated = True
+    effect: str = "gain that changes"
+    factors: int = 2
+    dated: bool = True
 
-    def __init__(self, run: FreeRun, output: int) -> None:
-        """Take the output's index."""
-        super().__init__(run, output, "process", "gain that changes")
-        self.contains = (
-            (f"disturbance:{run.model.outputs[output]}", "step"),
-            *((f"load:{valve}", "step") for valve in run.model.valve_names),
+    @classmethod
+    def of(cls, run: FreeRun, output: int) -> Self:
+        """Return the rival of an output by its index."""
+        tag, last = run.model.outputs[output], float(run.runs.time.max())
+        steps = [(f"load:{valve}", "step") for valve in run.model.valve_names]
+        return cls(
+            place=f"process:{tag}",
+            axes=(Axis(0.1 * last, 0.9 * last, 17),),
+            contains=((f"disturbance:{tag}", "step"), *steps),
+            output=output,
         )
-        last = float(run.runs.time.max())
-        self.axes = (Axis(0.1 * last, 0.9 * last, 17),)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         late = (run.runs.time[:, None] >= points[:, 0]).astype(float)
@@ -43,17 +51,20 @@ class GainChange(_Decoy):
         return Response({}, {self.output: np.stack([late * free, late], axis=2)})
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Trend(_Decoy):
     """A slow unknown load: a cubic spline in time."""
 
-    factors = KNOTS
+    effect: str = "slow load"
+    factors: int = KNOTS
 
-    def __init__(self, run: FreeRun, output: int) -> None:
-        """Take the output's index."""
-        super().__init__(run, output, "disturbance", "slow load")
-        places = [f"disturbance:{run.model.outputs[output]}"]
-        places += [f"load:{valve}" for valve in run.model.valve_names]
-        self.contains = tuple((place, "random_walk") for place in places)
+    @classmethod
+    def of(cls, run: FreeRun, output: int) -> Self:
+        """Return the rival of an output by its index."""
+        place = f"disturbance:{run.model.outputs[output]}"
+        places = (place, *(f"load:{valve}" for valve in run.model.valve_names))
+        walks = tuple((each, "random_walk") for each in places)
+        return cls(place=place, contains=walks, output=output)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         from scipy.interpolate import BSpline
@@ -64,20 +75,21 @@ class Trend(_Decoy):
         return Response({}, {self.output: basis[:, None, 1:]})
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Dynamics(_Decoy):
     """Other linear dynamics: the free run through several lags."""
 
-    factors = len(LAGS) + 1
+    effect: str = "other dynamics"
+    factors: int = len(LAGS) + 1
+    most_of: float = 0.8  # lags between samples are not quite those of held signals
 
-    def __init__(self, run: FreeRun, output: int) -> None:
-        """Take the output's index."""
-        super().__init__(run, output, "process", "other dynamics")
-        tag = run.model.outputs[output]
-        self.contains = (
-            *((f"process:{tag}", name) for name in ("pole", "delay", "gain")),
-            *((f"valve:{valve}", "lag") for valve in run.model.valve_names),
-        )
-        self.most_of = 0.8  # lags between samples are not quite those of held signals
+    @classmethod
+    def of(cls, run: FreeRun, output: int) -> Self:
+        """Return the rival of an output by its index."""
+        place = f"process:{run.model.outputs[output]}"
+        parts = [(place, name) for name in ("pole", "delay", "gain")]
+        lags = [(f"valve:{valve}", "lag") for valve in run.model.valve_names]
+        return cls(place=place, contains=(*parts, *lags), output=output)
 
     @property
     def absorbed(self) -> bool:
@@ -100,7 +112,7 @@ def decoys(run: FreeRun) -> list[Candidate]:
     """Return the rivals outside the catalogue for every output."""
     found: list[Candidate] = []
     for i in range(run.forced.shape[1]):
-        found += [Trend(run, i)]
+        found += [Trend.of(run, i)]
         if float(np.ptp(run.forced[:, i])) > 0.0:
-            found += [GainChange(run, i), Dynamics(run, i)]
+            found += [GainChange.of(run, i), Dynamics.of(run, i)]
     return found

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from typing import Self
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from stiction_ros.effects import (
     ExtraDelay,
     ExtraPole,
     FloatArray,
+    Lag,
     Leak,
     ProcessGain,
 )
@@ -26,31 +29,37 @@ LEAST_GAIN = 0.25
 INTEGRATES = 0.05  # of the record: a process with a longer time constant may leak
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class OutputCandidate(Candidate):
-    """A change of one output alone."""
+    """A change of one output alone.
 
-    def __init__(self, run: FreeRun, output: int, place: str, effect: str) -> None:
-        """Take the output's index and the kind of place, such as ``process``."""
-        self.output = output
-        self.place = f"{place}:{run.model.outputs[output]}"
-        self.effect = effect
+    Attributes:
+        output: its index.
+    """
+
+    output: int
 
     def signal(self, run: FreeRun) -> FloatArray:
         return run.forced[:, self.output]
 
-    def twin(self, run: FreeRun, place: str, effect: str) -> OutputCandidate:
-        """Name another effect that no record of OP and PV tells from this one."""
-        self.twins = (*self.twins, (f"{place}:{run.model.outputs[self.output]}", effect))
-        return self
 
-
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class FilterCandidate(OutputCandidate):
-    """A linear change between process and sensor: pole, delay, leak."""
+    """A linear change between process and sensor: pole, delay, leak.
 
-    def __init__(self, run: FreeRun, output: int, kind: type[GridBehaviour], axis: Axis) -> None:
-        """Take the output's index, the behaviour and its one figure."""
-        super().__init__(run, output, "process", kind.effect)
-        self.kind, self.axes = kind, (axis,)
+    Attributes:
+        kind: the behaviour; its first figure is searched.
+    """
+
+    kind: type[GridBehaviour]
+
+    @classmethod
+    def of(
+        cls, run: FreeRun, output: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
+    ) -> Self:
+        """Return the candidate of an output by its index, with the figures that are searched."""
+        place = f"process:{run.model.outputs[output]}"
+        return cls(place=place, effect=kind.effect, axes=axes, output=output, kind=kind)
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         parts = []
@@ -74,12 +83,6 @@ class FilterCandidate(OutputCandidate):
 class PoleCandidate(FilterCandidate):
     """One more lag of the output, by its time constant and where it begins."""
 
-    def __init__(self, run: FreeRun, output: int) -> None:
-        """Take the output's index."""
-        super().__init__(run, output, ExtraPole, lag_axis(run))
-        span = float(np.ptp(run.forced[:, output]))
-        self.axes = (*self.axes, Axis(-10.0 * span, 10.0 * span, 1, linear=True))
-
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         return lasts(self, point)
 
@@ -93,14 +96,11 @@ class PoleCandidate(FilterCandidate):
         return math.exp(-run.runs.sample_time / max(float(point[0]), 1e-9))
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class GainCandidate(OutputCandidate):
     """Another gain: the free run itself, by a factor."""
 
-    factors = 1
-
-    def __init__(self, run: FreeRun, output: int) -> None:
-        """Take the output's index."""
-        super().__init__(run, output, "process", "gain")
+    factors: int = 1
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         return Response({}, {self.output: run.forced[:, self.output][:, None, None]})
@@ -132,15 +132,18 @@ def output_candidates(run: FreeRun) -> list[Candidate]:
     for i in range(run.forced.shape[1]):
         if float(np.ptp(run.forced[:, i])) <= 0.0:
             continue
+        tag, span = run.model.outputs[i], float(np.ptp(run.forced[:, i]))
+        start = Axis(-10.0 * span, 10.0 * span, 1, linear=True)
+        delays = Axis(1.0, LONGEST_DELAY, LONGEST_DELAY, natural=True)
         found += [
-            GainCandidate(run, i),
-            PoleCandidate(run, i).twin(run, "sensor", "lag"),
-            FilterCandidate(
-                run, i, ExtraDelay, Axis(1.0, LONGEST_DELAY, LONGEST_DELAY, natural=True)
+            GainCandidate(place=f"process:{tag}", effect=ProcessGain.effect, output=i),
+            PoleCandidate.of(run, i, ExtraPole, (lag_axis(run), start)).or_else(
+                f"sensor:{tag}", Lag.effect
             ),
+            FilterCandidate.of(run, i, ExtraDelay, (delays,)),
         ]
         if memory > INTEGRATES * longest:
             lowest = max(0.3 / longest, 0.5 / memory) / step
             rates = Axis(lowest, 0.3 / step, 18, logarithmic=True)
-            found.append(FilterCandidate(run, i, Leak, rates))
+            found.append(FilterCandidate.of(run, i, Leak, (rates,)))
     return found

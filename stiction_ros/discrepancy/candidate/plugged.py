@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Self
 
 import numpy as np
 
@@ -18,17 +19,30 @@ from stiction_ros.errors import InputError
 ON_OUTPUTS = ("process", "disturbance", "sensor")
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class PluggedValve(ValveCandidate):
-    """A behaviour at the end of a valve's chain, by its own axes."""
+    """A behaviour at the end of a valve's chain, by its own axes.
 
-    def __init__(self, run: FreeRun, valve: int, kind: type[Behaviour]) -> None:
-        """Take the valve's index and the behaviour."""
-        axes = axes_of(kind, seen_of(run, run.stems[:, valve]))
-        super().__init__(run, valve, kind, axes)
-        self._about = kind
+    Attributes:
+        plugged: the behaviour.
+    """
+
+    plugged: type[Behaviour]
+
+    @classmethod
+    def of(cls, run: FreeRun, valve: int, kind: type[Behaviour]) -> Self:
+        """Return the candidate of a behaviour at a valve by its index."""
+        return cls(
+            place=f"valve:{run.model.valves[valve].name}",
+            effect=kind.effect,
+            axes=axes_of(kind, seen_of(run, run.stems[:, valve])),
+            valve=valve,
+            kind=kind,
+            plugged=kind,
+        )
 
     def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self._about, points)
+        return possible(self.plugged, points)
 
     def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
         """Return stem positions, shape (N, G), %; OP where the figures are not possible."""
@@ -45,88 +59,118 @@ class PluggedValve(ValveCandidate):
 
     @property
     def about(self) -> type[Behaviour]:
-        return self._about
+        return self.plugged
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class PluggedLoad(Candidate):
-    """A behaviour that enters the process beside the stem of a valve, by its own axes."""
+    """A behaviour that enters the process beside the stem of a valve, by its own axes.
 
-    def __init__(
-        self, run: FreeRun, valve: int, kind: type[Behaviour], moments: FloatArray
-    ) -> None:
-        """Take the valve's index, the behaviour, and moments, s, at which PV surprises most."""
-        self.valve, self._about = valve, kind
-        self.place, self.effect = f"load:{run.model.valves[valve].name}", kind.effect
-        self.axes = axes_of(kind, seen_of(run, np.zeros(len(run.runs))))
-        self.dated, self._moments = is_dated(kind), moments
+    Attributes:
+        valve: its index.
+        plugged: the behaviour.
+        moments: at which PV surprises most, s.
+    """
+
+    valve: int
+    plugged: type[Behaviour]
+    moments: FloatArray
+
+    @classmethod
+    def of(cls, run: FreeRun, valve: int, kind: type[Behaviour], moments: FloatArray) -> Self:
+        """Return the candidate of a behaviour at a valve by its index."""
+        return cls(
+            place=f"load:{run.model.valves[valve].name}",
+            effect=kind.effect,
+            axes=axes_of(kind, seen_of(run, np.zeros(len(run.runs)))),
+            dated=is_dated(kind),
+            valve=valve,
+            plugged=kind,
+            moments=moments,
+        )
 
     def grid(self) -> FloatArray:
-        return with_moments(super().grid(), self.axes, self._moments if self.dated else None)
+        return with_moments(super().grid(), self.axes, self.moments if self.dated else None)
 
     @property
     def about(self) -> type[Behaviour]:
-        return self._about
+        return self.plugged
 
     @property
     def law(self) -> str | None:
-        return self._about.law
+        return self.plugged.law
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        wave = simulated(run, self._about, points, np.zeros(len(run.runs)))
+        wave = simulated(run, self.plugged, points, np.zeros(len(run.runs)))
         entering = run.stems[:, self.valve, None] + wave
         reached = [i for i in range(run.forced.shape[1]) if run.responses.reaches(i, self.valve)]
         shifts = {i: run.drive(i, self.valve, entering) - run.forced[:, i : i + 1] for i in reached}
         return Response(shifts or {0: np.zeros(wave.shape)}, possible=self.possible(points))
 
     def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self._about, points)
+        return possible(self.plugged, points)
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return made(self._about, point)
+        return made(self.plugged, point)
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class PluggedOutput(OutputCandidate):
-    """A behaviour in the process, on an output or at its sensor, by its own axes."""
+    """A behaviour in the process, on an output or at its sensor, by its own axes.
 
-    def __init__(
-        self, run: FreeRun, output: int, place: str, kind: type[Behaviour], moments: FloatArray
-    ) -> None:
-        """Take the output's index, the place, the behaviour, and when PV surprises most, s."""
-        super().__init__(run, output, place, kind.effect)
-        self._about, self._kind = kind, place
-        self.axes = axes_of(kind, seen_of(run, self.signal(run)))
-        self.dated, self._moments = is_dated(kind), moments
+    Attributes:
+        plugged: the behaviour.
+        moments: at which PV surprises most, s.
+    """
+
+    plugged: type[Behaviour]
+    moments: FloatArray
+
+    @classmethod
+    def of(
+        cls, run: FreeRun, output: int, place: str, kind: type[Behaviour], moments: FloatArray
+    ) -> Self:
+        """Return the candidate of a behaviour at a kind of place of an output by its index."""
+        bare = cls(
+            place=f"{place}:{run.model.outputs[output]}",
+            effect=kind.effect,
+            dated=is_dated(kind),
+            output=output,
+            plugged=kind,
+            moments=moments,
+        )
+        return dataclasses.replace(bare, axes=axes_of(kind, seen_of(run, bare.signal(run))))
 
     def grid(self) -> FloatArray:
-        return with_moments(super().grid(), self.axes, self._moments if self.dated else None)
+        return with_moments(super().grid(), self.axes, self.moments if self.dated else None)
 
     @property
     def about(self) -> type[Behaviour]:
-        return self._about
+        return self.plugged
 
     @property
     def law(self) -> str | None:
-        return self._about.law
+        return self.plugged.law
 
     def signal(self, run: FreeRun) -> FloatArray:
         """Return what it acts on: nothing, the output of the process, or what a sensor sees."""
-        if self._kind == "disturbance":
+        if self.place.startswith("disturbance:"):
             return np.zeros(len(run.runs))
         values = run.forced[:, self.output]
-        return values if self._kind == "process" else values + run.known[:, self.output]
+        return values if self.place.startswith("process:") else values + run.known[:, self.output]
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         incoming = self.signal(run)
         return Response(
-            {self.output: simulated(run, self._about, points, incoming) - incoming[:, None]},
+            {self.output: simulated(run, self.plugged, points, incoming) - incoming[:, None]},
             possible=self.possible(points),
         )
 
     def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self._about, points)
+        return possible(self.plugged, points)
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return made(self._about, point)
+        return made(self.plugged, point)
 
 
 def plugged_candidates(run: FreeRun, whitened: list[FloatArray]) -> list[Candidate]:
@@ -143,13 +187,13 @@ def plugged_candidates(run: FreeRun, whitened: list[FloatArray]) -> list[Candida
             continue
         for j in range(len(run.model.valves)):
             if "valve" in kind.places:
-                found.append(PluggedValve(run, j, kind))
+                found.append(PluggedValve.of(run, j, kind))
             if "load" in kind.places:
-                found.append(PluggedLoad(run, j, kind, everywhere))
+                found.append(PluggedLoad.of(run, j, kind, everywhere))
         for i in range(len(run.model.outputs)):
             places = [place for place in ON_OUTPUTS if place in kind.places]
             moments = surprises(run, [whitened[i]])
-            found += [PluggedOutput(run, i, place, kind, moments) for place in places]
+            found += [PluggedOutput.of(run, i, place, kind, moments) for place in places]
     return [candidate for candidate in found if candidate.axes and _has_a_point(candidate)]
 
 

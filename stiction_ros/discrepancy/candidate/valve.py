@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 
@@ -30,22 +32,34 @@ LEAST_TRAVEL = 0.1  # of the span of OP
 _NEGLIGIBLE = 1e-9
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class ValveCandidate(Candidate):
     """A behaviour at the end of a valve's chain.
 
     Its stems start at rest at the first OP; stiction, backlash and a lag have one more figure,
     where the stem stood then.
+
+    Attributes:
+        valve: its index.
+        kind: the behaviour.
     """
 
-    def __init__(
-        self, run: FreeRun, valve: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
-    ) -> None:
-        """Take the valve's index, the behaviour and the figures that are searched."""
-        self.valve, self.kind, self.axes = valve, kind, axes
-        self.place = f"valve:{run.model.valves[valve].name}"
-        self.effect = kind.effect
-        self.twins = ()
-        self.needle = kind is HeStiction
+    valve: int
+    kind: type[GridBehaviour]
+
+    @classmethod
+    def at(
+        cls, run: FreeRun, valve: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
+    ) -> Self:
+        """Return the candidate at a valve by its index, with the figures that are searched."""
+        return cls(
+            place=f"valve:{run.model.valves[valve].name}",
+            effect=kind.effect,
+            axes=axes,
+            needle=kind is HeStiction,
+            valve=valve,
+            kind=kind,
+        )
 
     @property
     def law(self) -> str | None:
@@ -221,22 +235,24 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         Axis(0.0, 1.0, 9, natural=True),
     )
     return [
-        StictionCandidate(run, j, HeStiction, fine),
-        StictionCandidate(run, j, XchStiction, (*rough, start)),
-        BacklashCandidate(
+        StictionCandidate.at(run, j, HeStiction, fine),
+        StictionCandidate.at(run, j, XchStiction, (*rough, start)),
+        BacklashCandidate.at(
             run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True), start)
         ),
-        ValveCandidate(
+        ValveCandidate.at(
             run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
         ),
-        LagCandidate(run, j, Lag, (lag_axis(run), Axis(-2.0 * span, 2.0 * span, 1, linear=True))),
-        SaturationCandidate(
+        LagCandidate.at(
+            run, j, Lag, (lag_axis(run), Axis(-2.0 * span, 2.0 * span, 1, linear=True))
+        ),
+        SaturationCandidate.at(
             run,
             j,
             Saturation,
             (Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)),
         ),
-        ValveCandidate(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
+        ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
     ]
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Self
+
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
@@ -27,74 +30,81 @@ _AT_SENSOR = {"step": "bias_step", "drift": "drift"}
 _IN_VALVE = {"step": "offset"}
 
 
-class DisturbanceCandidate(Candidate):
-    """A wave that is added to one output."""
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class WaveCandidate(Candidate):
+    """A wave that enters somewhere.
 
-    def __init__(self, run: FreeRun, output: int, wave: Wave) -> None:
-        """Take the output's index and the shape."""
-        self.output, self.wave = output, wave
-        tag = run.model.outputs[output]
-        self.place, self.effect = f"disturbance:{tag}", wave.effect
-        self.axes, self.factors, self.dated = wave.axes, wave.factors, wave.dated
-        self.sharp = isinstance(wave, ShapedWave)
-        self.twins = ()
-        if wave.effect in _AT_SENSOR:
-            self.twins = ((f"sensor:{tag}", _AT_SENSOR[wave.effect]),)
+    Attributes:
+        wave: its shape.
+        index: of the output that it is added to, or of the valve beside which it enters.
+    """
+
+    wave: Wave
+    index: int
+
+    @classmethod
+    def of(cls, place: str, index: int, wave: Wave, twins: tuple[tuple[str, str], ...]) -> Self:
+        """Return the candidate of a shape at a place, and what is not told from it."""
+        return cls(
+            place=place,
+            effect=wave.effect,
+            axes=wave.axes,
+            factors=wave.factors,
+            twins=twins,
+            dated=wave.dated,
+            sharp=isinstance(wave, ShapedWave),
+            wave=wave,
+            index=index,
+        )
 
     def grid(self) -> FloatArray:
         return self.wave.grid()
 
-    def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        return Response({}, {self.output: self.wave.columns(run, points)})
-
     def reference(self, seen: Seen) -> tuple[float, ...]:
-        return _reference(self.wave, seen)
+        """Return figures of engineering size: ten periods, or the middle of the records."""
+        if isinstance(self.wave, SineWave | ShapedWave):
+            return (10.0 / len(seen.values),)
+        return about(self.effect).reference(seen)
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
         return self.wave.behaviour(point, factors)
 
 
-def _reference(wave: Wave, seen: Seen) -> tuple[float, ...]:
-    """Return figures of engineering size: ten periods, or the middle of the records."""
-    if isinstance(wave, SineWave | ShapedWave):
-        return (10.0 / len(seen.values),)
-    return about(wave.effect).reference(seen)
+class DisturbanceCandidate(WaveCandidate):
+    """A wave that is added to one output."""
+
+    @classmethod
+    def on(cls, run: FreeRun, output: int, wave: Wave) -> Self:
+        """Return the candidate of an output by its index."""
+        tag, same = run.model.outputs[output], _AT_SENSOR.get(wave.effect)
+        return cls.of(
+            f"disturbance:{tag}", output, wave, ((f"sensor:{tag}", same),) if same else ()
+        )
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        return Response({}, {self.index: self.wave.columns(run, points)})
 
 
-class LoadCandidate(Candidate):
+class LoadCandidate(WaveCandidate):
     """A wave that enters the process beside the stem of one valve, % of travel."""
 
-    def __init__(self, run: FreeRun, valve: int, wave: Wave) -> None:
-        """Take the valve's index and the shape."""
-        self.valve, self.wave = valve, wave
-        tag = run.model.valves[valve].name
-        self.place, self.effect = f"load:{tag}", wave.effect
-        self.axes, self.factors, self.dated = wave.axes, wave.factors, wave.dated
-        self.sharp = isinstance(wave, ShapedWave)
-        self.twins = ()
-        if wave.effect in _IN_VALVE:
-            self.twins = ((f"valve:{tag}", _IN_VALVE[wave.effect]),)
-
-    def grid(self) -> FloatArray:
-        return self.wave.grid()
+    @classmethod
+    def beside(cls, run: FreeRun, valve: int, wave: Wave) -> Self:
+        """Return the candidate of a valve by its index."""
+        tag, same = run.model.valves[valve].name, _IN_VALVE.get(wave.effect)
+        return cls.of(f"load:{tag}", valve, wave, ((f"valve:{tag}", same),) if same else ())
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         waves = self.wave.columns(run, points)
         count, size, factors = waves.shape
-        entering = run.stems[:, self.valve, None] + SMALL * waves.reshape(count, -1)
+        entering = run.stems[:, self.index, None] + SMALL * waves.reshape(count, -1)
         sizes = {}
         for i in range(run.forced.shape[1]):
-            if run.responses.reaches(i, self.valve):
-                moved = run.drive(i, self.valve, entering)
+            if run.responses.reaches(i, self.index):
+                moved = run.drive(i, self.index, entering)
                 moved -= run.forced[:, i : i + 1]
                 sizes[i] = (moved / SMALL).reshape(count, size, factors)
         return Response({}, sizes)
-
-    def reference(self, seen: Seen) -> tuple[float, ...]:
-        return _reference(self.wave, seen)
-
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return self.wave.behaviour(point, factors)
 
 
 def disturbance_candidates(
@@ -116,7 +126,7 @@ def disturbance_candidates(
     for i in range(gap.shape[1]):
         moments = surprises(run, [whitened[i]])
         lines = spectral_lines([gap[part, i], whitened[i][part]], lowest)
-        found += [DisturbanceCandidate(run, i, wave) for wave in _waves(run, moments, lines)]
+        found += [DisturbanceCandidate.on(run, i, wave) for wave in _waves(run, moments, lines)]
     for j in range(len(run.model.valves)):
         reached = [i for i in range(gap.shape[1]) if run.responses.reaches(i, j)]
         if not reached:
@@ -124,47 +134,43 @@ def disturbance_candidates(
         moments = surprises(run, [whitened[i] for i in reached])
         values = [each for i in reached for each in (gap[part, i], whitened[i][part])]
         waves = _waves(run, moments, spectral_lines(values, lowest))
-        found += _told_apart(run, [LoadCandidate(run, j, wave) for wave in waves], found)
+        for load in (LoadCandidate.beside(run, j, wave) for wave in waves):
+            same = _not_told(run, load, found)
+            if same is None:
+                found.append(load)
+            else:
+                found[same] = found[same].or_else(*load.key)
     return found
 
 
 def _waves(run: FreeRun, moments: FloatArray, lines: FloatArray) -> list[Wave]:
     return [
-        StepWave(run, moments),
+        StepWave.of(run, moments),
         DriftWave(),
-        SineWave(run, lines),
-        ShapedWave(run, lines, SquareDisturbance),
-        ShapedWave(run, lines, TriangleDisturbance),
+        SineWave.of(run, lines),
+        ShapedWave.of(run, lines, SquareDisturbance),
+        ShapedWave.of(run, lines, TriangleDisturbance),
     ]
 
 
-def _told_apart(
-    run: FreeRun, loads: list[LoadCandidate], disturbances: list[Candidate]
-) -> list[Candidate]:
-    """Return the loads that some record tells from a disturbance; the others become twins."""
-    kept: list[Candidate] = []
-    for load in loads:
-        point = load.values(load.grid()[:1])
-        response = load.respond(run, point)
-        same = None
-        if load.effect in ("drift", "sine") and len(response.outputs) == 1:
-            (output,) = response.outputs
-            same = next(
-                each
-                for each in disturbances
-                if isinstance(each, DisturbanceCandidate)
-                and (each.output, each.effect) == (output, load.effect)
-            )
-            wave = same.wave.columns(run, point)[:, 0]
-            basis = projector(np.hstack([wave, run.free[output]]))
-            left = left_by(basis, response.sizes[output][:, 0])
-            if float(np.sum(left**2)) > SAME**2 * float(np.sum(response.sizes[output] ** 2)):
-                same = None
-        if same is None:
-            kept.append(load)
-        else:
-            same.twins = (*same.twins, load.key)
-    return kept
+def _not_told(run: FreeRun, load: LoadCandidate, found: list[Candidate]) -> int | None:
+    """Return the place of the disturbance that no record tells from a load; None if all do."""
+    point = load.values(load.grid()[:1])
+    response = load.respond(run, point)
+    if load.effect not in ("drift", "sine") or len(response.outputs) != 1:
+        return None
+    (output,) = response.outputs
+    place, same = next(
+        (k, each)
+        for k, each in enumerate(found)
+        if isinstance(each, DisturbanceCandidate)
+        and (each.index, each.effect) == (output, load.effect)
+    )
+    wave = same.wave.columns(run, point)[:, 0]
+    basis = projector(np.hstack([wave, run.free[output]]))
+    left = left_by(basis, response.sizes[output][:, 0])
+    told = float(np.sum(left**2)) > SAME**2 * float(np.sum(response.sizes[output] ** 2))
+    return None if told else place
 
 
 def surprises(run: FreeRun, innovations: list[FloatArray]) -> FloatArray:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from abc import ABC, abstractmethod
+from typing import Self
 
 import numpy as np
 
@@ -27,6 +29,7 @@ PHASES = 8
 _TURN = 2.0 * math.pi
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Wave(ABC):
     """A shape in time.
 
@@ -55,21 +58,30 @@ class Wave(ABC):
         return np.zeros((1, 0))
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class StepWave(Wave):
-    """A step at one moment."""
+    """A step at one moment.
 
-    effect = "step"
-    dated = True
+    Attributes:
+        sample_time: s.
+        moments: at which PV surprises most, s.
+    """
 
-    def __init__(self, run: FreeRun, moments: FloatArray) -> None:
-        """Take moments, seconds, at which PV surprises most."""
-        self._step, last = run.runs.sample_time, float(run.runs.time.max())
-        self._moments = moments
-        self.axes = (Axis(0.02 * last, 0.98 * last, 60, natural=True),)
+    effect: str = StepDisturbance.effect
+    dated: bool = True
+    sample_time: float
+    moments: FloatArray
+
+    @classmethod
+    def of(cls, run: FreeRun, moments: FloatArray) -> Self:
+        """Return the step as it is searched in a record."""
+        last = float(run.runs.time.max())
+        axes = (Axis(0.02 * last, 0.98 * last, 60, natural=True),)
+        return cls(axes=axes, sample_time=run.runs.sample_time, moments=moments)
 
     def grid(self) -> FloatArray:
         axis = self.axes[0]
-        moments = np.clip(self._moments, axis.low, axis.high)
+        moments = np.clip(self.moments, axis.low, axis.high)
         return np.unique(np.concatenate([axis.grid(), moments]))[:, None]
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
@@ -77,14 +89,15 @@ class StepWave(Wave):
         return late.astype(float)[:, :, None]
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
-        onset = float(np.ceil(point[0] / self._step - 1e-9)) * self._step
+        onset = float(np.ceil(point[0] / self.sample_time - 1e-9)) * self.sample_time
         return StepDisturbance(onset, float(factors[0]))
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class DriftWave(Wave):
     """A ramp from the first sample on."""
 
-    effect = "drift"
+    effect: str = DriftDisturbance.effect
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
         return run.runs.time[:, None, None]
@@ -93,67 +106,115 @@ class DriftWave(Wave):
         return DriftDisturbance(float(factors[0]))
 
 
-class SineWave(Wave):
-    """A sine, searched near the lines of the gap's own spectrum."""
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class LineWave(Wave):
+    """A wave that is searched near the lines of the gap's own spectrum.
 
-    effect = "sine"
-    factors = 2
+    Attributes:
+        sample_time: s.
+        length: of the longest record, samples.
+        lines: of the gap, cycles per sample.
+    """
 
-    def __init__(self, run: FreeRun, lines: FloatArray) -> None:
-        """Take cycles per sample at which the gap has lines."""
-        rows = run.runs.longest
-        self._bin = 1.0 / (rows.stop - rows.start)
-        self._step, self._lines = run.runs.sample_time, lines
-        self.axes = (_frequencies(self._bin),)
+    sample_time: float
+    length: int
+    lines: FloatArray
+
+    @property
+    def width(self) -> float:
+        """Width of a line, cycles per sample."""
+        return 1.0 / self.length
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class SineWave(LineWave):
+    """A sine."""
+
+    effect: str = SineDisturbance.effect
+    factors: int = 2
+
+    @classmethod
+    def of(cls, run: FreeRun, lines: FloatArray) -> Self:
+        """Return the sine as it is searched in a record."""
+        length = length_of(run)
+        return cls(
+            axes=(_frequencies(1.0 / length),),
+            sample_time=run.runs.sample_time,
+            length=length,
+            lines=lines,
+        )
 
     def grid(self) -> FloatArray:
-        return _near(self._lines, self._bin)[:, None]
+        return _near(self.lines, self.width)[:, None]
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
-        angle = _TURN * (run.runs.time[:, None] / self._step) * points[:, 0]
+        angle = _TURN * (run.runs.time[:, None] / self.sample_time) * points[:, 0]
         return np.stack([np.sin(angle), np.cos(angle)], axis=2)
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         phase = float(np.arctan2(factors[1], factors[0]))
-        return SineDisturbance(float(np.hypot(*factors)), self._step / float(point[0]), phase)
+        return SineDisturbance(float(np.hypot(*factors)), self.sample_time / float(point[0]), phase)
 
 
-class ShapedWave(Wave):
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class ShapedWave(LineWave):
     """A square or a triangle, by its frequency and where in its cycle it is amid the record.
 
     Where it begins would follow its frequency: what is searched apart has to be told apart.
+
+    Attributes:
+        kind: the behaviour.
     """
 
-    def __init__(
-        self,
+    kind: type[SquareDisturbance | TriangleDisturbance]
+
+    @classmethod
+    def of(
+        cls,
         run: FreeRun,
         lines: FloatArray,
         kind: type[SquareDisturbance | TriangleDisturbance],
-    ) -> None:
-        """Take cycles per sample at which the gap has lines, and the behaviour."""
-        rows = run.runs.longest
-        self._bin = 1.0 / (rows.stop - rows.start)
-        self._step, self._lines, self._kind = run.runs.sample_time, lines, kind
-        self._middle = 0.5 * (rows.stop - rows.start)
-        self.effect = kind.effect
-        self.axes = (_frequencies(self._bin, SHAPED), Axis(-0.5, 1.0, 3 * PHASES + 1, natural=True))
+    ) -> Self:
+        """Return the wave as it is searched in a record."""
+        length = length_of(run)
+        phases = Axis(-0.5, 1.0, 3 * PHASES + 1, natural=True)
+        return cls(
+            effect=kind.effect,
+            axes=(_frequencies(1.0 / length, SHAPED), phases),
+            sample_time=run.runs.sample_time,
+            length=length,
+            lines=lines,
+            kind=kind,
+        )
+
+    @property
+    def middle(self) -> float:
+        """The middle of the record, samples."""
+        return 0.5 * self.length
 
     def grid(self) -> FloatArray:
         """Return half a turn of phases: a negative amplitude is the other half."""
-        lines, phases = _near(self._lines, self._bin, SHAPED), np.arange(PHASES) / (2.0 * PHASES)
+        lines, phases = _near(self.lines, self.width, SHAPED), np.arange(PHASES) / (2.0 * PHASES)
         meshed = np.meshgrid(lines, phases, indexing="ij")
         return np.stack([each.ravel() for each in meshed], axis=1)
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
-        turns = (run.runs.time[:, None] / self._step - self._middle) * points[:, 0] + points[:, 1]
-        return self._kind.wave(_TURN * turns)[:, :, None]
+        at = run.runs.time[:, None] / self.sample_time - self.middle
+        turns = at * points[:, 0] + points[:, 1]
+        return self.kind.wave(_TURN * turns)[:, :, None]
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         size = float(factors[0])
-        begun = float(point[1] - self._middle * point[0])
+        begun = float(point[1] - self.middle * point[0])
         phase = _TURN * (begun + (0.5 if size < 0.0 else 0.0))
         turned = math.remainder(phase, _TURN)
-        return self._kind(abs(size), self._step / float(point[0]), turned)
+        return self.kind(abs(size), self.sample_time / float(point[0]), turned)
+
+
+def length_of(run: FreeRun) -> int:
+    """Return the samples of the longest record."""
+    rows = run.runs.longest
+    return int(rows.stop - rows.start)
 
 
 def _frequencies(width: float, fastest: float = FASTEST) -> Axis:

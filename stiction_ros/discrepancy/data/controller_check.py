@@ -8,13 +8,17 @@ import math
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.gate import DataFinding
+from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP: what rounding of the signals may leave
+MANY = 0.2  # of the samples: where OP moves less often, its rounding stays what it is
+NEARLY_ALL = 0.9  # of the samples: where OP rests more often, no scan lies between them
+HALF = 0.5  # of a sample, for which an OP between two samples is held
+NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
 MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
 
 
@@ -47,6 +51,32 @@ class ControllerCheck:
     finding: DataFinding | None
     left: float
     clock_known: bool
+
+
+def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[float, ...]:
+    """Return per valve the variance of what may act beside the recorded OP, %².
+
+    A rounded OP is off by up to half a step; where it moves at many samples, by another amount
+    at each. A controller that scans again between two samples holds another OP for half of
+    them, which lies off the mean of its neighbours as far as a recorded one does off that of its
+    own; that is asked only where no PI law gives the recorded OP.
+
+    Args:
+        runs: the records.
+        check: of the controller.
+    """
+    asked = check.status is not ControllerStatus.NOT_ASKED and check.left > EXACT
+    found = []
+    for op in runs.op.T:
+        moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
+        often = float(np.mean(moves != 0.0))
+        variance = quantum_of(op) ** 2 / 12.0 if often > MANY else 0.0
+        if asked and often > NEARLY_ALL:
+            bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
+            spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
+            variance += (HALF * spread) ** 2
+        found.append(variance)
+    return tuple(found)
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:

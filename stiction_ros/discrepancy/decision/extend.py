@@ -153,10 +153,11 @@ def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]
 def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> AddedEffect:
     """Return effect k fitted again behind all others."""
     base = base_beside(bare, runs, effects[:k] + effects[k + 1 :])
-    candidate = same_candidate(all_candidates(base), effects[k].fit.candidate)
-    if candidate is None:
+    own = effects[k].fit.candidate
+    found = same_candidate(all_candidates(base), own)
+    if found is None:
         return effects[k]
-    candidate.twins = effects[k].fit.candidate.twins
+    candidate = dataclasses.replace(found, twins=own.twins)
     point = effects[k].fit.point
     fit = fit_candidate(base, base.run.gap, candidate, point if len(point) else None)
     behaviour = fit.behaviour(base.run)
@@ -165,12 +166,8 @@ def _refit(bare: LoopModel, runs: Runs, effects: list[AddedEffect], k: int) -> A
 
 
 def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candidate | None:
-    """Return the candidate of the same place, effect and behaviour; None when there is none."""
-    for candidate in candidates:
-        alike = candidate.key == wanted.key
-        if alike and getattr(candidate, "kind", None) is getattr(wanted, "kind", None):
-            return candidate
-    return None
+    """Return the candidate of the same identity; None when there is none."""
+    return next((each for each in candidates if each.identity == wanted.identity), None)
 
 
 def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:

@@ -15,8 +15,9 @@ from stiction_ros.discrepancy.candidate.valve import valve_candidates
 from stiction_ros.discrepancy.candidate.wave import disturbance_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects import ExtraDelay, FloatArray, TimeShift
 
+DATA = "data"  # the place of what is wrong with a record
 Progress = Callable[[float], None]
 
 
@@ -56,9 +57,10 @@ def all_candidates(base: Baseline, clock_known: bool = False) -> tuple[Candidate
     found += disturbance_candidates(base.run, gap, whitened)
     found += plugged_candidates(base.run, whitened)
     if not clock_known:
-        for candidate in found:
-            if candidate.effect == "delay":
-                candidate.twins = (*candidate.twins, ("data", "time_shift"))
+        found = [
+            each.or_else(DATA, TimeShift.effect) if each.effect == ExtraDelay.effect else each
+            for each in found
+        ]
     return tuple(found + decoys(base.run))
 
 

@@ -8,7 +8,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, rounded
 from stiction_ros.discrepancy.likelihood.grouped import best_noise
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
@@ -18,6 +17,7 @@ from stiction_ros.discrepancy.likelihood.noise import (
     projector,
     whitened_columns,
 )
+from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
 
@@ -74,11 +74,10 @@ class Baseline:
         gap = run.gap if gap is None else gap
         shared = tuple(run.free if columns is None else columns)
         blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
+        seen = seen_noise(run.model, run.runs.lattices, run.runs.unseen)
         declared = tuple(
-            () if noise is None or thinned else (rounded(noise, quantum).ar,)
-            for noise, thinned, quantum in zip(
-                declared_noise(run.model), run.runs.thinned, run.runs.lattices, strict=True
-            )
+            () if thinned else tuple(noise.ar for noise in forms)
+            for forms, thinned in zip(seen, run.runs.thinned, strict=True)
         )
         forms = [
             noise_forms(gap[:, i], shared[i], blocks[i], _FIRST_GUESSES, declared[i])

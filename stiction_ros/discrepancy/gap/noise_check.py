@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise, rounded
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
 LAGS = 20
@@ -46,14 +47,16 @@ class OutputNoise:
 def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
     """Return declared and found noise of every output under a model."""
     found = []
+    runs = base.run.runs
+    seen = seen_noise(base.run.model, runs.lattices, runs.unseen)
     for i, (name, declared) in enumerate(
         zip(base.run.model.outputs, declared_noise(base.run.model), strict=True)
     ):
-        fit, quantum = base.noise[i], base.run.runs.quanta[i]
+        fit, quantum = base.noise[i], runs.quanta[i]
         if declared is None:
             found.append(OutputNoise(name, math.nan, fit.innovation_std, False, 0))
             continue
-        shown = rounded(declared, base.run.runs.lattices[i])
+        shown = max(seen[i], key=lambda form: form.std)
         expected = math.sqrt(shown.std**2 + (0.0 if len(shown.ar) else quantum**2 / 12.0))
         larger = fit.innovation_std > LARGER * expected
         memory = _memory(base, i) if fit.enlarged else 0

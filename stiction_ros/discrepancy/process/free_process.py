@@ -212,5 +212,7 @@ def _other_dynamics(base: Baseline) -> list[CandidateFit]:
         gain, fitted = max(rivals, key=lambda each: each[0])
         held = now.held_minus_two_log - fitted.noise.held_minus_two_log
         none = np.zeros(0)
-        found.append(CandidateFit(Dynamics(base.run, i), none, none, {i: fitted.noise}, gain, held))
+        found.append(
+            CandidateFit(Dynamics.of(base.run, i), none, none, {i: fitted.noise}, gain, held)
+        )
     return found

@@ -36,6 +36,8 @@ class Runs:
         lattices: per output the distance of PV's values, however fine; 0 where there is none.
         thinned: per output whether values were held or interpolated, so that their noise is
             no longer that of the loop.
+        unseen: per valve the variance of what may act beside the recorded OP, %²; empty where
+            nothing does.
     """
 
     records: tuple[Record, ...]
@@ -47,6 +49,7 @@ class Runs:
     quanta: tuple[float, ...]
     thinned: tuple[bool, ...]
     lattices: tuple[float, ...]
+    unseen: tuple[float, ...] = ()
 
     @property
     def sample_time(self) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from gap_loops import loop, record
@@ -10,12 +12,14 @@ from hypothesis import strategies as st
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.decision.scores import all_candidates
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
-from stiction_ros.effects import Axis, Backlash
+from stiction_ros.effects import Axis, Backlash, Slew
 
 AXES = (Axis(0.1, 20.0, 24, logarithmic=True), Axis(-1.0, 1.0, 5))
 RUN = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=200)])[0])
-CANDIDATE = ValveCandidate(RUN, 0, Backlash, AXES)
+CANDIDATE = ValveCandidate.at(RUN, 0, Backlash, AXES)
 
 
 @given(st.floats(0.1, 20.0), st.floats(-1.0, 1.0))
@@ -46,7 +50,19 @@ def test_of_equally_good_points_the_first_of_the_grid_is_taken() -> None:
     assert CANDIDATE.apart(grid, np.zeros(len(grid)), 3) == [0, 2, 4]
 
 
-def test_a_candidate_stands_for_its_twins_too() -> None:
-    candidate = ValveCandidate(RUN, 0, Backlash, AXES)
-    candidate.twins = (("process:PV1", "pole"),)
+def test_a_candidate_stands_for_what_is_not_told_from_it_too() -> None:
+    candidate = CANDIDATE.or_else("process:PV1", "pole")
     assert candidate.keys == (("valve:V1", "backlash"), ("process:PV1", "pole"))
+    assert CANDIDATE.keys == (("valve:V1", "backlash"),)
+
+
+def test_candidates_are_values_with_an_identity() -> None:
+    for candidate in all_candidates(Baseline.of(RUN)):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            candidate.twins = ()  # type: ignore[misc]
+    beside = RUN.model.with_effect("valve:V1", Slew(2.0))
+    run = FreeRun(beside, RUN.runs)
+    now, then = all_candidates(Baseline.of(RUN)), all_candidates(Baseline.of(run))
+    names = [each.identity for each in now]
+    assert len(set(names)) == len(names)
+    assert {each.identity for each in then} == set(names)

@@ -91,3 +91,16 @@ def test_a_tuning_is_another_one_by_a_size_that_matters(factor: float, other: bo
     check = check_controller(scaled, again)
     assert (check.finding is not None) is other
     assert check.status is (ControllerStatus.OTHER if other else ControllerStatus.SAME)
+
+
+def test_a_gain_that_a_curve_explains_as_well_is_no_correction_of_the_model() -> None:
+    answer = answered(838)  # a quadratic characteristic of which the set-points see the slope
+    assert answer.verdict is GapVerdict.AMBIGUOUS
+    assert {("process:PV1", "gain"), ("valve:V1", "characteristic")} <= set(answer.alternatives)
+    assert answer.process_changes == ()
+
+
+def test_a_rounded_op_in_a_healthy_loop_is_no_coloured_noise() -> None:
+    answer = answered(875)
+    assert answer.verdict is GapVerdict.NONE
+    assert names(answer) == []

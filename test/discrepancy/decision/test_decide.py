@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
@@ -16,12 +18,6 @@ MARGIN = 10.0
 class Named(Candidate):
     """A candidate that is only a name."""
 
-    axes = (Axis(0.0, 10.0, 5),)
-
-    def __init__(self, place: str, effect: str, inside: bool = True) -> None:
-        self.place, self.effect, self.inside = place, effect, inside
-        self.twins = (("sensor:PV1", "bias_step"),) if effect == "step" else ()
-
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         raise NotImplementedError
 
@@ -33,7 +29,9 @@ def fit(
     place: str, effect: str, delta_bic: float, held: float = 5.0, inside: bool = True
 ) -> CandidateFit:
     factors = np.array([0.5])
-    candidate = Named(place, effect, inside)
+    twins = (("sensor:PV1", "bias_step"),) if effect == "step" else ()
+    axes = (Axis(0.0, 10.0, 5),)
+    candidate = Named(place=place, effect=effect, axes=axes, twins=twins, inside=inside)
     return CandidateFit(candidate, np.array([3.0]), factors, {}, delta_bic, held)
 
 
@@ -123,7 +121,9 @@ def test_weak_friction_names_the_family() -> None:
 def test_a_step_is_looked_at_before_a_change_that_contains_it() -> None:
     step = fit("disturbance:PV1", "step", 80.0)
     change = fit("process:PV1", "gain that changes", 90.0, inside=False)
-    change.candidate.contains = (("disturbance:PV1", "step"),)
+    steps = (("disturbance:PV1", "step"),)
+    other = dataclasses.replace(change.candidate, contains=steps)
+    change = dataclasses.replace(change, candidate=other)
     answer = said(step, change)
     assert answer.chosen is step
 

@@ -1,0 +1,72 @@
+"""The first step: the data are judged, and the model is driven by the recorded OP."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
+from stiction_ros.discrepancy.data.effects import add_data_effects, corrected
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.data.long_records import liveliest_parts
+from stiction_ros.discrepancy.decision.scores import Progress
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.process.refit import (
+    longest_delay,
+    refit_process,
+    with_common_rows,
+    without_noise,
+)
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+
+def begin(
+    model: LoopModel,
+    records: Sequence[Record],
+    options: GapOptions,
+    progress: Progress | None,
+) -> tuple[Task, State]:
+    """Return what the other steps are given, and what is believed before the first look.
+
+    Args:
+        model: the loop as it is simulated now.
+        records: of this loop.
+        options: of the run.
+        progress: called with the share done; None for nobody.
+
+    Raises:
+        InputError: records that do not fit the model, or a model whose free run grows
+            without bound.
+    """
+    begun = time.perf_counter()
+    runs, gate = open_gate(model, liveliest_parts(records) if options.free_process else records)
+    controller = check_controller(model, runs)
+    found = controller.finding
+    data = (*((found,) if found else ()), *gate.findings)
+    runs = dataclasses.replace(corrected(runs, found), unseen=unseen_of(runs, controller))
+    bare, longest = add_data_effects(model, data), 0
+    if options.free_process:
+        longest = longest_delay(model)
+        runs = with_common_rows(runs, model)
+        bare = refit_process(without_noise(bare), runs, longest)
+    task = Task(
+        model=model,
+        options=options,
+        gate=gate,
+        controller=controller,
+        data=data,
+        runs=runs,
+        longest=longest,
+        random=np.random.default_rng(options.seed),
+        report=progress or (lambda share: None),
+        begun=begun,
+    )
+    base = Baseline.of(FreeRun(bare if options.free_process else model, runs))
+    return task, State(given=bare, bare=bare, before=base, base=base)

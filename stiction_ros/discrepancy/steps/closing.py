@@ -1,0 +1,250 @@
+"""After the looks: what may be said of what was found, and the answer as it is handed over."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from stiction_ros.discrepancy.answer.found_effects import (
+    FoundEffect,
+    holds_nothing_out,
+    moved_by,
+    of_data,
+    of_noise,
+    own_closed,
+    units_of,
+)
+from stiction_ros.discrepancy.answer.results import Discrepancy
+from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
+from stiction_ros.discrepancy.answer.stem_words import look_at_stems
+from stiction_ros.discrepancy.candidate.base import figures_of
+from stiction_ros.discrepancy.decision.decide import GapVerdict
+from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.uncertainty import (
+    Intervals,
+    bootstrap_intervals,
+    likelihood_intervals,
+)
+from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
+from stiction_ros.discrepancy.gap.noise_check import OutputNoise, check_noise, noise_sentences
+from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.process.free_intervals import with_free_process
+from stiction_ros.discrepancy.process.refit import with_noise_of
+from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.effects import from_mapping
+
+BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
+A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
+SOME_STEPS = 3.0  # of the rounding
+CLOSES = 0.2  # of the excess of the free run that an effect has to close by itself
+
+
+def closing(task: Task, looked: State) -> Discrepancy:
+    """Return the answer: what holds as a name, and everything that belongs to it.
+
+    Args:
+        task: what the run was given.
+        looked: what is believed after the last step.
+    """
+    state, found = _named(task, looked)
+    before, after = measure_gap(state.before), measure_gap(state.base)
+    louder = _louder(task, state)
+    effects = [*(of_data(finding) for finding in task.data), *found, *louder]
+    verdict, alternatives = overall(effects, state.looks, state.testable)
+    model = state.bare
+    for shown, added in zip(found, state.added, strict=True):
+        model = model.with_effect(added.place, added.behaviour, **_provenance(task, shown))
+    for noise in louder:
+        behaviour = from_mapping({"effect": noise.effect} | dict(noise.parameters))
+        model = model.with_effect(noise.place, behaviour, **_provenance(task, noise))
+    if task.options.free_process:
+        model = with_noise_of(model, task.model)
+    noises = check_noise(state.base)
+    kept = {e.fit.candidate.key for e in state.added}
+    no_names = [
+        called(*e.fit.candidate.key) for e in looked.added if e.fit.candidate.key not in kept
+    ]
+    if verdict is GapVerdict.UNKNOWN and state.changes and _mended(state):
+        verdict = effects[0].verdict if effects else GapVerdict.NONE
+    silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
+    if silent and (no_names or _noise_left(task, state, noises)):
+        verdict = GapVerdict.UNKNOWN
+    named = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
+    named |= set(alternatives)
+    task.report(1.0)
+    return Discrepancy(
+        verdict=verdict,
+        effects=tuple(effects),
+        alternatives=alternatives,
+        experiment=experiment_for(verdict, effects, alternatives, state.testable),
+        where=_where(task, state, no_names, verdict),
+        untestable=tuple(
+            t for t in state.testable if not t.testable and (t.place, t.effect) not in named
+        ),
+        noise=noises,
+        process_changes=state.changes,
+        before=before,
+        after=after,
+        closed=closed_share(before, after) if state.added or state.changes else 0.0,
+        model_before=task.model,
+        model_after=model,
+        looks=state.looks,
+        gate=task.gate,
+        controller=task.controller,
+        runs=task.runs,
+        base_before=state.before,
+        base_after=state.base,
+        seconds=time.perf_counter() - task.begun,
+        notes=(*task.gate.notes, *(n for r in task.runs.records for n in r.notes)),
+    )
+
+
+def _where(task: Task, state: State, no_names: list[str], verdict: GapVerdict) -> tuple[str, ...]:
+    """Return the sentences that say where the gap is, the stem's first.
+
+    Where nothing is missed there is no such place; the noise may still be another than declared.
+    """
+    found: list[str] = []
+    if verdict is not GapVerdict.NONE:
+        found += [stem.sentence for stem in look_at_stems(state.before.run)]
+        found += [sentence for look in state.looks[:1] for sentence in look.where.sentences]
+    found += noise_sentences(check_noise(state.before), task.runs.sample_time)
+    last = state.looks[-1].decision
+    if last.verdict is GapVerdict.UNKNOWN:
+        found.append(last.reason)
+    found += [f"{each} would fit, but its figures hold nothing out" for each in no_names]
+    return tuple(found)
+
+
+def _named(task: Task, state: State) -> tuple[State, list[FoundEffect]]:
+    """Return what is left when effects that are no names are gone, and the names."""
+    while True:
+        found = [_effect(task, state, k, effect) for k, effect in enumerate(state.added)]
+        no_name = [
+            k
+            for k, (shown, effect) in enumerate(zip(found, state.added, strict=True))
+            if holds_nothing_out(effect, state.base, shown.intervals) or shown.closed < CLOSES
+        ]
+        if not no_name:
+            return state, found
+        state = state.with_added(task.runs, state.others(no_name[-1]))
+
+
+def _effect(task: Task, state: State, k: int, effect: AddedEffect) -> FoundEffect:
+    without = state.beside(task.runs, k)
+    return FoundEffect(
+        effect.place,
+        effect.effect,
+        effect.behaviour.law,
+        figures_of(effect.behaviour),
+        units_of(effect.behaviour, effect.place),
+        _intervals(task, state, k, effect, without),
+        state.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
+        own_closed(without, state.base),
+        GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
+        effect.alternatives,
+        reason_for(effect, state.looks),
+        moved_by(without, state.base),
+    )
+
+
+def _intervals(task: Task, state: State, k: int, effect: AddedEffect, base: Baseline) -> Intervals:
+    if task.options.quick:
+        found = likelihood_intervals(base, effect.fit)
+    else:
+        found = bootstrap_intervals(
+            base, effect.fit, task.options.resamples, task.random, _share(task, state, k)
+        )
+    if not task.options.free_process:
+        return found
+    return with_free_process(found, base, effect.fit, task.longest)
+
+
+def _share(task: Task, state: State, k: int) -> Callable[[float], None]:
+    done = task.options.most_effects / (task.options.most_effects + 1)
+    part = (1.0 - done) / len(state.added)
+    return lambda share: task.report(done + (k + share) * part)
+
+
+def _louder(task: Task, state: State) -> list[FoundEffect]:
+    """Return the noise beyond the declared one as effects."""
+    found = []
+    for i, declared in enumerate(declared_noise(state.base.run.model)):
+        fit = state.base.noise[i]
+        if declared is None or not fit.enlarged or _slowed(state, i):
+            continue
+        if not _matters(task, state, i):
+            continue
+        beside = state.added or state.changes
+        laws = noise_effects(state.base, i, declared, A_ROW if beside else 0.0)
+        if laws and laws[0].score < fit.bic(0) + fit.held_minus_two_log - _stranger(state, laws[0]):
+            own = state.base.under_declared(i)
+            found.append(of_noise(laws, own.bic(0) + own.held_minus_two_log, task.options.margin))
+    return found
+
+
+def _slowed(state: State, output: int) -> bool:
+    """Tell whether beside an effect the declared noise is left, which may have passed its lag."""
+    fits = [effect.fit.noise for effect in state.added]
+    return any(output in noise and not noise[output].enlarged for noise in fits)
+
+
+def _stranger(state: State, law: NoiseEffect) -> float:
+    """Return what an explanation gains that has no name, or one of a set that is left in doubt.
+
+    A noise has to be worth as much to be named; what it is a name of is no rival of it.
+    """
+    last = state.looks[-1]
+    if last.decision.verdict is GapVerdict.UNKNOWN:
+        name = law.place, law.behaviour.effect
+        rivals = [f.evidence for f in last.scores.fits if name not in f.candidate.contains]
+        return max([*rivals, -NO_LAW])
+    if last.decision.chosen is not None and not last.kept:
+        return last.decision.chosen.evidence
+    return -NO_LAW
+
+
+def _mended(state: State) -> bool:
+    """Tell whether the changed process took most of what was left without a name."""
+    gained = state.before.bic - state.base.bic + state.base.held_gain(state.before)
+    return max(fit.evidence for fit in state.looks[-1].scores.fits) < LEFT * gained
+
+
+def _noise_left(task: Task, state: State, noises: tuple[OutputNoise, ...]) -> bool:
+    """Tell whether noise is left that no law tells, and that is large enough to matter."""
+    return any(
+        each.memory and (not state.changes or _matters(task, state, i))
+        for i, each in enumerate(noises)
+    )
+
+
+def _matters(task: Task, state: State, output: int) -> bool:
+    """Tell whether what is left of an output is large enough to be an effect.
+
+    A model of the field is never exact: beside a large effect it leaves a little of its own.
+    Rounding of a slow signal is no white noise: what is left has to span some steps.
+    """
+    rows = state.base.blocks[output].train
+    before, after = (
+        float(np.std(base.noise[output].residual[rows])) for base in (state.before, state.base)
+    )
+    if after < SOME_STEPS * task.runs.quanta[output]:
+        return False
+    return not (state.added or state.changes) or after > BESIDE * before
+
+
+def _provenance(task: Task, effect: FoundEffect) -> dict[str, object]:
+    return {
+        "what": effect.effect,
+        "at": effect.place,
+        "by": "stiction gap",
+        "records": [record.name for record in task.runs.records],
+        "delta_bic": round(effect.delta_bic, 2),
+        "verdict": effect.verdict.value,
+        "alternatives": [f"{place} {name}" for place, name in effect.alternatives],
+    } | ({} if math.isnan(effect.closed) else {"closed": round(effect.closed, 3)})

@@ -1,0 +1,46 @@
+"""Which friction it is, told again when everything else is in the model."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from stiction_ros.discrepancy.candidate.valve import departures
+from stiction_ros.discrepancy.decision.decide import FRICTION, friction_kind
+from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.discrepancy.decision.scores import all_candidates
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.effects import about
+
+
+def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
+    """Return what counts how often the stem of a fit leaves a rest."""
+    return lambda fit: departures(run, fit.candidate, fit.point)
+
+
+def friction_told_again(task: Task, state: State) -> State:
+    """Test for the jump of sticky valves again, with what was found later in the model."""
+    for k, effect in enumerate(state.added):
+        if about(effect.effect).family == FRICTION:
+            told = _told(task, state, k)
+            added = (*state.added[:k], told, *state.added[k + 1 :])
+            state = dataclasses.replace(state, added=added)
+    return state.with_added(task.runs, state.added)
+
+
+def _told(task: Task, state: State, k: int) -> AddedEffect:
+    """Return the k-th effect as the better of stiction and backlash behind all others."""
+    base, place = state.beside(task.runs, k), state.added[k].place
+    rivals = [
+        candidate
+        for candidate in all_candidates(base)
+        if candidate.place == place and candidate.about.family == FRICTION
+    ]
+    fits = [fit_candidate(base, base.run.gap, each) for each in rivals]
+    ranked = sorted(fits, key=lambda fit: -fit.evidence)
+    best, doubts = friction_kind(ranked[0], ranked, rests_left(base.run))
+    behaviour = best.behaviour(base.run)
+    assert behaviour is not None
+    return AddedEffect(best, behaviour, doubts)

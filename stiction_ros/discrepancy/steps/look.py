@@ -1,0 +1,165 @@
+"""One look: every candidate scored, one effect added if the scores allow a name for it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from stiction_ros.discrepancy.answer.results import Look
+from stiction_ros.discrepancy.candidate.base import Candidate
+from stiction_ros.discrepancy.decision.chance import stored_threshold
+from stiction_ros.discrepancy.decision.decide import Decision, decide
+from stiction_ros.discrepancy.decision.extend import (
+    AddedEffect,
+    Extension,
+    extend,
+    has_friction,
+    left_open,
+    moved_away,
+)
+from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
+from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
+from stiction_ros.discrepancy.decision.testable import testable_effects
+from stiction_ros.discrepancy.fit.uncertainty import chance_threshold
+from stiction_ros.discrepancy.gap.where import locate
+from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
+from stiction_ros.discrepancy.steps.friction import rests_left
+from stiction_ros.discrepancy.steps.mending import changed_again, process_first
+from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.loop import LoopModel
+
+SCORED = 0.8  # of the time of a look
+
+
+@dataclasses.dataclass(frozen=True)
+class _Scored:
+    """What the scores of a look leave.
+
+    Attributes:
+        state: where the process is free, with the one that was fitted again.
+        candidates: that were tried.
+        scores: of all of them.
+        models: where the process is free, the one behind each candidate.
+    """
+
+    state: State
+    candidates: tuple[Candidate, ...]
+    scores: Scores
+    models: Mapping[tuple[str, str], LoopModel]
+
+    def bare(self, key: tuple[str, str]) -> LoopModel:
+        """Return the model without effects that goes with a candidate."""
+        return self.models.get(key, self.state.bare)
+
+
+def look_on(task: Task, state: State) -> State:
+    """Look until nothing more is found; what takes the free run away from PV is taken back."""
+    state = dataclasses.replace(state, testable=())
+    for k in range(len(state.added), task.options.most_effects):
+        state = look(task, state, k)
+        if not state.looks[-1].kept:
+            break
+    while state.added and state.earlier and moved_away(state.before, state.base):
+        state = withdrawn(task, state)
+    return state
+
+
+def look(task: Task, state: State, k: int) -> State:
+    """Look for one effect more: the k-th, from 0."""
+    scored = _scored(task, state, k)
+    state, scores = scored.state, scored.scores
+    mended = process_first(task, state, scores)
+    if mended is not None:
+        return look(task, mended, k)
+    decision = _decided(task, state, scored)
+    step = _extended(task, state, scored, decision)
+    kept, reason = (step.kept, step.reason) if step else (False, decision.reason)
+    seen = dataclasses.replace(
+        state,
+        testable=testable_effects(scores.base, list(scored.candidates), task.options.margin),
+        looks=(*state.looks, Look(scores, decision, locate(scores.base), kept, reason)),
+    )
+    return changed_again(task, _grown(seen, scored, decision, step)) if step and kept else seen
+
+
+def withdrawn(task: Task, state: State) -> State:
+    """Take the last effect back: with it the free run is farther from PV than before."""
+    last = max(k for k, each in enumerate(state.looks) if each.kept)
+    reason = "the free run of the held-out rows moves away from PV"
+    ended = dataclasses.replace(state.looks[last], kept=False, reason=reason)
+    before = dataclasses.replace(
+        state,
+        bare=state.earlier[-1],
+        earlier=state.earlier[:-1],
+        looks=(*state.looks[:last], ended, *state.looks[last + 1 :]),
+    )
+    return before.with_added(task.runs, state.added[:-1])
+
+
+def _scored(task: Task, state: State, k: int) -> _Scored:
+    """Score every candidate against the model as it is now."""
+    free, share = task.options.free_process, 1.0 / (task.options.most_effects + 1)
+    base = state.base if free else left_open(state.base, state.added)
+    candidates = all_candidates(base, task.controller.clock_known)
+
+    def report(done: float) -> None:
+        task.report((k + SCORED * done) * share)
+
+    if not free:
+        return _Scored(state, candidates, score_candidates(base, candidates, report), {})
+    found = score_with_free_process(base, candidates, task.longest, report)
+    state = dataclasses.replace(state, base=found.scores.base)
+    if not state.added:
+        refitted = _with_process(state.bare, state.base.run.model)
+        state = dataclasses.replace(state, before=state.base, bare=refitted)
+    models = {key: _with_process(state.bare, model) for key, model in found.models.items()}
+    return _Scored(state, candidates, found.scores, models)
+
+
+def _decided(task: Task, state: State, scored: _Scored) -> Decision:
+    """Return what the scores allow to say."""
+    base, margin = scored.scores.base, task.options.margin
+    if task.options.quick:
+        chance = stored_threshold(sum(each.inside for each in scored.candidates))
+    else:
+        chance = chance_threshold(base, scored.candidates, task.random)
+    possible = not_contradicted(base.run, scored.scores.fits)
+    allowed = [fit for fit in possible if not has_friction(state.added, fit)]
+    decision = decide(allowed, margin, max(margin, chance), rests_left(base.run))
+    if task.options.free_process:
+        decision = in_doubt_of_place(base, decision)
+    return told_by_stem(base.run, decision, allowed)
+
+
+def _extended(task: Task, state: State, scored: _Scored, decision: Decision) -> Extension | None:
+    """Return the model with the chosen effect; None where none may be added."""
+    chosen = decision.chosen
+    if chosen is None or not decision.inseparable:
+        return None
+    behaviour = chosen.behaviour(state.base.run)
+    assert behaviour is not None
+    new = AddedEffect(chosen, behaviour, decision.alternatives)
+    bare = scored.bare(chosen.candidate.key)
+    return extend(bare, task.runs, state.added, new, state.base)
+
+
+def _grown(state: State, scored: _Scored, decision: Decision, step: Extension) -> State:
+    """Return the state with the effects of an extension."""
+    assert decision.chosen is not None
+    key = decision.chosen.candidate.key
+    gained = {key: decision.chosen.delta_bic} if scored.models else {}
+    return dataclasses.replace(
+        state,
+        bare=scored.bare(key),
+        base=step.base,
+        added=step.added,
+        earlier=(*state.earlier, state.bare),
+        gains={**state.gains, **gained},
+    )
+
+
+def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
+    """Return ``model`` with the process of ``other``."""
+    document = model.to_mapping()
+    document["process"] = other.to_mapping()["process"]
+    return LoopModel.from_mapping(document, model.name)

@@ -1,0 +1,90 @@
+"""What a gap run is given, and what it believes between two of its steps."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.answer.results import Look
+from stiction_ros.discrepancy.data.controller_check import ControllerCheck
+from stiction_ros.discrepancy.data.gate import DataFinding, Gate
+from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, run_with
+from stiction_ros.discrepancy.decision.scores import Progress
+from stiction_ros.discrepancy.decision.testable import Testable
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.process.change import ProcessChange
+from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.loop import LoopModel
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """What all steps of a run are given.
+
+    Attributes:
+        model: as it was given.
+        options: of the run.
+        gate, controller, data: what the data themselves show.
+        runs: the records end to end.
+        longest: delay tried where the process is free, samples; 0 where it is given.
+        random: source of the bootstraps, drawn from in the order of the steps.
+        report: called with the share done.
+        begun: of the clock, s.
+    """
+
+    model: LoopModel
+    options: GapOptions
+    gate: Gate
+    controller: ControllerCheck
+    data: tuple[DataFinding, ...]
+    runs: Runs
+    longest: int
+    random: np.random.Generator
+    report: Progress
+    begun: float
+
+
+@dataclasses.dataclass(frozen=True)
+class State:
+    """What is believed of a loop.
+
+    Attributes:
+        given: the model without any effect that was added, its process as it was given.
+        bare: the same, its process as it is taken now.
+        changes: what of the process is another than given.
+        before, base: free runs without and with what was added.
+        added: effects that are in the model, in the order in which they were found.
+        earlier: ``bare`` before each of them came, as long as they may be taken back.
+        gains: BIC by which an effect beat the model, where the process is free.
+        looks: the rounds so far.
+        opened: the first look at the process as it is now.
+        testable: what the last look could have seen.
+    """
+
+    given: LoopModel
+    bare: LoopModel
+    before: Baseline
+    base: Baseline
+    changes: tuple[ProcessChange, ...] = ()
+    added: tuple[AddedEffect, ...] = ()
+    earlier: tuple[LoopModel, ...] = ()
+    gains: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
+    looks: tuple[Look, ...] = ()
+    opened: int = 0
+    testable: tuple[Testable, ...] = ()
+
+    def others(self, k: int) -> tuple[AddedEffect, ...]:
+        """Return all added effects but one."""
+        return (*self.added[:k], *self.added[k + 1 :])
+
+    def beside(self, runs: Runs, k: int) -> Baseline:
+        """Return the baseline with all added effects but one, their linear figures left open."""
+        return base_beside(self.bare, runs, self.others(k))
+
+    def with_added(self, runs: Runs, added: Sequence[AddedEffect]) -> State:
+        """Return the same process with these effects in place of those that were added."""
+        base = Baseline.of(run_with(self.bare, runs, added))
+        return dataclasses.replace(self, added=tuple(added), base=base)

@@ -1,0 +1,86 @@
+"""Noise of an OP that is not all that acted, behind the process and beside the declared noise."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gap_loops import loop, record
+from scipy.signal import lfilter
+
+from stiction_ros.discrepancy import GapOptions, GapVerdict, find_discrepancy
+from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.likelihood.noise import whiten
+from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+
+STEP = 0.4  # %, of a coarse OP
+
+
+def rounded_op(recorded: Record, step: float = STEP) -> Record:
+    """Return a record whose OP is rounded, though the valve had it as it was."""
+    return dataclasses.replace(recorded, op=np.round(recorded.op / step) * step)
+
+
+def unseen(model: LoopModel, recorded: Record) -> tuple[float, ...]:
+    runs, _ = open_gate(model, [recorded])
+    return unseen_of(runs, check_controller(model, runs))
+
+
+def correlations(values: FloatArray) -> FloatArray:
+    return np.array([np.corrcoef(values[lag:], values[:-lag])[0, 1] for lag in range(1, 8)])
+
+
+@pytest.mark.parametrize("enters", ["measurement", "equation"])
+def test_both_noises_together_are_white_behind_their_whitening(enters: str) -> None:
+    document, size, variance = loop().to_mapping(), 0.05, 4.0
+    document["process"]["outputs"][0]["noise"] = {"std": size, "enters": enters}
+    model, random = LoopModel.from_mapping(document), np.random.default_rng(4)
+    a, b = [1.0, -1.6, 0.64], [0.0, 0.03, 0.01]
+    own, passed = size * random.normal(size=20000), random.normal(size=20000) * variance**0.5
+    noise = (own if enters == "measurement" else lfilter([1.0], a, own)) + lfilter(b, a, passed)
+    alone, beside = seen_noise(model, (0.0,), (variance,))[0]
+    left = whiten(noise, beside.ar)[50:]
+    assert np.abs(correlations(left)).max() < 0.03
+    assert left.std() == pytest.approx(beside.std, rel=0.02)
+    assert np.abs(correlations(whiten(noise, alone.ar)[50:])).max() > 0.1
+
+
+def test_what_is_not_seen_behind_the_process_is_no_form_of_its_own() -> None:
+    assert len(seen_noise(loop(), (0.0,), (1e-6,))[0]) == 1
+    assert len(seen_noise(loop(), (0.0,), ())[0]) == 1
+    assert seen_noise(loop(0.0), (0.0,), (1.0,)) == ((),)
+
+
+def test_an_op_that_is_rounded_and_moves_is_off_by_up_to_half_a_step() -> None:
+    recorded = record(loop())
+    assert unseen(loop(), recorded) == (0.0,)
+    assert unseen(loop(), rounded_op(recorded, 0.2)) == pytest.approx((0.2**2 / 12.0,))
+
+
+def test_an_op_that_is_moved_by_hand_is_what_it_is() -> None:
+    recorded = record(loop())
+    held = 50.0 + 5.0 * (np.arange(len(recorded)) // 150 % 3.0)[:, None]
+    assert unseen(loop(), dataclasses.replace(recorded, op=held, sp=None)) == (0.0,)
+
+
+def test_scans_between_samples_are_asked_where_no_law_gives_the_op() -> None:
+    recorded, random = record(loop()), np.random.default_rng(0)
+    moved = recorded.op + random.normal(scale=0.5, size=recorded.op.shape)
+    (found,) = unseen(loop(), dataclasses.replace(recorded, op=moved))
+    plain = np.diff(moved[:, 0], 2) / 2.0
+    assert 0.5 * plain.var() / 4.0 < found < 1.5 * plain.var() / 4.0
+
+
+def test_a_rounded_op_is_no_disturbance() -> None:
+    model = loop()
+    answer = find_discrepancy(
+        model, [rounded_op(record(model, samples=2000, seed=2))], GapOptions(quick=True)
+    )
+    assert answer.verdict is GapVerdict.NONE
+    assert not answer.effects
+    assert not answer.noise[0].disagrees
