@@ -167,7 +167,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
     draws = draws.taken(kept)
     assert left.measures is not None
     service = _service(loop, draws, now).beside(now, left.measures)
-    retuned = _retune(loop, draws, found).beside(now, left.measures)
+    retuned = _retune(loop, draws, found, now).beside(now, left.measures)
     options = (service, _embedding(loop, draws, found), retuned)
     told = tuple(_where_agreed(option, now) for option in options)
     return Gain(*names, now, (*told, left.beside(now, left.measures)))
@@ -200,15 +200,21 @@ def _doubt(now: Measures, runs: Sequence[Measures | None], kept: int) -> str:
 
 def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:
     if not draws.frictions.any():
-        note = "No friction was found: a service changes nothing."
-        interval = {key: (value, value) for key in KEYS if (value := getattr(now, key)) is not None}
-        return Option(What.SERVICE, now, interval, note)
+        return _as_now(What.SERVICE, now, "No friction was found: a service changes nothing.")
     runs = loop.run(draws, frictions=np.zeros_like(draws.frictions))
     note = "The valve without friction under the controller that is there."
     return option_of(What.SERVICE, runs, note, likeliest=draws.likeliest)
 
 
-def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
+def _as_now(
+    what: What, now: Measures, note: str, settings: dict[str, float] | None = None
+) -> Option:
+    """Return an option that changes nothing."""
+    interval = {key: (value, value) for key in KEYS if (value := getattr(now, key)) is not None}
+    return Option(what, now, interval, note, settings or {})
+
+
+def _retune(loop: RecordedLoop, draws: Draws, found: Identification, now: Measures) -> Option:
     tuning = UNCHANGED
     cause = found.outputs[loop.output].cause
     if cause is not None and cause.kind in RETUNED:
@@ -216,10 +222,11 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
         note = "No other tuning with enough distance from instability helps."
     else:
         note = "Neither valve nor tuning is the cause: another tuning is not looked for."
-    runs = loop.run(draws, tunings=tuning.applied(draws.tunings))
-    if tuning != UNCHANGED:
-        note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
     settings = {"gain_factor": tuning.gain, "integral_time_factor": tuning.integral_time}
+    if tuning == UNCHANGED:
+        return _as_now(What.RETUNE, now, note, settings)
+    runs = loop.run(draws, tunings=tuning.applied(draws.tunings))
+    note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
     return option_of(What.RETUNE, runs, note, settings, draws.likeliest)
 
 
