@@ -17,8 +17,7 @@ All weights follow from the identified loop, in units of OP's and PV's own movem
 - a valve with backlash alone has f_S = f_D, half its band, and so no least jump.
 
 The controller answers faster than the loop ever has, and what the process does then is known less
-well than what it did. So it is run on processes that are drawn, too, each with the load with which
-it repeats the record; see :data:`PROCESSES`.
+well than what it did. So it is run on drawn loops, whose processes differ, too.
 """
 
 from __future__ import annotations
@@ -33,6 +32,7 @@ from stiction_ros.control import ControlMode, ControlSettings, FrictionSpread, M
 from stiction_ros.control.design import History
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.identification.result.identification import ValveEstimate
@@ -59,14 +59,14 @@ STARTED = 1e-3
 MARGIN = 0.3
 """Share of the half-widths of the frictions' intervals that a jump is larger than it must be."""
 
-PROCESSES = ((1.0, 1.0), (0.8, 1.0), (1.25, 1.0), (1.0, 0.5), (1.0, 1.5))
-"""Factors on gain and dead time of the processes that it is run on."""
+RUNS = 7
+"""Drawn loops that it is run on."""
+
+BEYOND = 1e4
+"""Standard deviations of PV from which on a run is taken as gone."""
 
 PAST = 1000
 """Samples before a run that the controller takes over, at most."""
-
-FRICTIONS = 3
-"""Drawn frictions that it is run on; all but the first with the process as it was identified."""
 
 LEAST_NOISE = 0.02
 """Standard deviation of the noise that is taken at least, in those of PV."""
@@ -229,70 +229,56 @@ def pair_of(estimate: ValveEstimate) -> tuple[float, float]:
     return 0.5 * (static + dynamic), 0.5 * (static + dynamic)
 
 
-def embedded(
-    loop: RecordedLoop, design: EmbeddingDesign, frictions: FloatArray
-) -> list[Measures | None]:
-    """Return the measures under the controller, on valves and processes that may be the loop's.
+def embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws) -> list[Measures | None]:
+    """Return the measures under the controller, on loops that may be the recorded one.
 
     Args:
         loop: whose rows are run.
         design: of the controller, which keeps its friction and its process.
-        frictions: (f_S, f_D) of the valve, %, shape (R, 2), the likeliest first.
+        draws: loops, the likeliest first; no more than :data:`RUNS` of them are run.
 
     Returns:
-        One entry for each of :data:`PROCESSES` with the first friction, then one for each of the
-        next ones; None for a run that grows without end.
+        None for a run that grows without end.
     """
-    runs = [_embedded(loop.with_process(*one), design, frictions[0]) for one in PROCESSES]
-    return runs + [_embedded(loop, design, pair) for pair in frictions[1:FRICTIONS]]
+    return [_embedded(loop, design, draws, r) for r in range(min(RUNS, len(draws)))]
 
 
-def _embedded(loop: RecordedLoop, design: EmbeddingDesign, friction: FloatArray) -> Measures | None:
-    i, j, process = loop.output, loop.valve, loop.process
-    past, begin = loop.past, loop.rows[0]
-    static, dynamic = (friction / loop.op_scale).tolist()
-    a, b, delay = process.a[i], process.b[i, j], int(process.delay[i, j])
-    rows = np.arange(*loop.rows)
-    load = loop.loop.pv[:, i] - loop.simulated[:, i]
-    others = process.bias[i] + _others(loop)
-    sp = loop.set_points[:, i]
-    first = begin - past
-    y = np.empty(past + len(rows))
-    stem = np.empty(past + len(rows))
-    y[:past] = loop.simulated[begin - past : begin, i]
-    stem[:past] = loop.loop.stem[begin - past : begin, j]
-    op, at = float(loop.loop.op[begin - 1, j]), float(stem[past - 1])
-    whole = slice(max(loop.loop.longest[0], begin - PAST), begin)
+def _embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws, r: int) -> Measures | None:
+    i, j = loop.output, loop.valve
+    a, b, delay, _ = draws.equations
+    static, dynamic = (draws.frictions[r] / loop.op_scale).tolist()
+    outside = draws.equations.outside[r, i] + _others(draws, r, i, j)
+    span, begin = slice(loop.begin, loop.rows[1]), loop.rows[0] - loop.begin
+    y, stem = loop.loop.pv[span, i].copy(), draws.stems[r, j].copy()
+    sp, recorded = loop.set_points[span, i], loop.loop.op[span, j]
+    op, at = float(recorded[begin - 1]), float(stem[begin - 1])
+    whole = slice(max(loop.loop.longest[0], loop.rows[0] - PAST), loop.rows[0])
     control = EmbeddingRun(design, loop.loop.pv[whole, i], loop.loop.op[whole, j])
-    errors = np.empty(len(rows))
-    back_a, back_b = a[::-1].copy(), b[::-1].copy()
-    for k, row in enumerate(rows.tolist()):
-        now = past + k
-        late = now - 1 - delay
-        value = others[row] - float(back_a @ y[now - len(a) : now])
-        y[now] = value + float(back_b @ stem[late - len(b) + 1 : late + 1])
-        pv, goal = y[now] + load[row], float(sp[row - first])
-        errors[k] = pv - goal
-        op = control(pv, goal, op)
+    back_a, back_b = a[r, i, ::-1].copy(), b[r, i, j, ::-1].copy()
+    lags, late = len(back_a), int(delay[i, j])
+    for k in range(begin, len(y)):
+        known = float(back_b @ stem[k - late - lags : k - late])
+        y[k] = outside[k] - float(back_a @ y[k - lags : k]) + known
+        if not abs(y[k]) < BEYOND:
+            return None
+        op = control(float(y[k]), float(sp[k]), op)
         apart = op - at
         if abs(apart) > static:
             at = op - math.copysign(dynamic, apart)
-        stem[now] = at
-        if not abs(y[now]) < 1e6:
-            return None
-    return loop.yardstick.measure(loop.pv_scale * errors, loop.op_scale * stem[past:])
+        stem[k] = at
+    errors = y[begin:] - sp[begin:]
+    return loop.yardstick.measure(loop.pv_scale * errors, loop.op_scale * stem[begin:])
 
 
-def _others(loop: RecordedLoop) -> FloatArray:
-    """Return what the other valves, as recorded, add to equation (9) at each row, shape (N,)."""
-    i, process = loop.output, loop.process
-    added = np.zeros(len(loop.loop.op))
-    for v in range(loop.loop.op.shape[1]):
-        if v == loop.valve:
+def _others(draws: Draws, r: int, i: int, j: int) -> FloatArray:
+    """Return what the other valves, as recorded, add to an output, shape (N,)."""
+    _, b, delay, outside = draws.equations
+    added = np.zeros(outside.shape[2])
+    for v, stem in enumerate(draws.stems[r]):
+        if v == j:
             continue
-        stem = loop.loop.stem[:, v]
-        for lag, weight in enumerate(process.b[i, v]):
-            shift = 1 + int(process.delay[i, v]) + lag
+        for lag, weight in enumerate(b[r, i, v].tolist()):
+            shift = 1 + int(delay[i, v]) + lag
             added[shift:] += weight * stem[:-shift]
     return added
 

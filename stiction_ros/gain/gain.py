@@ -5,19 +5,18 @@ from __future__ import annotations
 import dataclasses
 import enum
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.gain.draws import DRAWS, SEED, drawn_frictions, drawn_tunings
-from stiction_ros.gain.embedding import EmbeddingDesign, embedded, pair_of
+from stiction_ros.gain.draws import DRAWS, SEED, Draws
+from stiction_ros.gain.embedding import EmbeddingDesign, embedded
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.gain.retuning import UNCHANGED, best_tuning
 from stiction_ros.identification.result.cause import CauseKind
-from stiction_ros.identification.result.identification import Identification, VerdictKind
+from stiction_ros.identification.result.identification import Identification
 from stiction_ros.records.record import Record
 
 AGREED = 0.25
@@ -40,8 +39,8 @@ REPEATS = 0.25
 """Share by which a drawn loop may differ from the record in IAE and amplitude: what does not cycle
 as recorded is not the loop that was recorded."""
 
-FEWEST = 3
-"""Drawn loops that must repeat the record, for anything to be said."""
+FEWEST = 10
+"""Drawn loops that must repeat the record, the likeliest among them, for anything to be said."""
 
 RETUNED = (CauseKind.VALVE, CauseKind.TUNING)
 """Causes by which a loop shows its process well enough to be tuned by it: what comes from outside
@@ -65,8 +64,8 @@ class Option:
 
     Attributes:
         what: see :class:`What`.
-        measures: medians of the draws that repeat the record; None where it could not be
-            simulated, or where the draws do not agree.
+        measures: of the likeliest of the drawn loops; None where it could not be simulated, or
+            where the draws do not agree.
         interval: 5th and 95th percentile of each measure over the draws.
         note: one sentence.
         settings: weights of the embedding, factors of the retuning.
@@ -153,48 +152,25 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
         InputError: there is no model, or no controller can be recovered.
     """
     loop = RecordedLoop.of(record, found, valve)
-    random = np.random.default_rng(SEED)
-    frictions = drawn_frictions(loop.estimate, DRAWS, random)
-    if not _believed(loop):
-        frictions = np.zeros_like(frictions)
-    draws = Draws(frictions, drawn_tunings(loop.law, DRAWS, random))
+    draws = loop.drawn(np.random.default_rng(SEED))
     now = loop.now()
-    runs = loop.run(*draws)
+    runs = loop.run(draws)
     kept = [k for k, run in enumerate(runs) if _repeats(now, run)]
-    if len(kept) < FEWEST:
-        left = option_of(What.LEAVE, runs, "The loop as it is, simulated.")
-        note = f"Not simulated: {_doubt(now, left.measures)}."
+    names = record.valves[loop.valve], record.outputs[loop.output]
+    if len(kept) < FEWEST or kept[: draws.likeliest] != list(range(draws.likeliest)):
+        note = f"Not simulated: {_doubt(now, runs, len(kept))}."
         others = [Option(what, None, {}, note) for what in What if what is not What.LEAVE]
         same = Option(What.LEAVE, now, {}, "The loop as it is, as recorded.")
-        return Gain(record.valves[loop.valve], record.outputs[loop.output], now, (*others, same))
+        return Gain(*names, now, (*others, same))
     note = f"The loop as it is: {len(kept)} of {DRAWS} drawn loops repeat the record."
-    left = option_of(What.LEAVE, [runs[k] for k in kept], note)
-    draws = Draws(frictions[kept], draws.tunings[kept])
+    left = option_of(What.LEAVE, [runs[k] for k in kept], note, likeliest=draws.likeliest)
+    draws = draws.taken(kept)
     assert left.measures is not None
-    service, retuned, same = (
-        option.beside(now, left.measures)
-        for option in (_service(loop, draws, now), _retune(loop, draws, found), left)
-    )
-    options = (service, _embedding(loop, draws, found), retuned, same)
-    return Gain(record.valves[loop.valve], record.outputs[loop.output], now, options)
-
-
-class Draws(NamedTuple):
-    """Loops that the identification does not tell apart.
-
-    Attributes:
-        frictions: (f_S, f_D), %, shape (R, 2).
-        tunings: (K, K_i, K_d), scaled, shape (R, 3).
-    """
-
-    frictions: FloatArray
-    tunings: FloatArray
-
-
-def _believed(loop: RecordedLoop) -> bool:
-    """Tell whether the valve is taken to have the friction that was identified."""
-    verdict = loop.estimate.verdict
-    return verdict is not VerdictKind.HEALTHY and loop.estimate.static_friction > 0.0
+    service = _service(loop, draws, now).beside(now, left.measures)
+    retuned = _retune(loop, draws, found, now).beside(now, left.measures)
+    options = (service, _embedding(loop, draws, found), retuned)
+    told = tuple(_where_agreed(option, now) for option in options)
+    return Gain(*names, now, (*told, left.beside(now, left.measures)))
 
 
 def _repeats(now: Measures, run: Measures | None) -> bool:
@@ -209,39 +185,49 @@ def _repeats(now: Measures, run: Measures | None) -> bool:
     )
 
 
-def _doubt(now: Measures, left: Measures | None) -> str:
+def _doubt(now: Measures, runs: Sequence[Measures | None], kept: int) -> str:
     """Return why the simulated loop cannot stand for the recorded one."""
-    if left is None:
+    if runs[0] is None:
         return "the identified loop grows without end"
+    if _repeats(now, runs[0]):
+        return f"no more than {kept} of {len(runs)} drawn loops repeat the record"
     return (
         "the identified loop does not repeat the record, its IAE is "
-        f"{left.iae_per_hour / max(now.iae_per_hour, 1e-300):.2f} times the recorded one"
+        f"{_ratio(runs[0].iae_per_hour, now.iae_per_hour):.2f} and its amplitude "
+        f"{_ratio(runs[0].amplitude, now.amplitude):.2f} times the recorded one"
     )
 
 
 def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:
-    if not _believed(loop):
-        note = "No friction was found: a service changes nothing."
-        interval = {key: (value, value) for key in KEYS if (value := getattr(now, key)) is not None}
-        return Option(What.SERVICE, now, interval, note)
-    runs = loop.run(np.zeros_like(draws.frictions), draws.tunings)
+    if not draws.frictions.any():
+        return _as_now(What.SERVICE, now, "No friction was found: a service changes nothing.")
+    runs = loop.run(draws, frictions=np.zeros_like(draws.frictions))
     note = "The valve without friction under the controller that is there."
-    return option_of(What.SERVICE, runs, note)
+    return option_of(What.SERVICE, runs, note, likeliest=draws.likeliest)
 
 
-def _retune(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
+def _as_now(
+    what: What, now: Measures, note: str, settings: dict[str, float] | None = None
+) -> Option:
+    """Return an option that changes nothing."""
+    interval = {key: (value, value) for key in KEYS if (value := getattr(now, key)) is not None}
+    return Option(what, now, interval, note, settings or {})
+
+
+def _retune(loop: RecordedLoop, draws: Draws, found: Identification, now: Measures) -> Option:
     tuning = UNCHANGED
     cause = found.outputs[loop.output].cause
     if cause is not None and cause.kind in RETUNED:
-        tuning = best_tuning(loop, *draws)
+        tuning = best_tuning(loop, draws)
         note = "No other tuning with enough distance from instability helps."
     else:
         note = "Neither valve nor tuning is the cause: another tuning is not looked for."
-    runs = loop.run(draws.frictions, tuning.applied(draws.tunings))
-    if tuning != UNCHANGED:
-        note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
     settings = {"gain_factor": tuning.gain, "integral_time_factor": tuning.integral_time}
-    return option_of(What.RETUNE, runs, note, settings)
+    if tuning == UNCHANGED:
+        return _as_now(What.RETUNE, now, note, settings)
+    runs = loop.run(draws, tunings=tuning.applied(draws.tunings))
+    note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
+    return option_of(What.RETUNE, runs, note, settings, draws.likeliest)
 
 
 def _embedding(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
@@ -251,19 +237,16 @@ def _embedding(loop: RecordedLoop, draws: Draws, found: Identification) -> Optio
         note = "The record does not show a valve whose friction makes the loop cycle."
         return Option(What.EMBEDDING, None, {}, f"{note} Nothing is promised of embedding it.")
     part = embedding_part(loop)
-    frictions = np.vstack([pair_of(loop.estimate), draws.frictions[1:]])
     try:
         design = EmbeddingDesign.of(loop)
-        runs = embedded(part, design, frictions)
+        runs = embedded(part, design, draws)
     except InputError as error:
         return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
     note = f"Predictive control that knows the friction, on {len(runs)} drawn loops."
     weights = design.weights(loop.pv_scale, loop.op_scale)
-    option = option_of(What.EMBEDDING, runs, note, weights).beside(loop.now(), part.now())
-    if None in runs or not _agreed(option, loop.now()):
-        note = f"{note} They do not agree: the record does not tell what it would bring."
-        return dataclasses.replace(option, measures=None, note=note)
-    return option
+    option = option_of(What.EMBEDDING, runs, note, weights, draws.likeliest)
+    option = option.beside(loop.now(), part.now())
+    return dataclasses.replace(option, measures=None) if None in runs else option
 
 
 def embedding_part(loop: RecordedLoop) -> RecordedLoop:
@@ -271,15 +254,16 @@ def embedding_part(loop: RecordedLoop) -> RecordedLoop:
     return loop.last(EMBEDDING_SAMPLES, TAKEN_OVER)
 
 
-def _agreed(option: Option, now: Measures) -> bool:
-    """Tell whether the runs of an option say the same of IAE and amplitude."""
+def _where_agreed(option: Option, now: Measures) -> Option:
+    """Return the option, without figures where its runs do not say the same."""
     for key in ("iae_per_hour", "amplitude"):
         if key in option.interval and option.measures is not None:
             low, high = option.interval[key]
             room = max(AGREED * getattr(option.measures, key), AGREED_NOW * getattr(now, key))
             if high - low > 2.0 * room:
-                return False
-    return option.measures is not None
+                note = f"{option.note} The drawn loops do not agree on what it would bring."
+                return dataclasses.replace(option, measures=None, note=note)
+    return option
 
 
 def option_of(
@@ -287,24 +271,34 @@ def option_of(
     runs: Sequence[Measures | None],
     note: str,
     settings: dict[str, float] | None = None,
+    likeliest: int = 0,
 ) -> Option:
-    """Return the option of its draws; one that grows in half of them is none."""
+    """Return the option of its draws; one that grows in half of them is none.
+
+    Args:
+        what: is tried.
+        runs: of the draws.
+        note: one sentence.
+        settings: of the option.
+        likeliest: draws at the begin whose mean is given; 0 gives the medians of all.
+    """
     stable = [run for run in runs if run is not None]
-    if 2 * len(stable) <= len(runs):
+    if 2 * len(stable) <= len(runs) or None in runs[:likeliest]:
         return Option(what, None, {}, f"{note} The simulated loop grows without end.")
     middle: dict[str, Any] = {}
     interval = {}
     for key in KEYS:
         values = [value for run in stable if (value := getattr(run, key)) is not None]
-        middle[key] = float(np.median(values)) if values else None
+        middle[key] = None
         if values:
-            low, high = np.percentile(values, ENDS)
-            interval[key] = (float(low), float(high))
+            given = float(np.mean(values[:likeliest]) if likeliest else np.median(values))
+            low, high = map(float, np.percentile(values, ENDS))
+            middle[key], interval[key] = given, (min(low, given), max(high, given))
     return Option(what, Measures(**middle), interval, note, settings or {})
 
 
-def _ratio(recorded: float | None, simulated: float | None) -> float:
-    """Return recorded over simulated; 1 where there is nothing to compare."""
-    if recorded is None or simulated is None or simulated <= 0.0:
+def _ratio(one: float | None, other: float | None) -> float:
+    """Return one over the other; 1 where there is nothing to compare."""
+    if one is None or other is None or other <= 0.0:
         return 1.0
-    return recorded / simulated
+    return one / other

@@ -16,9 +16,11 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.oscillation import (
     LEAST_LINE,
+    NEAR,
     REGULAR,
     Oscillation,
     amplitude,
+    dominant_cycle,
 )
 from stiction_ros.records.valve_work import ValveWork
 
@@ -61,17 +63,28 @@ class Yardstick:
     period: float | None
     stretches: Sequence[tuple[int, int]]
 
-    def measure(self, error: FloatArray, stem: FloatArray) -> Measures:
+    def measure(self, error: FloatArray, stem: FloatArray, *, repeats: bool = False) -> Measures:
         """Return the measures of one run.
 
         Args:
             error: PV − SP, shape (n,), engineering units.
             stem: shape (n,), %.
+            repeats: whether the run is to repeat the record: then the line is looked at where it
+                is, as a cycle that goes a little faster than the recorded one is no smaller.
         """
         hours = len(error) * self.sample_time / 3600.0
-        line = None if self.period is None else amplitude(error, self.stretches, self.period)
+        period = self._own(error) if repeats else self.period
+        line = None if period is None else amplitude(error, self.stretches, period)
         work = ValveWork.of(stem).per_hour(hours)
         return Measures(line, float(np.abs(error).mean()), work.travel, work.moves, work.reversals)
+
+    def _own(self, error: FloatArray) -> float | None:
+        """Return the period near the recorded one at which a run cycles, samples."""
+        if self.period is None:
+            return None
+        near = self.period / NEAR, self.period * NEAR
+        cycle = dominant_cycle(error[:, None], self.stretches, near)
+        return self.period if cycle is None else cycle.period
 
 
 def cycle_period(swing: Oscillation | None) -> float | None:

@@ -1,8 +1,9 @@
 """A recorded loop that can be run again otherwise.
 
-The identified process and friction, the controller recovered from SP, PV and OP, and the load:
-what the process, driven by the estimated stems, leaves of PV. With the friction of the record
-and its load the loop repeats the record; with anything changed it shows what would have been.
+The identified friction, the controller recovered from SP, PV and OP, how PV answers the stems
+(:mod:`stiction_ros.gain.answering`), and what comes from outside: what nobody could have known of a
+PV a sample before. With the friction of the record the loop repeats the record; with anything
+changed it shows what would have been.
 Signals are in units of their own movement, see
 :mod:`stiction_ros.identification.closed_loop.scaled_loop`.
 """
@@ -15,10 +16,20 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.gain.answering import Answering
+from stiction_ros.gain.draws import (
+    CANDIDATES,
+    DRAWS,
+    Draws,
+    drawn_frictions,
+    drawn_tunings,
+    resampled,
+)
+from stiction_ros.gain.loop_runs import Equations, Valves, run_again
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
 from stiction_ros.gain.stems import stems_of
 from stiction_ros.identification.closed_loop.closed_loop import output_oscillation, paired
-from stiction_ros.identification.closed_loop.loop_run import Process, Runs, run_loops
+from stiction_ros.identification.closed_loop.loop_run import Process
 from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.repeated_runs import controllers_of, period_of
@@ -28,10 +39,14 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
     scaled,
     scaled_process,
 )
+from stiction_ros.identification.evidence.outside_waves import outside_wave
+from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.rates import LEAST_ROWS, RATES
 from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
     ValveEstimate,
+    VerdictKind,
 )
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
@@ -51,11 +66,12 @@ class RecordedLoop:
         record: what was measured.
         estimates: of all valves.
         loop: the scaled signals.
-        process: equation (9).
+        process: equation (9) as identified.
         pairs: per valve the output of its controller, −1 for none, and the controller.
         valve, output: indices of what is looked at.
+        begin: first sample that is looked at.
         rows: first row that is run, and the one behind the last.
-        simulated: PV of the process driven by the estimated stems, shape (N, p).
+        answers: how each output is explained from sample ``begin`` on.
         yardstick: measures of a run.
     """
 
@@ -66,8 +82,9 @@ class RecordedLoop:
     pairs: tuple[tuple[int, RecoveredController], ...]
     valve: int
     output: int
+    begin: int
     rows: tuple[int, int]
-    simulated: FloatArray
+    answers: tuple[Answering, ...]
     yardstick: Yardstick
 
     @classmethod
@@ -95,18 +112,14 @@ class RecordedLoop:
             )
         process = scaled_process(found.outputs, record.valves, loop)
         first, last = loop.longest
-        past = _past(process, pairs)
-        first = max(first, last - MOST - past)
-        simulated = free_run(process, loop, loop.stem)
-        if not np.isfinite(simulated[first:last]).all():
-            raise InputError("the identified process grows without end", where=record.name)
+        first = max(first, last - MOST)
+        answers = _answers(record, loop, process, (first, last))
+        past = max(*(one.past for one in answers), 4 + max(law.lag for _, law in pairs))
         period = cycle_period(output_oscillation(loop, output))
         rows = slice(first + past, last)
-        moves = law.set_point[rows, None]
-        stretches = holds(moves)
+        stretches = holds(law.set_point[rows, None])
         if period is not None and max(b - a for a, b in stretches) < 2.0 * period:
-            stretches = [(0, len(moves))]
-        yardstick = Yardstick(record.sample_time, period, stretches)
+            stretches = [(0, rows.stop - rows.start)]
         return cls(
             record=record,
             estimates=found.valves,
@@ -115,9 +128,10 @@ class RecordedLoop:
             pairs=pairs,
             valve=chosen,
             output=output,
+            begin=first,
             rows=(first + past, last),
-            simulated=simulated,
-            yardstick=yardstick,
+            answers=answers,
+            yardstick=Yardstick(record.sample_time, period, stretches),
         )
 
     @property
@@ -141,28 +155,20 @@ class RecordedLoop:
         return float(self.loop.pv_scale[self.output])
 
     @property
-    def past(self) -> int:
-        """H, samples before the first of a run."""
-        return _past(self.process, self.pairs)
-
-    @property
     def load(self) -> FloatArray:
-        """What the process leaves of PV in the rows and the past before them, shape (H + n, p)."""
-        whole = slice(self.rows[0] - self.past, self.rows[1])
-        return np.asarray(self.loop.pv[whole] - self.simulated[whole])
+        """What the identified process, run freely, leaves of PV in the rows, shape (n, p)."""
+        simulated = free_run(self.process, self.loop, self.loop.stem)
+        rows = slice(*self.rows)
+        return np.asarray(self.loop.pv[rows] - simulated[rows])
 
     @property
     def set_points(self) -> FloatArray:
-        """Set-points in the rows and the past before them, recorded or found, (H + n, p)."""
-        whole = slice(self.rows[0] - self.past, self.rows[1])
-        if self.loop.sp is None:
-            sp = np.zeros((whole.stop - whole.start, self.loop.pv.shape[1]))
-        else:
-            sp = self.loop.sp[whole].copy()
+        """Set-points of the record, recorded or found, shape (N, p)."""
+        found = np.zeros_like(self.loop.pv) if self.loop.sp is None else self.loop.sp.copy()
         for i, law in self.pairs:
             if i >= 0:
-                sp[:, i] = law.set_point[whole]
-        return sp
+                found[:, i] = law.set_point
+        return found
 
     def now(self) -> Measures:
         """Return the measures of the record itself."""
@@ -180,82 +186,114 @@ class RecordedLoop:
         """
         first, last = self.loop.longest
         ahead = first + min(past, (last - first) // 3)
-        return self._from(max(self.rows[0], last - samples, ahead))
-
-    def with_process(self, gain: float, dead_time: float) -> RecordedLoop:
-        """Return the loop with another process; what that leaves of PV is its load.
-
-        So it repeats the record as well. Rows that it has no past for are left out.
-
-        Args:
-            gain: factor on what the valve does.
-            dead_time: factor on its dead time; other than 1 it makes a sample at least, as far as
-                there is any.
-        """
-        process = self.process
-        i, j = self.output, self.valve
-        b, delay = process.b.copy(), process.delay.copy()
-        b[i, j] *= gain
-        known = int(delay[i, j])
-        change = max(round(abs(dead_time - 1.0) * known), 1) if dead_time != 1.0 else 0
-        delay[i, j] = max(known + (change if dead_time > 1.0 else -change), 0)
-        process = process._replace(b=b, delay=delay)
-        simulated = free_run(process, self.loop, self.loop.stem)
-        other = dataclasses.replace(self, process=process, simulated=simulated)
-        return other._from(max(self.rows[0], other.past))
-
-    def _from(self, row: int) -> RecordedLoop:
-        """Return the loop from a row on."""
+        row = max(self.rows[0], last - samples, ahead)
         ahead = row - self.rows[0]
         stretches = [(max(a - ahead, 0), b - ahead) for a, b in self.yardstick.stretches]
         yardstick = dataclasses.replace(
             self.yardstick, stretches=[(a, b) for a, b in stretches if b > 0]
         )
-        return dataclasses.replace(self, rows=(row, self.rows[1]), yardstick=yardstick)
+        return dataclasses.replace(self, rows=(row, last), yardstick=yardstick)
 
-    def run(self, frictions: FloatArray, tunings: FloatArray) -> list[Measures | None]:
-        """Return the measures of the loop with another friction or tuning of the valve.
+    def drawn(self, random: np.random.Generator) -> Draws:
+        """Return loops that the identification does not tell apart.
+
+        Of each friction the stem is known, and by the stem how PV may answer it: of the likeliest
+        loops by the likeliest equations, of the others by some that the record does not tell apart.
+        What they leave comes from outside, so that each loop repeats the record.
+        """
+        verdict = self.estimate.verdict
+        pairs = drawn_frictions(self.estimate, CANDIDATES, random)
+        frictions = resampled(pairs, self._losses(pairs), verdict, random)
+        tunings = drawn_tunings(self.law, DRAWS, random)
+        likeliest = 2 if verdict is VerdictKind.UNDECIDED else 1
+        stems = self._stems(frictions)
+        number, length = len(stems), stems.shape[2]
+        delay = np.array([one.delay for one in self.answers])
+        lags = self.answers[0].lags
+        a, b = np.empty((number, len(delay), lags)), np.empty((number, *delay.shape, lags))
+        outside = np.zeros((number, len(delay), length))
+        for i, answering in enumerate(self.answers):
+            for r in range(number):
+                answer = answering.fit(stems[r].T)
+                weights = answer.mean if r < likeliest else answer.drawn(random)
+                a[r, i], b[r, i] = answer.split(weights)
+                outside[r, i] = answering.left(stems[r].T, a[r, i], b[r, i])
+        return Draws(frictions, tunings, stems, Equations(a, b, delay, outside), likeliest)
+
+    def _losses(self, frictions: FloatArray) -> FloatArray:
+        """Return −2 log of the likelihood of frictions, shape (C,)."""
+        return np.array(
+            [sum(one.loss(stem.T) for one in self.answers) for stem in self._stems(frictions)]
+        )
+
+    def _stems(self, frictions: FloatArray) -> FloatArray:
+        """Return the stems of all valves by frictions of the one, scaled, shape (C, m, N)."""
+        number, j, whole = len(frictions), self.valve, slice(self.begin, self.rows[1])
+        stems = np.repeat(self.loop.stem[whole].T[None], number, axis=0)
+        op = np.repeat(self.loop.op[whole, j][None], number, axis=0)
+        start = np.full(number, self.loop.stem[self.begin, j])
+        stems[:, j] = stems_of(op, frictions / self.op_scale, start)
+        return stems
+
+    def run(
+        self,
+        draws: Draws,
+        frictions: FloatArray | None = None,
+        tunings: FloatArray | None = None,
+    ) -> list[Measures | None]:
+        """Return the measures of drawn loops, as they are or with something changed.
 
         Args:
-            frictions: (f_S, f_D) of the valve, %, shape (R, 2).
-            tunings: (K, K_i, K_d) of its controller, scaled, shape (R, 3).
+            draws: R loops.
+            frictions: of the valve in place of those drawn, %, shape (R, 2).
+            tunings: of its controller in place of those drawn, scaled, shape (R, 3).
 
         Returns:
             None for a run that grows without end.
         """
-        number, past, j, i = len(frictions), self.past, self.valve, self.output
-        before = slice(self.rows[0] - past, self.rows[0])
+        repeats = frictions is None and tunings is None
+        number, j, i = len(draws), self.valve, self.output
         friction = np.empty((number, len(self.estimates), 2))
         tuning = np.empty((number, len(self.estimates), 3))
         for v, valve in enumerate(self.estimates):
             pair = np.array([valve.static_friction, valve.dynamic_friction])
             friction[:, v] = pair / self.loop.op_scale[v]
             tuning[:, v] = self.pairs[v][1].coefficients
-        friction[:, j], tuning[:, j] = frictions / self.op_scale, tunings
-        runs = Runs(
-            friction,
-            tuning,
-            np.repeat(self.simulated[before].T[None], number, axis=0),
-            np.repeat(self.loop.stem[before].T[None], number, axis=0),
-            np.repeat(self.loop.op[self.rows[0] - 1][None], number, axis=0),
+        friction[:, j] = (draws.frictions if frictions is None else frictions) / self.op_scale
+        tuning[:, j] = draws.tunings if tunings is None else tunings
+        whole, ahead = slice(self.begin, self.rows[1]), self.rows[0] - self.begin
+        sp = np.ascontiguousarray(self.set_points[whole])
+        pv, _, stems = run_again(
+            draws.equations,
+            controllers_of(self.pairs),
+            Valves(friction, tuning, np.ascontiguousarray(draws.stems[:, :, :ahead])),
+            (self.loop.op[whole].copy(), self.loop.pv[whole].copy(), sp),
         )
-        sp = np.repeat(self.set_points[None], number, axis=0)
-        load = np.repeat(self.load[None], number, axis=0)
-        op, pv = run_loops(self.process, controllers_of(self.pairs), runs, sp, load)
-        start = np.full(number, self.loop.stem[self.rows[0] - 1, j])
-        stem = stems_of(np.ascontiguousarray(op[:, :, j]), friction[:, j].copy(), start)
-        errors = pv[:, :, i] - sp[:, past:, i]
+        errors = pv[:, :, i] - sp[ahead:, i]
         return [
-            self.yardstick.measure(self.pv_scale * error, self.op_scale * moved)
+            self.yardstick.measure(self.pv_scale * error, self.op_scale * moved, repeats=repeats)
             if np.isfinite(error).all()
             else None
-            for error, moved in zip(errors, stem, strict=True)
+            for error, moved in zip(errors, stems[:, :, j], strict=True)
         ]
 
 
-def _past(process: Process, pairs: tuple[tuple[int, RecoveredController], ...]) -> int:
-    late = max(law.lag for _, law in pairs)
-    return int(max(process.a.shape[1], process.b.shape[2] + int(process.delay.max()) + 1, 4 + late))
+def _answers(
+    record: Record, loop: ScaledLoop, process: Process, span: tuple[int, int]
+) -> tuple[Answering, ...]:
+    """Return how each output is explained in a span of the samples of ``loop``."""
+    ahead = len(record) - len(loop.op)
+    part = record.part(ahead + span[0], ahead + span[1])
+    rates = [rate for rate in RATES if rate == 1 or len(part) // rate >= LEAST_ROWS]
+    problems = [Problem.of(part, None, rate) for rate in rates]
+    samples = slice(*span)
+    answers = []
+    for i in range(len(record.outputs)):
+        wave = outside_wave(problems, i)
+        lines = np.array([] if wave is None else wave.lines, dtype=np.float64)
+        pv, stems = loop.pv[samples, i].copy(), loop.stem[samples]
+        answers.append(Answering.of(pv, stems, process.delay[i], lines))
+    return tuple(answers)
 
 
 def _chosen(found: Identification, name: str | None, record: Record) -> int:

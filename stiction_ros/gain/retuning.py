@@ -13,6 +13,7 @@ import itertools
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.recorded_loop import RecordedLoop
 
 ComplexArray = np.ndarray[tuple[int], np.dtype[np.complex128]]
@@ -70,42 +71,36 @@ def candidates(friction: bool) -> list[Tuning]:
     return [tuning for pair in pairs if (tuning := Tuning(*pair)) != UNCHANGED]
 
 
-def best_tuning(loop: RecordedLoop, frictions: FloatArray, tunings: FloatArray) -> Tuning:
-    """Return the tuning of least IAE; unchanged where none saves enough.
-
-    Args:
-        loop: that is tuned.
-        frictions, tunings: draws, shapes (R, 2) and (R, 3).
-    """
-    present = sensitivity(loop, UNCHANGED)
-    frictions, tunings = frictions[:TRIED], tunings[:TRIED]
-    tried = [UNCHANGED]
-    for tuning in candidates(bool(frictions.any())):
-        if sensitivity(loop, tuning) <= max(SENSITIVE, CALMER * present):
-            tried.append(tuning)
-    number = len(frictions)
-    runs = loop.run(
-        np.tile(frictions, (len(tried), 1)),
-        np.concatenate([tuning.applied(tunings) for tuning in tried]),
-    )
-    errors = np.array([np.inf if run is None else run.iae_per_hour for run in runs])
-    means = errors.reshape(len(tried), number).mean(axis=1)
-    best = int(np.argmin(means))
-    return tried[best] if means[best] < (1.0 - WORTH) * means[0] else UNCHANGED
+def best_tuning(loop: RecordedLoop, draws: Draws) -> Tuning:
+    """Return the tuning of least IAE over the first draws; unchanged where none saves enough."""
+    draws = draws.taken(list(range(min(TRIED, len(draws)))))
+    present = sensitivity(loop, draws, UNCHANGED)
+    best, least, before = UNCHANGED, np.inf, np.inf
+    for tuning in [UNCHANGED, *candidates(bool(draws.frictions.any()))]:
+        near = sensitivity(loop, draws, tuning) <= max(SENSITIVE, CALMER * present)
+        if tuning != UNCHANGED and not near:
+            continue
+        runs = loop.run(draws, tunings=tuning.applied(draws.tunings))
+        mean = float(np.mean([np.inf if run is None else run.iae_per_hour for run in runs]))
+        if tuning == UNCHANGED:
+            before = mean
+        elif mean < least:
+            best, least = tuning, mean
+    return best if least < (1.0 - WORTH) * before else UNCHANGED
 
 
-def sensitivity(loop: RecordedLoop, tuning: Tuning) -> float:
-    r"""Return the peak of :math:`|1 / (1 + C P)|` of the loop without friction."""
-    law, process = loop.law, loop.process
+def sensitivity(loop: RecordedLoop, draws: Draws, tuning: Tuning) -> float:
+    r"""Return the peak of :math:`|1 / (1 + C P)|` of the first loop, its valve without friction."""
+    law, (a, b, delay, _) = loop.law, draws.equations
     i, j = loop.output, loop.valve
     turn = frequencies()
     gain, reset, rate = tuning.applied(law.coefficients[None])[0]
     share = law.smoothing
     control = gain + reset / (1.0 - turn) + rate * (1.0 - turn)
     control = control * (1.0 - share) / (1.0 - share * turn) * turn**law.lag
-    poles = np.polyval(np.concatenate([process.a[i][::-1], [1.0]]), turn)
-    zeros = np.polyval(process.b[i, j][::-1], turn)
-    return peak(control * zeros * turn ** (1 + int(process.delay[i, j])) / poles)
+    poles = np.polyval(np.concatenate([a[0, i, ::-1], [1.0]]), turn)
+    zeros = np.polyval(b[0, i, j, ::-1], turn)
+    return peak(control * zeros * turn ** (1 + int(delay[i, j])) / poles)
 
 
 def frequencies() -> ComplexArray:

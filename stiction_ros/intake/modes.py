@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shlex
 
 import numpy as np
 
@@ -93,8 +94,8 @@ def _not_automatic(
     if automatic is not None:
         wanted = {word.casefold() for word in automatic}
         return {word for word in words if not _alike(word, wanted)}
-    known_off = {word for word in words if MANUAL.fullmatch(word)}
-    unknown = {word for word in words - known_off if not AUTOMATIC.fullmatch(word)}
+    known_off = {word for word in words if MANUAL.fullmatch(_bare(word))}
+    unknown = {word for word in words - known_off if not AUTOMATIC.fullmatch(_bare(word))}
     if not unknown or len(words) == 1:
         return known_off
     if all(number(word) is not None for word in words):
@@ -104,8 +105,13 @@ def _not_automatic(
     raise InputError(
         f"{name} shows {', '.join(sorted(words))}, of which it is not known which is automatic",
         where=str(block.path),
-        fix=f"say which with --auto, such as --auto {sorted(unknown)[-1]}",
+        fix=f"say which with --auto, such as --auto {shlex.quote(sorted(unknown)[-1])}",
     )
+
+
+def _bare(word: str) -> str:
+    """Return a mode without what stands behind it in brackets, and without a full stop."""
+    return re.sub(r"\s*[(\[].*", "", word).rstrip(".")
 
 
 def _alike(word: str, wanted: set[str]) -> bool:

@@ -33,7 +33,7 @@ TO_PERCENT = {
 
 _OP_UNITS = {
     **dict.fromkeys(("%", "percent", "pct", "prozent", "% open"), OpUnit.PERCENT),
-    **dict.fromkeys(("share", "fraction", "ratio", "0-1", "0..1", "0…1"), OpUnit.SHARE),
+    **dict.fromkeys(("share", "fraction", "frac", "ratio", "0-1", "0..1", "0…1"), OpUnit.SHARE),
     **dict.fromkeys(("ma", "4-20ma", "4-20 ma", "4..20 ma"), OpUnit.CURRENT),
     **dict.fromkeys(("other",), OpUnit.OTHER),
 }

@@ -10,13 +10,17 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.tables.block import Block, FlagArray, Key
+from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.records.quality import Quality, QualityArray
+
+IndexArray = NDArray[np.intp]
 
 HELD = 5
 """Samples in a row that are held at most; a gap in time is one from 5.5 samples on."""
@@ -33,6 +37,12 @@ SENTINELS = (
     *(-1e30, 3.4028234663852886e38, -3.4028234663852886e38, 9.96921e36),
 )
 """Numbers that loggers and controllers write in the place of a bad value."""
+
+FEWEST_STAMPS = 5
+"""Stamps from which on it can be told that they are cut off."""
+
+DIFFERENT = 0.5
+"""Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
 
 RARE = 0.2
 """Share of a signal that may lie far outside."""
@@ -115,6 +125,13 @@ def checked(block: Block, rules: Rules) -> Block:
         if key.signal == "mode":
             continue
         missing = ~np.isfinite(column.values)
+        if missing.all() and key.signal in ("op", "pv"):
+            shown = " ".join(repr(word) for word, _ in column.words.most_common(2) if word)
+            raise InputError(
+                f"column {column.name} holds no number{f', but {shown}' if shown else ''}",
+                where=str(block.path),
+                fix=f"choose another one with --{key.signal} TAG=COLUMN",
+            )
         if block.mask is not None:
             missing &= block.mask != Quality.BAD
         if not missing.any():
@@ -189,7 +206,13 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
     differing = 0
     first = np.flatnonzero(np.insert(last[:-1], 0, True))
     group = np.cumsum(np.insert(last[:-1], 0, True)) - 1
-    columns = {}
+    columns: dict[Key, Column] = {}
+    spread = _spread(block, first)
+    if spread is not None:
+        note = f"stamps lack what is below {spread.step:g} s: "
+        note += f"{spread.usual} rows on each, spread evenly"
+        rules.told.append(note)
+        return dataclasses.replace(block, time=spread.time)
     for key, column in block.columns.items():
         here = np.flatnonzero(~column.blank)
         values = np.full(len(first), np.nan)
@@ -205,6 +228,44 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
         f"{note}: the last value counts, {differing} differ" if differing else f"{note} left out"
     )
     return dataclasses.replace(kept, columns=columns)
+
+
+class _Spread(NamedTuple):
+    step: float
+    usual: int
+    time: FloatArray
+
+
+def _spread(block: Block, first: IndexArray) -> _Spread | None:
+    """Return times of rows whose stamps were cut off, as minutes without their seconds.
+
+    Then every stamp has as many rows but for one, stamps follow each other evenly, and what stands
+    in the rows differs; None for rows that are there twice.
+
+    Args:
+        block: rows in order.
+        first: first row of each stamp.
+    """
+    counts = np.diff(np.append(first, len(block.time)))
+    stamps = block.time[first]
+    if len(first) < FEWEST_STAMPS:
+        return None
+    steps, inner = np.diff(stamps), counts[1:-1]
+    usual = int(np.median(inner))
+    even = np.ptp(steps) <= 1e-6 * steps[0] and np.ptp(inner) <= 1 and counts.max() <= usual + 1
+    again = np.setdiff1d(np.arange(len(block.time)), first)
+    differs = [
+        column.values[again] != column.values[again - 1]
+        for key, column in block.columns.items()
+        if key.signal in ("op", "pv")
+    ]
+    if usual < 2 or not even or not np.any(differs, axis=0).mean() > DIFFERENT:
+        return None
+    within = np.arange(len(block.time)) - np.repeat(first, counts)
+    of = np.maximum(np.repeat(counts, counts), usual)
+    within[: counts[0]] += max(usual - int(counts[0]), 0)  # the first stamp has its last rows
+    time = block.time + float(steps[0]) * within / of
+    return _Spread(float(steps[0]), usual, np.asarray(time))
 
 
 def without_outliers(block: Block, rules: Rules) -> Block:

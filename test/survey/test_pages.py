@@ -124,7 +124,7 @@ def test_a_figure_is_zoomed_by_dragging_and_comes_back(loop_file: Path) -> None:
         back: area.getAttribute("viewBox").split(" ").map(Number)[2] };
     """
     acted = probe(loop_file, 1400, dark=False, act=act)["acted"]
-    assert acted["zoomed"][2] == pytest.approx(0.2 * 960 / 896 * acted["wide"], rel=0.02)
+    assert acted["zoomed"][2] == pytest.approx(0.2 * 960 / 880 * acted["wide"], rel=0.02)
     assert acted["back"] == pytest.approx(acted["wide"])
     assert acted["shown"]
     assert len(acted["ticks"]) >= 2

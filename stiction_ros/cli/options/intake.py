@@ -138,8 +138,9 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
     Returns:
         Exit code: 0, or 1 when no loop can be read.
     """
-    readable = 0
+    readable = known = 0
     for loop in loops(paths, options):
+        known += 1
         readable += loop.problem is None
         files = ", ".join(file.name for file in loop.files)
         said = loop.summary if loop.problem is None else f"not read: {loop.problem}"
@@ -148,6 +149,7 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
             print(f"  {signal} from {column}")
         for note in loop.notes:
             print(f"  note: {note}")
+    print(f"{known} loops, {readable} can be read" if known else "no file of a loop")
     return 0 if readable else 1
 
 

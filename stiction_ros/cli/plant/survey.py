@@ -10,7 +10,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,9 @@ from stiction_ros.errors import InputError, storing
 
 SHOWN = 30
 """Rows of the list that are printed."""
+
+NAMED = 8
+"""Names that a remark lists."""
 
 PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
 
@@ -76,6 +79,7 @@ def run(options: argparse.Namespace) -> int:
     if options.dry_run:
         return show_loops(paths, intake)
     costs = {name: _number(value, options.cost) for name, value in _pairs(options.cost)}
+    units = dict(_pairs(options.units))
     identification = IdentificationOptions()
     if options.delay is not None:
         identification = dataclasses.replace(identification, delay=options.delay)
@@ -84,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
             identification,
             gain=not options.no_gain,
             pages=options.out is not None,
-            units=tuple(_pairs(options.units)),
+            units=tuple(units.items()),
             read_by=repr(intake),
         ),
         None if options.out is None else Path(options.out),
@@ -98,6 +102,8 @@ def run(options: argparse.Namespace) -> int:
     found = dataclasses.replace(
         found, date=datetime.datetime.now(datetime.UTC).isoformat(" ", "minutes")
     )
+    for file, names in ((options.cost, costs), (options.units, units)):
+        _tell_strangers(file, names, {entry.name for entry in found.entries})
     if plan.out is not None:
         _write(found, plan.out, trends)
     if options.json is not None:
@@ -188,6 +194,14 @@ def _pairs(file: str | None) -> list[tuple[str, str]]:
         raise InputError("has no second column", where=f"{file}: row {short}", fix="loop,value")
     pairs = [(row[0].strip(), row[1].strip()) for row in rows]
     return pairs[1:] if pairs and pairs[0][0].lower() in ("loop", "tag", "name") else pairs
+
+
+def _tell_strangers(file: str | None, names: Iterable[str], loops: set[str]) -> None:
+    """Say which names of a file are no loop, as a misspelt one would not be missed."""
+    strange = [name for name in names if name not in loops]
+    if strange:
+        more = " and others" if len(strange) > NAMED else ""
+        print(f"{file}: no loop is called {', '.join(strange[:NAMED])}{more}", file=sys.stderr)
 
 
 def _number(text: str, file: str | None) -> float:

@@ -30,6 +30,17 @@ BAD_WORDS = re.compile(
 SHOWN = 30
 """Characters of a cell that an error shows."""
 
+_SIGNS = str.maketrans({"\u2212": "-", "\u00a0": "", "\u202f": "", "\u2009": "", "'": ""})
+"""Signs in numbers that are typeset: a minus, and spaces and marks between thousands."""
+
+_UNIT = re.compile(
+    r"([+-]?[\d.,]*\d(?:[eE][+-]?\d+)?)\s*"
+    r"(?:%|°\s?[CF]?|[^\W\d_]+\d?/[^\W\d_]+\d?|"
+    r"(?<=\s)(?:deg ?[CF]|[CFKVA]|m?bar[ag]?|[kM]?Pa|psi[ag]?|[mck]?m|kg|t|l|m3|m³|mA|Hz|rpm|ppm|"
+    r"pH|in|ft))"
+)
+"""A number and its unit in one cell."""
+
 _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _STAMP = re.compile(
     r"\d{1,4}[./-](\d{1,2}|[^\W\d_]{3,9}\.?)[./-]\d{2,4}([ T,].*)?|\d{8}T?\s?\d{4,6}.*|"
@@ -128,14 +139,21 @@ class Numbers:
         for row, cell in enumerate(cells):
             text = str(cell).strip()
             value = number(text)
-            if value is None and "," in text:
-                value = number(self._with_point(text))
+            if value is None:
+                value = self._typeset(text)
             if value is None or not math.isfinite(value):
                 self._note(row, text, 1, not_finite=value is not None)
                 value = math.nan
                 blank[row] = not text
             values[row] = value
         return values
+
+    def _typeset(self, text: str) -> float | None:
+        """Return the number in a cell that is written for people."""
+        plain = text.translate(_SIGNS)
+        unit = _UNIT.fullmatch(plain)
+        plain = unit[1] if unit else plain
+        return number(self._with_point(plain) if "," in plain else plain)
 
     def _with_point(self, text: str) -> str:
         comma, point = text.rfind(","), text.rfind(".")

@@ -21,7 +21,7 @@ LOOKED_AT = 40
 """Lines at the top of a file that are looked at."""
 
 UNITS = re.compile(
-    r"%|0-1|0\.\.1|4-20 ?ma|other|pct\.?|percent|prozent|[-–]|none|ratio|share|fraction|"
+    r"%|0-1|0\.\.1|4-20 ?ma|other|pct\.?|percent|prozent|[-–]|none|ratio|share|frac(?:tion)?|"
     r"s|sec|seconds?|ms|msec|milliseconds?|us|µs|ns|min|minutes?|h|hours?|days?|ma|v|bar[ag]?|mbar|k?pa[ag]?|mpa|psi[ag]?|"
     r"°?[cfk]|deg ?[cfk]|[kmg]?g/[hs]|t/h|kg/h|l/(h|s|min)|m3/h|m³/h|n?m3/h|nm³/h|m|mm|cm|"
     r"kg|g|l|m3|m³|rpm|ph|ppm|vol%|wt%|eu|unit|utc|datetime|yyyy.*|dd.*|mm.*|float\d*|double|string",

@@ -37,6 +37,22 @@ _CLOCK = re.compile(
 _ZONE = re.compile(r"(?:Z|[+-]\d\d:?\d\d)$")
 
 
+_OFFSETS = {
+    **dict.fromkeys(("UTC", "GMT", "WET"), "+00:00"),
+    **dict.fromkeys(("CET", "MEZ", "WEST"), "+01:00"),
+    **dict.fromkeys(("CEST", "MESZ", "EET"), "+02:00"),
+    "EEST": "+03:00",
+    "EDT": "-04:00",
+    **dict.fromkeys(("EST", "CDT"), "-05:00"),
+    "MDT": "-06:00",
+    **dict.fromkeys(("MST", "PDT"), "-07:00"),
+    "PST": "-08:00",
+}
+"""Zones by their names, of which each is one alone; CST, IST and BST are several."""
+
+_NAMED = re.compile(rf"\s*\b({'|'.join(_OFFSETS)})$")
+
+
 class DateOrder(enum.StrEnum):
     """Which comes first in a date such as 01/02/2024."""
 
@@ -87,6 +103,8 @@ class Stamps:
 
     def add(self, cells: Cells) -> None:
         """Add the next piece of the column."""
+        if not isinstance(cells, np.ndarray):
+            cells = _with_offsets(cells)
         if not self._kind:
             self._kind = self._told(cells)
         if self._kind == "number":
@@ -234,6 +252,13 @@ class Stamps:
         there = np.isfinite(values)
         first = float(values[np.argmax(there)]) if there.any() else 0.0
         return Times(values - first, first, False, False, wrong, "")
+
+
+def _with_offsets(cells: Sequence[str]) -> Sequence[str]:
+    """Return stamps with the offset of a zone that is named behind them."""
+    if not any(_NAMED.search(cell.strip()) for cell in (*cells[:1], *cells[-1:])):
+        return cells
+    return [_NAMED.sub(lambda found: _OFFSETS[found[1]], cell.strip()) for cell in cells]
 
 
 def _iso(cell: str) -> datetime.datetime | None:

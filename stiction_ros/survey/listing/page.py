@@ -229,6 +229,6 @@ def _legend(costs: bool) -> str:
         "come first, those that are surest and lose most of OP's movement in their band at the "
         "top. Undecided ones follow in the order of what speaks for their friction."
         f"{money} <i>After service</i>, <i>embedding</i> and <i>retuned</i> are what of the "
-        "IAE of now is left, simulated; the pages of the loops have all figures with their "
-        "intervals.</p>"
+        "IAE of now is left, simulated; where nothing stands the record does not tell, and the "
+        "page of the loop says why. There are all figures with their intervals.</p>"
     )

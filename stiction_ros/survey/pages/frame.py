@@ -86,6 +86,7 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   table.list td:empty { display: none; }
   table.list td.name, table.list td.wordy { grid-column: 1 / -1; }
   table.list td.wordy::before { content: none; }
+  .plot[data-low] text { font-size: 24px; }
   table.list td.rank { order: 1; } table.list td { order: 2; } table.list td.name { order: 0; }
 }
 @media print { :root { color-scheme: light; } main { max-width: none; padding: 0; }

@@ -13,8 +13,9 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.survey.pages.frame import text
 
 WIDTH, HEIGHT = 960, 240
-LEFT, RIGHT, TOP, BOTTOM = 56, 8, 8, 26
-"""Size of a figure and its margins, units of its own."""
+LEFT, RIGHT, TOP, BOTTOM = 72, 8, 8, 32
+"""Size of a figure and its margins, units of its own: a phone shows it at a third, and the figures
+on its axes twice as large."""
 
 MOST = 3000
 """Points of a curve; of a longer one the lowest and highest of each stretch are kept."""

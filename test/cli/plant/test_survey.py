@@ -30,7 +30,7 @@ def test_a_folder_gives_a_list_with_a_reason_for_every_loop(
 ) -> None:
     out = tmp_path / "out"
     costs = tmp_path / "cost.csv"
-    costs.write_text("loop,cost\nFIC1,3.5\n")
+    costs.write_text("loop,cost\nFIC1,3.5\nFIC11,2\n")
     arguments = ["survey", str(exports), "--out", str(out), "--jobs", "1", "--cost", str(costs)]
     assert _code([*arguments, "--json", str(tmp_path / "s.json")]) == 0
     document = json.loads((tmp_path / "s.json").read_text())
@@ -42,7 +42,9 @@ def test_a_folder_gives_a_list_with_a_reason_for_every_loop(
     assert document["engine"] == "local"
     for name in ("survey.html", "survey.csv", "survey.xlsx", "survey.log", "loops.jsonl"):
         assert (out / name).stat().st_size > 0
-    assert "FIC1" in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert "FIC1" in told.out
+    assert "no loop is called FIC11" in told.err
     before = (out / "loops.jsonl").read_bytes()
     assert _code([*arguments, "--resume"]) == 0
     assert (out / "loops.jsonl").read_bytes() == before
