@@ -103,8 +103,11 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
     grid = np.vstack([grid, deadbands])
     start = np.full(len(grid), best.starts[valve])
     rows.append(grid)
-    found_near = losses(problem, best, valve, np.column_stack([grid, start]), best.fits, held=True)
-    lost.append(found_near)
+    tried = np.column_stack([grid, start])
+    held, free = (
+        losses(problem, best, valve, tried, best.fits, held=each) for each in (True, False)
+    )
+    lost.append(np.minimum(held, free))
     return np.vstack(rows), np.concatenate(lost)
 
 

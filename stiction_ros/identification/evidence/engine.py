@@ -60,7 +60,7 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
-WIDER = 1.2  # of OP's movement: a wider band is not what makes it
+WIDER = 2.0  # of OP's movement: a wider band is not what makes it
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 REJECTED = 6.0
 """−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
