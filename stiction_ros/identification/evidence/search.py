@@ -113,7 +113,7 @@ class _Valve:
         stems[self.valve] = self.problem.stems(self.valve, row[None, :2], row[2])[0]
         if whole:
             found = tuple(
-                fit_output(self.problem, i, stems, (fit, *(self._begun(i) if anew else ())))
+                fit_output(self.problem, i, stems, (fit, *((self.base.fits[i],) if anew else ())))
                 for i, fit in enumerate(fits)
             )
         else:
@@ -150,10 +150,6 @@ class _Valve:
         """Fit the heads until nothing changes; the first of them ``anew``, too."""
         for k, head in enumerate(self.heads(HEADS, APART)):
             self.add(self.row_of(head), head.fits, whole=True, anew=anew and k == 0)
-
-    def _begun(self, output: int) -> list[ResponsePrior]:
-        known = self.problem.reaches[output] is not None
-        return beginnings(self.problem, output) if known else []
 
     def polish(self) -> None:
         """Look closer and closer round the heads, and along the lines through them."""
@@ -232,7 +228,7 @@ def search_valve(
     if looked.met:
         looked.settle(anew=True)
         looked.polish()
-        looked.settle(anew=True)
+        looked.settle()
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 
