@@ -47,7 +47,7 @@ ComplexArray = NDArray[np.complex128]
 ROUNDS = 6
 SETTLED = 0.2  # of −2 log likelihood: a round that gains less is the last
 TUNED = (0, 1, 3)  # rounds in which the prior is chosen anew
-BEGUN = (FREE, 2, 4)  # reaches from which fits begin that have no neighbours
+BEGUN = (FREE, 1, 3, 5)  # reaches from which fits begin that have no neighbours
 LOAD = 1e-8  # of the noise's variance, that keeps its equations regular
 
 

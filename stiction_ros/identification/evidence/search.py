@@ -30,7 +30,6 @@ from stiction_ros.identification.evidence.output_fit import (
 )
 from stiction_ros.identification.evidence.problem import LIMIT, Problem
 from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, finer_grid
-from stiction_ros.identification.linear.response_prior import ResponsePrior
 
 SEEDS = 6  # frictions taken from one look at the whole triangle
 APART = 0.03  # of the span of OP, by which they differ
