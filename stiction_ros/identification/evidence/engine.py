@@ -67,7 +67,8 @@ REJECTED = 6.0
 likelihood of none each."""
 REJECTING = 2  # rates that do
 SURELY = 10.0  # what they must lose where one rate alone rejects them
-NOTHING = 8.0  # what they may gain at any other rate then
+NOTHING = 8.0
+"""What they may gain at any rate with news: as much as the best of many frictions does on noise."""
 BETWEEN = 3.0
 """Standard deviations of OP's innovations by which the band may be larger than the record shows: a
 valve feels what OP does between two samples, and slips at its peaks."""
@@ -264,9 +265,9 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
         return False
     gains = [look.accepted[valve].material_gain for look in seen if look.carries_news]
     lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
-    most = max(gains, default=PRICE)
-    twice = sum(one >= REJECTED for one in lost) >= REJECTING and most < PRICE
-    return twice or (max(lost, default=0.0) >= SURELY and most < NOTHING)
+    twice = sum(one >= REJECTED for one in lost) >= REJECTING
+    surely = max(lost, default=0.0) >= SURELY
+    return max(gains, default=PRICE) < NOTHING and (twice or surely)
 
 
 def _over_all(

@@ -111,7 +111,11 @@ class Look:
         It has news, sees all of the response, and this gets as far as the controller tells.
         """
         fits = zip(self.found.ideal.fits, self.problem.reaches, strict=True)
-        backwards = any(fit.prior.reach == FREE for fit, reach in fits if reach is not None)
+        backwards = any(
+            fit.prior.reach == FREE
+            for fit, reach in fits
+            if reach is not None and reach.valve == valve
+        )
         return self.carries_news and not backwards and self.covers(valve)
 
 

@@ -104,8 +104,8 @@ def test_the_verdict_follows_from_what_the_rates_say(
         ([rejected(REJECTED + 0.1)], UNDECIDED),
         ([rejected(REJECTED + 0.1)] * 2, HEALTHY),
         ([rejected(REJECTED + 0.1), rejected(REJECTED - 0.1)], UNDECIDED),
-        ([*[rejected(REJECTED + 0.1)] * 2, held(PRICE - 1.0, (0.1, 0.2))], HEALTHY),
-        ([*[rejected(30.0)] * 3, held(PRICE + 1.0, (0.1, 0.2))], UNDECIDED),
+        ([*[rejected(REJECTED + 0.1)] * 2, held(NOTHING - 1.0, (0.1, 0.2))], HEALTHY),
+        ([*[rejected(30.0)] * 3, held(NOTHING + 1.0, (0.1, 0.2))], UNDECIDED),
     ],
 )
 def test_a_valve_is_healthy_where_rates_reject_all_that_matters_and_none_finds_it(
