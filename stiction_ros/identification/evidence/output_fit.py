@@ -377,17 +377,20 @@ def _descended(
         noise, prior = start.noise, start.prior
     whole = Whitened.of(problem, output, stems, noise)
     fit = _fitted(problem, output, whole, prior)
-    best = fit
+    best, settled = fit, False
     for turn in range(ROUNDS):
-        if turn in TUNED and (tuned := _tuned(whole, prior)) != prior:
-            prior = tuned
-            fit = _fitted(problem, output, whole, prior)
+        if settled or turn in TUNED:
+            tuned = _tuned(whole, prior)
+            if settled and tuned == prior:
+                break
+            if tuned != prior:
+                prior = tuned
+                fit = _fitted(problem, output, whole, prior)
         last = fit.loss
         whole, fit = _stepped(problem, output, whole, fit)
+        settled = last - fit.loss < SETTLED
         if fit.loss < best.loss or (begins and turn == 0):
             best = fit
-        if last - fit.loss < SETTLED and turn >= TUNED[-1]:
-            break
     return best
 
 
@@ -396,16 +399,20 @@ def _stepped(
 ) -> tuple[Whitened, OutputFit]:
     """Return the fit after a step of noise and responses at once, as they stand in for each other.
 
-    Where that is no better, the noise alone is taken anew.
+    Where that is worse, the noise alone is taken anew.
     """
-    step = whole.noise_step(fit)
-    tried = []
-    for noise in (step, _noise_beside(problem, fit)):
-        again = Whitened.of(problem, output, whole.stems, noise)
-        tried.append((again, _fitted(problem, output, again, fit.prior)))
-        if tried[-1][1].loss < fit.loss:
-            break
-    return min(tried, key=lambda pair: pair[1].loss)
+    first = _with_noise(problem, output, whole, fit, whole.noise_step(fit))
+    if first[1].loss < fit.loss + SETTLED:
+        return first
+    second = _with_noise(problem, output, whole, fit, _noise_beside(problem, fit))
+    return min(first, second, key=lambda pair: pair[1].loss)
+
+
+def _with_noise(
+    problem: Problem, output: int, whole: Whitened, fit: OutputFit, noise: FloatArray
+) -> tuple[Whitened, OutputFit]:
+    again = Whitened.of(problem, output, whole.stems, noise)
+    return again, _fitted(problem, output, again, fit.prior)
 
 
 def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
