@@ -19,6 +19,7 @@ FREEDOM = 3  # f_S, f_D, and one for the choice among many
 MISFIT = 0.1
 """Share of the evidence for friction itself on which no friction is rejected: no valve obeys a
 law to the letter, and what the law misses weighs as much as what it explains grows."""
+HARMLESS = 0.08  # of the range of OP: a valve is healthy when all larger bands are rejected
 STEPS = (0.3, 0.1, 0.03, 0.01, 0.003)  # of f_S + f_D: grids round the best
 
 
@@ -32,6 +33,8 @@ class Accepted:
             which it has none.
         none: whether a valve without friction is not rejected.
         deadband_loss: by how much the best f_D = f_S is worse than the best.
+        material_gain: what the best friction adds whose band is above :data:`HARMLESS`; below 0
+            where all such are less likely than none.
         profile: rows (f_S, least loss above the best), best over f_D.
     """
 
@@ -41,6 +44,7 @@ class Accepted:
     gain: float
     none: bool
     deadband_loss: float
+    material_gain: float
     profile: tuple[tuple[float, float], ...]
 
     def times(self, span: float) -> Accepted:
@@ -65,6 +69,7 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
     gain = found.without[valve].loss - best.loss
     slack = chi2_quantile(confidence, FREEDOM) + MISFIT * max(gain, 0.0)
     rows, lost = _looked_at(problem, found, valve)
+    material = float(lost[rows.sum(axis=1) > HARMLESS].min(initial=np.inf))
     lost = lost - lost.min()
     inside = lost <= slack
     static, dynamic = rows[inside].T
@@ -77,6 +82,7 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         gain=gain,
         none=gain <= slack,
         deadband_loss=float(lost[flat].min(initial=np.inf)),
+        material_gain=found.without[valve].loss - material,
         profile=_profile(rows[:, 0], lost),
     )
 
@@ -97,7 +103,11 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
     grid = np.vstack([grid, deadbands])
     start = np.full(len(grid), best.starts[valve])
     rows.append(grid)
-    lost.append(losses(problem, best, valve, np.column_stack([grid, start]), best.fits))
+    tried = np.column_stack([grid, start])
+    held, free = (
+        losses(problem, best, valve, tried, best.fits, held=each) for each in (True, False)
+    )
+    lost.append(np.minimum(held, free))
     return np.vstack(rows), np.concatenate(lost)
 
 

@@ -8,9 +8,15 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.output_fit import OutputFit, Whitened, fit_output
+from stiction_ros.identification.evidence.output_fit import (
+    OutputFit,
+    Whitened,
+    beginnings,
+    fit_output,
+)
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.kernels.scan import best_apart
+from stiction_ros.identification.linear.response_prior import FREE, ResponsePrior
 
 TOGETHER = 64  # stems that are judged in one go: few enough to stay near the processor
 
@@ -42,7 +48,13 @@ class Candidate:
 
 
 def losses(
-    problem: Problem, beside: Candidate, valve: int, rows: FloatArray, fits: Sequence[OutputFit]
+    problem: Problem,
+    beside: Candidate,
+    valve: int,
+    rows: FloatArray,
+    fits: Sequence[OutputFit],
+    *,
+    held: bool = False,
 ) -> FloatArray:
     """Return the loss of many frictions of one valve, shape (G,).
 
@@ -54,9 +66,14 @@ def losses(
         valve: index.
         rows: (f_S, f_D, start), shape (G, 3), further parameters of the law before the start.
         fits: whose noise and prior are taken.
+        held: whether responses get as far as in these fits; otherwise each as far as it may.
     """
+    priors = [fit.prior if held else dataclasses.replace(fit.prior, reach=FREE) for fit in fits]
     others = np.delete(beside.stems, valve, axis=0)
-    judges = [Whitened.of(problem, i, others, f.noise).under(f.prior) for i, f in enumerate(fits)]
+    judges = [
+        Whitened.of(problem, i, others, fit.noise, valve).under(prior)
+        for i, (fit, prior) in enumerate(zip(fits, priors, strict=True))
+    ]
     out = np.full(len(rows), np.inf)
     within = np.flatnonzero(rows[:, 0] <= problem.limit[valve])
     for begin in range(0, len(within), TOGETHER):
@@ -75,7 +92,9 @@ def rows_apart(places: FloatArray, found: FloatArray, count: int, distance: floa
 def ideal(problem: Problem, starts: Iterable[Sequence[OutputFit]] = ()) -> Candidate:
     """Return the best fit without friction, from white noise and from ``starts``."""
     stems = problem.ideal_stems()
-    begun: list[list[OutputFit | None]] = [[None] for _ in problem.pv]
+    begun: list[list[OutputFit | ResponsePrior]] = [
+        [*beginnings(problem, i)] for i in range(len(problem.pv))
+    ]
     for fits in starts:
         for row, fit in zip(begun, fits, strict=True):
             row.append(fit)

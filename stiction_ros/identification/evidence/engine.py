@@ -60,9 +60,15 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 
 LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
+WIDER = 2.0  # of OP's movement: a wider band is not what makes it
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
-HARMLESS = 0.08  # of the range of OP: a valve is healthy when larger bands are rejected
-POWERFUL = 2  # rates at which larger bands must be rejected, of those that carry news
+REJECTED = 6.0
+"""−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
+likelihood of none each."""
+REJECTING = 2  # rates that do
+SURELY = 10.0  # what they must lose where one rate alone rejects them
+NOTHING = 8.0
+"""What they may gain at any rate with news: as much as the best of many frictions does on noise."""
 BETWEEN = 3.0
 """Standard deviations of OP's innovations by which the band may be larger than the record shows: a
 valve feels what OP does between two samples, and slips at its peaks."""
@@ -114,8 +120,9 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     """Return the estimate, no longer with friction where its loop says otherwise.
 
     A friction without which OP would move all the same is not what moves it, where the controller
-    is known and the evidence not overwhelming. And a stem that is a wave itself cannot be told
-    from one that comes from outside.
+    is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
+    that comes from outside. And a band that is wider than OP moves about its mean moves with its
+    large moves alone, as those in manual are.
     """
     if not valve.verdict.has_friction:
         return valve
@@ -125,7 +132,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
     idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
     band_share = told["share"] * (1.0 + valve.dynamic_friction / valve.static_friction)
-    if not (idle or is_wave_itself(told, band_share)):
+    wide = valve.band_share > WIDER
+    if not (idle or wide or is_wave_itself(told, band_share)):
         return valve
     return dataclasses.replace(
         valve,
@@ -244,13 +252,22 @@ def _verdict(
         both = min(figures["half_1"], figures["half_2"]) > 0.0
         kind = kind_of(held.deadband_loss, held.static, held.dynamic)
         return kind if both and slips else VerdictKind.UNDECIDED
-    quiet = max(look.accepted[valve].gain for look in seen) < PRICE
-    rejecting = [
-        look for look in seen if look.carries_news and look.accepted[valve].band[1] <= HARMLESS
-    ]
-    if quiet and slips and len(rejecting) >= min(POWERFUL, len(seen)):
-        return VerdictKind.HEALTHY
-    return VerdictKind.UNDECIDED
+    return VerdictKind.HEALTHY if slips and _harmless(seen, valve) else VerdictKind.UNDECIDED
+
+
+def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
+    """Tell whether the record rejects all bands that would matter: at two rates, or surely at one.
+
+    A rate that takes something else for the process rejects nothing, as neither do rows that are
+    drawn between reports; and what such rows say for friction is not believed before it is sure.
+    """
+    if any(look.accepted[valve].material_gain > look.price + SURE for look in seen):
+        return False
+    gains = [look.accepted[valve].material_gain for look in seen if look.carries_news]
+    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
+    twice = sum(one >= REJECTED for one in lost) >= REJECTING
+    surely = max(lost, default=0.0) >= SURELY
+    return max(gains, default=PRICE) < NOTHING and (twice or surely)
 
 
 def _over_all(

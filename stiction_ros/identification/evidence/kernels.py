@@ -72,6 +72,7 @@ class Given(NamedTuple):
         root: L^-1, with L L^T the products of the known signals and of the lags of each of
             ``others`` with each other and what is known of them before the record, shape (q, q).
         target: :func:`step_products` with what all these leave of the output, shape (N + M + 8,).
+        pull: that a held response adds to its products with the target, shape (r,).
         energy: of that and of the prior of what explains the rest.
         edges: of the groups of lags, shape (r + 1,).
     """
@@ -84,6 +85,7 @@ class Given(NamedTuple):
     others_first: FloatArray
     root: FloatArray
     target: FloatArray
+    pull: FloatArray
     energy: float
     edges: IntArray
 
@@ -125,7 +127,7 @@ def evidence(
     gram -= np.dot(shared, shared.T)
     gram += precision
     determinant = factorised(gram)
-    seen = grouped(lag_products(moves, given.target, taps), edges)
+    seen = grouped(lag_products(moves, given.target, taps), edges) + given.pull
     response, explained = solved(gram, seen)
     left = max(given.energy - explained, LEAST * given.energy)
     return count * np.log(left / count) + determinant, response

@@ -29,17 +29,25 @@ from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.kernels.lags import (
     Products,
     answered,
+    beside_lags,
     products_of,
     step_products,
     whitened,
 )
-from stiction_ros.identification.linear.response_prior import ResponsePrior
+from stiction_ros.identification.linear.response_prior import (
+    FREE,
+    REACHES,
+    Held,
+    Reach,
+    ResponsePrior,
+)
 
 ComplexArray = NDArray[np.complex128]
 
 ROUNDS = 6
 SETTLED = 0.2  # of −2 log likelihood: a round that gains less is the last
 TUNED = (0, 1, 3)  # rounds in which the prior is chosen anew
+BEGUN = (FREE, 1, 3, 5)  # reaches from which fits begin that have no neighbours
 LOAD = 1e-8  # of the noise's variance, that keeps its equations regular
 
 
@@ -100,6 +108,8 @@ class Whitened:
         products: of ``known`` and of the lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
         edges: of the groups of taps.
+        reach: how far the response of one of the valves is expected to get, or None.
+        at: index in ``stems`` of the one whose response it is; −1 where that is not among them.
     """
 
     noise: FloatArray
@@ -111,10 +121,27 @@ class Whitened:
     products: FloatArray
     seen_products: FloatArray
     edges: IntArray
+    reach: Reach | None
+    at: int
 
     @classmethod
-    def of(cls, problem: Problem, output: int, stems: FloatArray, noise: FloatArray) -> Whitened:
-        """Whiten an output and ``stems``, scaled, shape (m, N); m may be 0."""
+    def of(
+        cls,
+        problem: Problem,
+        output: int,
+        stems: FloatArray,
+        noise: FloatArray,
+        without: int | None = None,
+    ) -> Whitened:
+        """Whiten an output and the stems beside it.
+
+        Args:
+            problem: the record.
+            output: index.
+            stems: scaled, shape (m, N), or of all valves but one; there may be none.
+            noise: D.
+            without: index of the valve that is left out.
+        """
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[problem.first :]
         known = problem.known[output]
@@ -128,7 +155,22 @@ class Whitened:
         seen_products = np.concatenate([known @ seen, lags.beside[count]])
         turns = np.outer(problem.turns(output), np.arange(len(noise)))
         passed = np.exp(-1j * turns) @ noise
-        return cls(noise, seen, known, passed, stems, lags, products, seen_products, problem.edges)
+        reach, at = problem.reaches[output], -1
+        if reach is not None and reach.valve != without:
+            at = reach.valve - (without is not None and without < reach.valve)
+        return cls(
+            noise,
+            seen,
+            known,
+            passed,
+            stems,
+            lags,
+            products,
+            seen_products,
+            problem.edges,
+            reach,
+            at,
+        )
 
     def wave_variances(self, prior: ResponsePrior) -> FloatArray:
         """Return the variances of the sines and cosines, whitened, over σ², shape (2 H,)."""
@@ -137,11 +179,35 @@ class Whitened:
         harmonics = np.arange(1, len(self.passed) + 1)
         return np.tile(prior.wave_variances(harmonics) * np.abs(self.passed) ** 2, 2)
 
-    def with_precision(self, prior: ResponsePrior) -> FloatArray:
-        """Return the products and what is known before the record, shape (q, q)."""
+    def held(self, prior: ResponsePrior) -> Held | None:
+        """Return the response that is held; None where none is expected to get anywhere."""
+        return None if self.reach is None else prior.held(self.edges, self.reach)
+
+    def block(self, valve: int) -> slice:
+        """Return where the lags of a stem stand among what explains the output."""
+        size = len(self.edges) - 1
+        return slice(len(self.known) + valve * size, len(self.known) + (valve + 1) * size)
+
+    def equations(self, prior: ResponsePrior) -> tuple[FloatArray, FloatArray, float]:
+        """Return what is known before the record with the products, those with y, and y's energy.
+
+        Shapes (q, q) and (q,).
+        """
+        out, seen, energy = self._with_precision(prior), self.seen_products, _energy(self.seen)
+        held = self.held(prior) if self.at >= 0 else None
+        if held is not None:
+            block = self.block(self.at)
+            seen = seen.copy()
+            out[block, block] += held.precision
+            seen[block] += held.pull
+            energy += held.energy
+        return out, seen, energy
+
+    def _with_precision(self, prior: ResponsePrior) -> FloatArray:
         out, precision = self.products.copy(), prior.precision(self.edges)
-        waves = np.arange(1, len(self.known))
-        out[waves, waves] += 1.0 / self.wave_variances(prior)
+        if len(self.known) > 1:
+            waves = np.arange(1, len(self.known))
+            out[waves, waves] += 1.0 / self.wave_variances(prior)
         for start in range(len(self.known), len(out), len(precision)):
             block = slice(start, start + len(precision))
             out[block, block] += precision
@@ -150,28 +216,57 @@ class Whitened:
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
         waves = float(np.log(self.wave_variances(prior)).sum())
-        return waves + len(self.stems) * prior.log_determinant(self.edges)
+        held = self.held(prior)
+        known = 0.0 if held is None else held.determinant
+        return waves + len(self.stems) * prior.log_determinant(self.edges) + known
 
     def loss(self, prior: ResponsePrior) -> tuple[float, FloatArray]:
         """Return the loss, and what multiplies ``known`` and each lag, shape (q,)."""
-        factor = self.with_precision(prior)
+        factor, seen, energy = self.equations(prior)
         determinant = factorised(factor) + self.log_determinant(prior)
-        weights, explained = solved(factor, self.seen_products)
-        count, energy = len(self.seen), float(self.seen @ self.seen)
-        left = max(energy - explained, LEAST * energy)
+        weights, explained = solved(factor, seen)
+        count = len(self.seen)
+        left = max(energy - explained, LEAST * _energy(self.seen))
         return float(count * np.log(left / count) + determinant), weights
+
+    def noise_step(self, fit: OutputFit) -> FloatArray:
+        """Return D after a Gauss-Newton step in D, responses and level together, shape (d + 1,).
+
+        Args:
+            fit: the one of this D.
+        """
+        first = len(fit.rest) - len(self.seen)
+        lags = range(1, NOISE_ORDER + 1)
+        past = np.array([fit.rest[first - i : len(fit.rest) - i] for i in lags])
+        equations, seen, _ = self.equations(fit.prior)
+        beside = beside_lags(self.noise, self.stems, past, self.edges)
+        cross = np.hstack([past @ self.known.T, beside])
+        solution = np.linalg.solve(equations, np.column_stack([cross.T, seen]))
+        gram = past @ past.T
+        gram += LOAD * float(fit.rest @ fit.rest) * np.eye(NOISE_ORDER)
+        step = np.linalg.solve(
+            gram - cross @ solution[:, :-1], cross @ solution[:, -1] - past @ self.seen
+        )
+        out = np.append(0.0, step)
+        out[: len(self.noise)] += self.noise
+        return out
 
     def under(self, prior: ResponsePrior) -> Criterion:
         """Return the criterion for one more stem beside these, their responses integrated out."""
-        factor = np.linalg.cholesky(self.with_precision(prior))
+        equations, seen, energy = self.equations(prior)
+        factor = np.linalg.cholesky(equations)
         root = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
-        half = root @ self.seen_products
+        half = root @ seen
         weights = root.T @ half
         target = self.seen - weights[: len(self.known)] @ self.known
         levels = weights[len(self.known) :].reshape(len(self.stems), len(self.edges) - 1)
         for past, level in zip(self.lags.past, levels, strict=True):
             target -= answered(past, np.repeat(level, np.diff(self.edges)))[-len(target) :]
-        energy = float(self.seen @ self.seen) - float(half @ half)
+        energy -= float(half @ half)
+        precision, pull = prior.precision(self.edges), np.zeros(len(self.edges) - 1)
+        held = self.held(prior) if self.at < 0 else None
+        if held is not None:  # the response of the stem that is judged
+            precision, pull, energy = precision + held.precision, held.pull, energy + held.energy
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
         rows, taps = self.stems.shape[1], int(self.edges[-1])
         noise, count = self.noise, len(self.seen)
@@ -186,16 +281,27 @@ class Whitened:
                 others_first=self.lags.first,
                 root=np.ascontiguousarray(root),
                 target=step_products(noise, target, rows, taps),
+                pull=pull,
                 energy=energy,
                 edges=self.edges,
             ),
-            prior.precision(self.edges),
+            precision,
             determinant + prior.log_determinant(self.edges),
         )
 
 
+def beginnings(problem: Problem, output: int) -> list[ResponsePrior]:
+    """Return the priors from which a fit of an output begins without neighbours."""
+    if problem.reaches[output] is None:
+        return [ResponsePrior()]
+    return [ResponsePrior(reach=reach) for reach in BEGUN]
+
+
 def fit_output(
-    problem: Problem, output: int, stems: FloatArray, starts: Sequence[OutputFit | None] = (None,)
+    problem: Problem,
+    output: int,
+    stems: FloatArray,
+    starts: Sequence[OutputFit | ResponsePrior] = (),
 ) -> OutputFit:
     """Return the best fit that is reached from any of ``starts``.
 
@@ -203,47 +309,110 @@ def fit_output(
         problem: the record.
         output: index.
         stems: scaled, shape (m, n).
-        starts: fits of neighbours; None begins with white noise.
+        starts: fits of neighbours, or priors beside white noise; of these :func:`beginnings`
+            without any.
     """
-    found = [_descended(problem, output, stems, start) for start in starts]
-    return min(found, key=lambda fit: fit.loss)
+    told = starts or beginnings(problem, output)
+    found = [_descended(problem, output, stems, start) for start in told]
+    best = min(found, key=lambda fit: fit.loss)
+    if len(told) == 1 or problem.reaches[output] is None:
+        return best
+    return _reaching(problem, output, stems, best)
+
+
+def _reaching(problem: Problem, output: int, stems: FloatArray, best: OutputFit) -> OutputFit:
+    """Return the fit to which none with a reach beside its own is better, from ``best``."""
+    met = {best.prior.reach}
+    while True:
+        for reach in (best.prior.reach - 1, best.prior.reach + 1):
+            if reach in met or not 0 <= reach < len(REACHES):
+                continue
+            met.add(reach)
+            prior = dataclasses.replace(best.prior, reach=reach)
+            start = dataclasses.replace(best, prior=prior)
+            found = _descended(problem, output, stems, start)
+            if found.loss < best.loss:
+                best = found
+                break
+        else:
+            return best
 
 
 def follow(problem: Problem, output: int, stems: FloatArray, start: OutputFit) -> OutputFit:
-    """Return ``start`` carried over to other stems: its prior, and its noise taken once anew."""
-    kept = _fitted(problem, output, Whitened.of(problem, output, stems, start.noise), start.prior)
-    again = Whitened.of(problem, output, stems, _noise_beside(problem, kept))
-    return min(kept, _fitted(problem, output, again, start.prior), key=lambda fit: fit.loss)
+    """Return ``start`` carried over to other stems: its prior, and its noise by a step.
+
+    How far the responses get is chosen anew.
+    """
+    whole = Whitened.of(problem, output, stems, start.noise)
+    fit = _fitted(problem, output, whole, _reached(whole, start.prior))
+    return min(fit, _stepped(problem, output, whole, fit)[1], key=lambda one: one.loss)
+
+
+def _reached(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
+    """Return the best of the priors that differ from ``prior`` in their reach alone."""
+    if whole.reach is None:
+        return prior
+    tried = [dataclasses.replace(prior, reach=k) for k in (FREE, *range(len(REACHES)))]
+    return min(tried, key=lambda one: whole.loss(one)[0])
 
 
 def white(problem: Problem, output: int, stems: FloatArray, memory: float) -> OutputFit:
     """Return the fit under the noise 1 − ``memory`` q⁻¹, with the prior that suits it."""
     noise = np.array([1.0, -memory]) if memory else np.ones(1)
     whole = Whitened.of(problem, output, stems, noise)
-    return _fitted(problem, output, whole, _tuned(whole, ResponsePrior()))
+    return _fitted(problem, output, whole, _tuned(whole, ResponsePrior(reach=FREE)))
+
+
+def _energy(signal: FloatArray) -> float:
+    return float(signal @ signal)
 
 
 def _descended(
-    problem: Problem, output: int, stems: FloatArray, start: OutputFit | None
+    problem: Problem, output: int, stems: FloatArray, start: OutputFit | ResponsePrior
 ) -> OutputFit:
-    noise = np.ones(1) if start is None else start.noise
-    prior = ResponsePrior() if start is None else start.prior
+    begins = isinstance(start, ResponsePrior)
+    if isinstance(start, ResponsePrior):
+        noise, prior = np.ones(1), start
+    else:
+        noise, prior = start.noise, start.prior
     whole = Whitened.of(problem, output, stems, noise)
     fit = _fitted(problem, output, whole, prior)
-    best, last = (None if start is None else fit), np.inf
+    best, settled = fit, False
     for turn in range(ROUNDS):
-        if turn in TUNED and (tuned := _tuned(whole, prior)) != prior:
-            prior = tuned
-            fit = _fitted(problem, output, whole, prior)
-        whole = Whitened.of(problem, output, stems, _noise_beside(problem, fit))
-        fit = _fitted(problem, output, whole, prior)
-        if best is None or fit.loss < best.loss:
-            best = fit
-        if abs(last - fit.loss) < SETTLED:
-            break
+        if settled or turn in TUNED:
+            tuned = _tuned(whole, prior)
+            if settled and tuned == prior:
+                break
+            if tuned != prior:
+                prior = tuned
+                fit = _fitted(problem, output, whole, prior)
         last = fit.loss
-    assert best is not None
+        whole, fit = _stepped(problem, output, whole, fit)
+        settled = last - fit.loss < SETTLED
+        if fit.loss < best.loss or (begins and turn == 0):
+            best = fit
     return best
+
+
+def _stepped(
+    problem: Problem, output: int, whole: Whitened, fit: OutputFit
+) -> tuple[Whitened, OutputFit]:
+    """Return the fit after a step of noise and responses at once, as they stand in for each other.
+
+    Where that is worse, the noise alone is taken anew.
+    """
+    first = _with_noise(problem, output, whole, fit, whole.noise_step(fit))
+    if first[1].loss < fit.loss + SETTLED:
+        return first
+    second = _with_noise(problem, output, whole, fit, _noise_beside(problem, fit))
+    return min(first, second, key=lambda pair: pair[1].loss)
+
+
+def _with_noise(
+    problem: Problem, output: int, whole: Whitened, fit: OutputFit, noise: FloatArray
+) -> tuple[Whitened, OutputFit]:
+    again = Whitened.of(problem, output, whole.stems, noise)
+    return again, _fitted(problem, output, again, fit.prior)
 
 
 def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:

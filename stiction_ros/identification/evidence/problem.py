@@ -11,8 +11,10 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
+from stiction_ros.identification.evidence.reach import Tuning
 from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.kernels.lags import in_rows
+from stiction_ros.identification.linear.response_prior import Reach
 from stiction_ros.identification.options import IdentificationOptions, limited
 from stiction_ros.records.record import Record
 
@@ -46,6 +48,8 @@ class Problem:
         further: per valve, values of the law's parameters behind f_S and f_D; empty where it
             has no others.
         lines: per output, frequencies of a wave from outside, turns per sample; empty for none.
+        tunings: per output, the controller that reads it; empty where none is known.
+        shrunk: per output, standard deviation of the rows over that of the samples, shape (p,).
     """
 
     op: FloatArray
@@ -59,10 +63,16 @@ class Problem:
     least_moves: int = MOVES
     further: tuple[tuple[float, ...], ...] = ()
     lines: tuple[tuple[float, ...], ...] = ()
+    tunings: tuple[Tuning | None, ...] = ()
+    shrunk: FloatArray = dataclasses.field(default_factory=lambda: np.ones(1))
 
     @classmethod
     def of(
-        cls, record: Record, options: IdentificationOptions | None = None, rate: int = 1
+        cls,
+        record: Record,
+        options: IdentificationOptions | None = None,
+        rate: int = 1,
+        tunings: tuple[Tuning | None, ...] = (),
     ) -> Problem:
         """Prepare a whole record.
 
@@ -70,6 +80,7 @@ class Problem:
             record: without gaps.
             options: of which law, largest friction and smallest delay count.
             rate: samples that are averaged to a row.
+            tunings: per output, the controller that reads it; empty where none is known.
 
         Raises:
             InputError: an unknown law, or limits that are not one or one for each valve.
@@ -89,6 +100,8 @@ class Problem:
             limit=limited(span, options.friction_limit) / span,
             scale=op.std(axis=1),
             skipped=options.delay[0] // rate,
+            tunings=tunings,
+            shrunk=slow.std(axis=1) / record.pv.std(axis=0),
         )
 
     def beginning(self, rows: int) -> Problem:
@@ -142,6 +155,21 @@ class Problem:
     def taps(self) -> int:
         """M, length of an impulse response."""
         return int(self.edges[-1])
+
+    @functools.cached_property
+    def reaches(self) -> tuple[Reach | None, ...]:
+        """Per output, how far a valve is expected to move it; None where that is not known."""
+        told = self.tunings or (None,) * len(self.pv)
+        return tuple(
+            None if one is None else one.reach(self.rate, float(self.shrunk[i]), self.edges)
+            for i, one in enumerate(told)
+        )
+
+    @property
+    def told_to_end(self) -> bool:
+        """Whether every output has a controller whose three reset times end by the last tap."""
+        known = [one is not None and one.time <= self.taps * self.rate for one in self.tunings]
+        return bool(known) and all(known)
 
     @functools.cached_property
     def waves(self) -> tuple[FloatArray, ...]:

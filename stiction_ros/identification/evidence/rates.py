@@ -27,6 +27,7 @@ from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.reach import tunings
 from stiction_ros.identification.evidence.search import (
     APART,
     Found,
@@ -37,6 +38,7 @@ from stiction_ros.identification.evidence.search import (
     search_again,
 )
 from stiction_ros.identification.exact.long_records import PART, liveliest_begin
+from stiction_ros.identification.linear.response_prior import FREE
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
 
@@ -51,12 +53,12 @@ ALIKE = 1.5
 row, and the friction with it."""
 
 
-PRICE = 15.0
+PRICE = 17.0
 """−2 log likelihood that friction must gain at two neighbouring rates: what the best of so many
 frictions gains on quiet loops without any."""
-BESIDE = 15.0
+BESIDE = 10.0
 """What it must gain more where a wave from outside is tried, whose period is chosen as well."""
-INEXACT = 0.05
+INEXACT = 0.03
 """Share of a wave's own gain that it must gain besides: no wave is one to the letter, and what it
 misses moves in time with it, as a friction may."""
 UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on beyond it
@@ -93,9 +95,28 @@ class Look:
         return self.accepted[valve].gain - self.price
 
     def covers(self, valve: int) -> bool:
-        """Return whether responses die away by their last tap, without friction of the valve."""
-        taps = np.abs([fit.responses for fit in self.found.without[valve].fits])
-        return bool(taps[..., -1].max() <= UNDIED * taps.max())
+        """Return whether responses die away by their last tap, without friction of the valve.
+
+        With friction is enough where the controller was tuned for what ends by then.
+        """
+        tried = [self.found.without[valve]]
+        if self.problem.told_to_end:
+            tried.append(self.found.best)
+        taps = [np.abs([fit.responses for fit in one.fits]) for one in tried]
+        return any(one[..., -1].max() <= UNDIED * one.max() for one in taps)
+
+    def sees_process(self, valve: int) -> bool:
+        """Return whether what this rate takes for the process is the one that is controlled.
+
+        It has news, sees all of the response, and this gets as far as the controller tells.
+        """
+        fits = zip(self.found.ideal.fits, self.problem.reaches, strict=True)
+        backwards = any(
+            fit.prior.reach == FREE
+            for fit, reach in fits
+            if reach is not None and reach.valve == valve
+        )
+        return self.carries_news and not backwards and self.covers(valve)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +149,8 @@ def looks(
         providers: of seeds.
     """
     rates = [rate for rate in RATES if rate == 1 or len(record) // rate >= LEAST_ROWS]
-    problems = [Problem.of(record, options, rate) for rate in rates]
+    told = tunings(record)
+    problems = [Problem.of(record, options, rate, told) for rate in rates]
     further = settled(problems[0])
     problems = [dataclasses.replace(problem, further=further) for problem in problems]
     found = _searched(problems, providers)

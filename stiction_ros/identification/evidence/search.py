@@ -21,7 +21,13 @@ from stiction_ros.identification.evidence.candidate import (
     rows_apart,
 )
 from stiction_ros.identification.evidence.growing import grown
-from stiction_ros.identification.evidence.output_fit import OutputFit, fit_output, follow, white
+from stiction_ros.identification.evidence.output_fit import (
+    OutputFit,
+    beginnings,
+    fit_output,
+    follow,
+    white,
+)
 from stiction_ros.identification.evidence.problem import LIMIT, Problem
 from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, finer_grid
 
@@ -87,8 +93,17 @@ class _Valve:
             and np.array_equal(one.starts[others], base.starts[others])
         }
 
-    def add(self, row: FloatArray, fits: Sequence[OutputFit], *, whole: bool) -> None:
-        """Fit a row (f_S, f_D, start) from neighbouring fits; ``whole`` until nothing changes."""
+    def add(
+        self, row: FloatArray, fits: Sequence[OutputFit], *, whole: bool, anew: bool = False
+    ) -> None:
+        """Fit a row (f_S, f_D, start) from neighbouring fits.
+
+        Args:
+            row: of this valve.
+            fits: of a neighbour.
+            whole: until nothing changes.
+            anew: also from where fits without neighbours begin.
+        """
         key = _key(row)
         if key in self._keys and not whole:
             return
@@ -96,7 +111,10 @@ class _Valve:
         stems = self.base.stems.copy()
         stems[self.valve] = self.problem.stems(self.valve, row[None, :2], row[2])[0]
         if whole:
-            found = tuple(fit_output(self.problem, i, stems, (f,)) for i, f in enumerate(fits))
+            found = tuple(
+                fit_output(self.problem, i, stems, (fit, *((self.base.fits[i],) if anew else ())))
+                for i, fit in enumerate(fits)
+            )
         else:
             found = tuple(follow(self.problem, i, stems, f) for i, f in enumerate(fits))
         friction, starts = self.base.friction.copy(), self.base.starts.copy()
@@ -127,10 +145,10 @@ class _Valve:
         met = sorted(self.met, key=lambda one: one.loss)
         return candidates_apart(met, self.valve, count, distance)
 
-    def settle(self) -> None:
-        """Fit the heads until nothing changes, once more from the noise of the best."""
-        for head in self.heads(HEADS, APART):
-            self.add(self.row_of(head), head.fits, whole=True)
+    def settle(self, *, anew: bool = False) -> None:
+        """Fit the heads until nothing changes; the first of them ``anew``, too."""
+        for k, head in enumerate(self.heads(HEADS, APART)):
+            self.add(self.row_of(head), head.fits, whole=True, anew=anew and k == 0)
 
     def polish(self) -> None:
         """Look closer and closer round the heads, and along the lines through them."""
@@ -144,6 +162,12 @@ class _Valve:
                 self._near(finer_grid(centre, step / 3.0, LIMIT), head, 2, step / 3.0)
             step /= SHRINK
         self._begin(self.heads(1, 0.0)[0])
+
+    def look_near(self, seed: Candidate, fits: Sequence[OutputFit]) -> None:
+        """Take the best beside a friction from elsewhere, the stem's beginning kept."""
+        grid = finer_grid(seed.friction[self.valve][None, :], NEAR, LIMIT)
+        start = np.full(len(grid), seed.starts[self.valve])
+        self._take(np.column_stack([grid, start]), fits, 1, 0.0)
 
     def _near(self, grid: FloatArray, head: Candidate, count: int, distance: float) -> None:
         friction, start = head.friction[self.valve], head.starts[self.valve]
@@ -201,7 +225,7 @@ def search_valve(
     if Provider.DRIFTING in providers and slower:
         looked.look(drifting)
     if looked.met:
-        looked.settle()
+        looked.settle(anew=True)
         looked.polish()
         looked.settle()
     return sorted([base, *looked.met], key=lambda one: one.loss)
@@ -244,7 +268,8 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
         rubbing = [seed for seed in seeds if seed.friction[valve, 0] > 0.0]
         for seed in candidates_apart(rubbing, valve, SEEDS, NEAR):
             tried.add(tried.row_of(seed), best.fits, whole=False)
-        tried.settle()
+            tried.look_near(seed, best.fits)
+        tried.settle(anew=True)
         if min((one.loss for one in tried.met), default=np.inf) < best.loss - BETTER:
             tried.polish()
             tried.settle()
@@ -286,7 +311,10 @@ def _one_by_one(
         friction, starts, stems = best.friction.copy(), best.starts.copy(), best.stems.copy()
         friction[valve], starts[valve] = 0.0, 0.0
         stems[valve] = problem.ideal_stems()[valve]
-        fits = tuple(fit_output(problem, i, stems, (None, fit)) for i, fit in enumerate(best.fits))
+        fits = tuple(
+            fit_output(problem, i, stems, (*beginnings(problem, i), fit))
+            for i, fit in enumerate(best.fits)
+        )
         known = [one for one in met if not one.friction[valve].any()]
         told.append(min([Candidate(friction, starts, stems, fits), *known], key=lambda c: c.loss))
     return tuple(told)

@@ -276,6 +276,30 @@ def products_of(
 
 
 @compiled_fused
+def beside_lags(
+    noise: FloatArray, stems: FloatArray, signals: FloatArray, edges: IntArray
+) -> FloatArray:
+    """Return the products of the groups of lags of stems with signals, shape (c, m r).
+
+    Args:
+        noise: monic polynomial D, shape (d + 1,).
+        stems: not whitened, shape (m, N).
+        signals: whitened, shape (c, n).
+        edges: of the groups, as in :func:`grouped`.
+    """
+    valves, rows = stems.shape
+    taps, size = edges[-1], len(edges) - 1
+    out = np.empty((len(signals), valves * size))
+    moves = [moves_of(stems[i]) for i in range(valves)]
+    for row in range(len(signals)):
+        seen = step_products(noise, signals[row], rows, taps)
+        for i in range(valves):
+            at = i * size
+            out[row, at : at + size] = grouped(lag_products(moves[i], seen, taps), edges)
+    return out
+
+
+@compiled_fused
 def in_rows(stems: FloatArray, rate: int, skipped: int, scale: float) -> FloatArray:
     """Return stems, shape (N, G), as means of ``rate`` samples over ``scale``, shape (G, n).
 

@@ -23,6 +23,43 @@ WAVES = tuple(10.0**k for k in range(-2, 9))
 SHARPNESSES = (2.0, 4.0, 6.0)
 """Powers by which the variances of harmonics fall: squares, triangles, and smoother."""
 SIZES = (1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of σ²; per standard deviation of the stem
+FREE = -1  # reach of a response of which nothing is held
+FACTOR = 3.0  # from one reach to the next: a standard deviation of its logarithm
+REACHES = range(-3, 4)  # powers of it
+MIDDLE = 0.9  # the reach itself, in units of what is expected
+TIGHT = 1e6  # 1 / variance with which a reach is held, over that of the prior
+
+
+@dataclasses.dataclass(frozen=True)
+class Reach:
+    """How far a response gets is known but for a factor.
+
+    Attributes:
+        valve: index of the one whose response it is.
+        heights: what sums its groups of taps up, shape (r,).
+        unit: the sum that is expected.
+    """
+
+    valve: int
+    heights: FloatArray
+    unit: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """A response whose sum is held, as one more row of the equations for it.
+
+    Attributes:
+        precision: that it adds, shape (r, r).
+        pull: that it adds to the products with the output, shape (r,).
+        energy: that it adds to the output's.
+        determinant: that it adds to −2 log likelihood.
+    """
+
+    precision: FloatArray
+    pull: FloatArray
+    energy: float
+    determinant: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,12 +71,14 @@ class ResponsePrior:
         size: index of c in :data:`SIZES`.
         wave, sharpness: indices in :data:`WAVES` and :data:`SHARPNESSES`; they count where there
             is a wave.
+        reach: index in :data:`REACHES`, or :data:`FREE`; it counts where one is expected.
     """
 
     decay: int = 3
     size: int = 2
     wave: int = 5
     sharpness: int = 1
+    reach: int = len(REACHES) // 2
 
     def variances(self, edges: IntArray) -> FloatArray:
         """Return the variances of the differences g over σ², shape (r,).
@@ -62,6 +101,18 @@ class ResponsePrior:
     def wave_variances(self, harmonics: IntArray) -> FloatArray:
         """Return the variances of a wave's harmonics, numbered from 1, over σ², same shape."""
         return np.asarray(WAVES[self.wave] * harmonics ** -SHARPNESSES[self.sharpness])
+
+    def held(self, edges: IntArray, reach: Reach) -> Held:
+        """Return the response that is held to the reach of this prior.
+
+        The likelihood is that of the output given the sum; how likely the sum is comes on top.
+
+        Args:
+            edges: of groups of taps, shape (r + 1,).
+            reach: what is expected.
+        """
+        heights = reach.heights.tobytes()
+        return _held(self.decay, self.size, self.reach, edges.tobytes(), heights, reach.unit)
 
     def neighbours(self, *, waves: bool = False) -> list[ResponsePrior]:
         """Return the members next to this one, itself included; ``waves`` changes those of it."""
@@ -91,3 +142,19 @@ def _inverse(decay: int, size: int, edges: bytes) -> tuple[FloatArray, float]:
     found -= np.diag(weights[:-1], 1) + np.diag(weights[:-1], -1)
     found.flags.writeable = False
     return found, float(np.log(variances).sum())
+
+
+@functools.lru_cache(maxsize=4096)
+def _held(decay: int, size: int, reach: int, edges: bytes, heights: bytes, unit: float) -> Held:
+    """Return the response that is held, what it adds not to be written to."""
+    told = np.frombuffer(heights, dtype=np.float64)
+    if reach == FREE:
+        unlikely = float(max(REACHES)) ** 2
+        return Held(np.zeros((len(told), len(told))), np.zeros(len(told)), 0.0, unlikely)
+    power = REACHES[reach]
+    goal = MIDDLE * FACTOR**power * unit
+    spread = float(told @ np.linalg.solve(_inverse(decay, size, edges)[0], told))
+    weight = TIGHT / spread
+    energy = weight * goal**2 - goal**2 / (spread + 1.0 / weight)
+    determinant = float(power**2 - np.log1p(TIGHT))
+    return Held(weight * np.outer(told, told), weight * goal * told, energy, determinant)

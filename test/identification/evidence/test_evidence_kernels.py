@@ -15,6 +15,7 @@ from stiction_ros.identification.evidence.kernels import (
 )
 from stiction_ros.identification.kernels.lags import (
     answered,
+    beside_lags,
     grouped,
     in_rows,
     lag_products,
@@ -67,6 +68,11 @@ def test_products_of_lags_are_those_of_the_rows(
     rows, others = (np.add.reduceat(lag, edges[:-1]) for lag in lags)
     found = lagged_products(one, two, begun, edges)
     assert found == pytest.approx(rows @ others.T, abs=1e-8)
+    signal = random.standard_normal((1, count))
+    groups = np.concatenate([rows, others])
+    assert beside_lags(NOISE, np.array(stems), signal, edges) == pytest.approx(
+        signal @ groups.T, abs=1e-8
+    )
     own = own_products(one, lag_products(moves[0], steps[0], taps), edges)
     assert own == pytest.approx(rows @ rows.T, abs=1e-8)
     other = random.standard_normal(count)
@@ -166,6 +172,7 @@ def _given(noise: FloatArray, y: FloatArray, edges: IntArray) -> Given:
         others_first=np.empty((0, rows + taps + 8)),
         root=np.eye(1),
         target=step_products(noise, y, rows, taps),
+        pull=np.zeros(len(edges) - 1),
         energy=float(y @ y),
         edges=edges,
     )

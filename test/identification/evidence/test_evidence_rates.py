@@ -21,6 +21,7 @@ from stiction_ros.identification.evidence.rates import (
     looks,
     samples_between_reports,
 )
+from stiction_ros.identification.evidence.reach import Tuning
 from stiction_ros.identification.evidence.search import search, search_again
 
 
@@ -38,13 +39,30 @@ def changed(seen: tuple[Look, ...], *told: tuple[float, float, float]) -> tuple[
     return tuple(out)
 
 
-def ending(look: Look, share: float) -> Look:
-    """Return a look whose friction-free responses end with ``share`` of their largest tap."""
+def ending(look: Look, share: float, reset_times: float = np.inf) -> Look:
+    """Return a look whose friction-free responses end with ``share`` of their largest tap.
+
+    ``reset_times`` are three of its controller, samples.
+    """
     none = look.found.without[0]
     taps = np.append(np.ones(none.fits[0].responses.shape[1] - 1), share)[None, :]
     fits = tuple(dataclasses.replace(fit, responses=taps) for fit in none.fits)
     without = (dataclasses.replace(none, fits=fits),)
-    return dataclasses.replace(look, found=dataclasses.replace(look.found, without=without))
+    found = dataclasses.replace(look.found, without=without)
+    problem = dataclasses.replace(look.problem, tunings=(Tuning(0, 1.0, reset_times),))
+    return dataclasses.replace(look, problem=problem, found=found)
+
+
+def test_a_response_that_ends_with_friction_is_enough_where_the_controller_is_as_fast(
+    seen: tuple[Look, ...],
+) -> None:
+    look = seen[0]
+    rows = look.problem.taps * look.problem.rate
+    assert ending(look, 0.5, 0.99 * rows).covers(0)
+    assert not ending(look, 0.5, 1.01 * rows).covers(0)
+    unknown = ending(look, 0.5)
+    problem = dataclasses.replace(unknown.problem, tunings=(None,))
+    assert not dataclasses.replace(unknown, problem=problem).covers(0)
 
 
 def rate_of(found: Agreement) -> int:

@@ -8,11 +8,14 @@ import pytest
 from evidence_loops import pi_loop
 
 from stiction_ros.identification import IdentificationOptions, VerdictKind
+from stiction_ros.identification.closed_loop.explanation import SURE
 from stiction_ros.identification.evidence.accepted import Accepted
 from stiction_ros.identification.evidence.engine import (
-    HARMLESS,
     MATERIAL,
+    NOTHING,
     PRICE,
+    REJECTED,
+    SURELY,
     _stability,
     _verdict,
 )
@@ -25,9 +28,20 @@ STICKY, BACKLASH, HEALTHY, UNDECIDED = VerdictKind
 FIGURES = {"delta_bic": 60.0, "half_1": 30.0, "half_2": 30.0, "moves": 40.0}
 
 
-def held(gain: float, band: tuple[float, float], deadband_loss: float = 50.0) -> Accepted:
+def held(
+    gain: float,
+    band: tuple[float, float],
+    deadband_loss: float = 50.0,
+    material_gain: float | None = None,
+) -> Accepted:
     """Return what a rate does not reject; bands are shares of OP's range."""
-    return Accepted(band, band, band, gain, gain < 10.0, deadband_loss, ())
+    material = gain if material_gain is None else material_gain
+    return Accepted(band, band, band, gain, gain < 10.0, deadband_loss, material, ())
+
+
+def rejected(lost: float) -> Accepted:
+    """Return a rate at which all bands that would matter lose against none."""
+    return held(2.0, (0.0, 0.05), material_gain=-lost)
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +50,12 @@ def blank() -> Look:
     problem = Problem.of(pi_loop(3.0, 1.0, samples=200))
     nothing = ideal(problem)
     return Look(problem, Found(nothing, nothing, (nothing,), (nothing,)), ())
+
+
+@pytest.fixture(autouse=True)
+def sighted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every rate with news see the process."""
+    monkeypatch.setattr(Look, "sees_process", lambda look, valve: look.carries_news)
 
 
 def agreed(blank: Look, *rates: Accepted, alike: bool = True) -> tuple[Agreement, tuple[Look, ...]]:
@@ -63,10 +83,10 @@ def agreed(blank: Look, *rates: Accepted, alike: bool = True) -> tuple[Agreement
         ({"moves": 5.0}, held(75.0, (0.2, 0.3)), True, UNDECIDED),
         ({"delta_bic": -1.0}, held(PRICE - 1.0, (0.2, 0.3)), True, UNDECIDED),
         ({}, held(75.0, (0.9 * MATERIAL, 0.3)), True, UNDECIDED),
-        ({"delta_bic": -13.0}, held(2.0, (0.0, 0.9 * HARMLESS)), True, HEALTHY),
-        ({"delta_bic": -13.0}, held(2.0, (0.0, 1.1 * HARMLESS)), True, UNDECIDED),
-        ({"delta_bic": -13.0, "moves": 5.0}, held(2.0, (0.0, 0.05)), True, UNDECIDED),
-        ({"delta_bic": -2.0}, held(PRICE + 1.0, (0.0, 0.05)), True, UNDECIDED),
+        ({"delta_bic": -13.0}, rejected(SURELY + 0.1), True, HEALTHY),
+        ({"delta_bic": -13.0}, rejected(SURELY - 0.1), True, UNDECIDED),
+        ({"delta_bic": -13.0, "moves": 5.0}, rejected(30.0), True, UNDECIDED),
+        ({"delta_bic": -2.0}, held(PRICE + 1.0, (0.0, 0.3)), True, UNDECIDED),
     ],
 )
 def test_the_verdict_follows_from_what_the_rates_say(
@@ -76,24 +96,38 @@ def test_the_verdict_follows_from_what_the_rates_say(
     assert _verdict(FIGURES | changes, found, seen, 0, IdentificationOptions()) is verdict
 
 
-def test_a_rate_that_hears_friction_keeps_a_valve_from_being_healthy(blank: Look) -> None:
-    quiet, loud = held(2.0, (0.0, 0.05)), held(PRICE + 1.0, (0.0, 0.05))
+@pytest.mark.parametrize(
+    ("rates", "verdict"),
+    [
+        ([rejected(SURELY + 1.0), held(NOTHING - 1.0, (0.1, 0.2))], HEALTHY),
+        ([rejected(SURELY + 1.0), held(NOTHING + 1.0, (0.1, 0.2))], UNDECIDED),
+        ([rejected(REJECTED + 0.1)], UNDECIDED),
+        ([rejected(REJECTED + 0.1)] * 2, HEALTHY),
+        ([rejected(REJECTED + 0.1), rejected(REJECTED - 0.1)], UNDECIDED),
+        ([*[rejected(REJECTED + 0.1)] * 2, held(NOTHING - 1.0, (0.1, 0.2))], HEALTHY),
+        ([*[rejected(30.0)] * 3, held(NOTHING + 1.0, (0.1, 0.2))], UNDECIDED),
+    ],
+)
+def test_a_valve_is_healthy_where_rates_reject_all_that_matters_and_none_finds_it(
+    blank: Look, rates: list[Accepted], verdict: VerdictKind
+) -> None:
+    found, seen = agreed(blank, *rates)
     figures = FIGURES | {"delta_bic": -13.0}
-    for others, verdict in (((quiet,), HEALTHY), ((loud,), UNDECIDED)):
-        found, seen = agreed(blank, quiet, *others)
-        assert _verdict(figures, found, seen, 0, IdentificationOptions()) is verdict
+    assert _verdict(figures, found, seen, 0, IdentificationOptions()) is verdict
 
 
-def test_two_rates_that_carry_news_must_have_power_for_a_healthy_valve(blank: Look) -> None:
-    blind, sharp = held(2.0, (0.0, 0.9)), held(2.0, (0.0, 0.05))
+@pytest.mark.parametrize(
+    ("gain", "verdict"), [(PRICE + SURE - 1.0, HEALTHY), (PRICE + SURE + 1.0, UNDECIDED)]
+)
+def test_rows_without_news_acquit_no_valve_and_speak_for_friction_when_sure(
+    blank: Look, gain: float, verdict: VerdictKind
+) -> None:
     figures, options = FIGURES | {"delta_bic": -13.0}, IdentificationOptions()
-    found, seen = agreed(blank, blind, sharp, sharp)
-    assert _verdict(figures, found, seen, 0, options) is HEALTHY
-    found, seen = agreed(blank, blind, sharp, blind)
-    assert _verdict(figures, found, seen, 0, options) is UNDECIDED
-    found, seen = agreed(blank, sharp, sharp)
-    held_back = (dataclasses.replace(seen[0], carries_news=False), seen[1])
-    assert _verdict(figures, found, held_back, 0, options) is UNDECIDED
+    found, seen = agreed(blank, held(gain, (0.1, 0.2)), rejected(30.0), rejected(30.0))
+    told = (dataclasses.replace(seen[0], carries_news=False), *seen[1:])
+    assert _verdict(figures, found, told, 0, options) is verdict
+    silent = tuple(dataclasses.replace(look, carries_news=False) for look in seen[1:])
+    assert _verdict(figures, found, silent, 0, options) is UNDECIDED
 
 
 def test_stability_tells_which_rates_and_halves_agree_on_friction(blank: Look) -> None:
