@@ -125,6 +125,8 @@ def checked(block: Block, rules: Rules) -> Block:
         if key.signal == "mode":
             continue
         missing = ~np.isfinite(column.values)
+        if block.mask is not None:
+            missing &= block.mask != Quality.BAD
         if missing.all() and key.signal in ("op", "pv"):
             shown = " ".join(repr(word) for word, _ in column.words.most_common(2) if word)
             raise InputError(
@@ -132,8 +134,6 @@ def checked(block: Block, rules: Rules) -> Block:
                 where=str(block.path),
                 fix=f"choose another one with --{key.signal} TAG=COLUMN",
             )
-        if block.mask is not None:
-            missing &= block.mask != Quality.BAD
         if not missing.any():
             continue
         row = int(np.argmax(missing))

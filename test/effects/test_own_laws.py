@@ -195,7 +195,7 @@ def test_table_and_report_show_every_parameter_with_its_interval(
 
 def test_gap_leaves_out_what_the_law_refuses_of_its_axes(record: Record) -> None:
     run = FreeRun(loop(), join_records(loop(), [record]))
-    candidate = PluggedValve(run, 0, type(law()))
+    candidate = PluggedValve.of(run, 0, type(law()))
     grid = candidate.values(candidate.grid())
     allowed = candidate.possible(grid)
     assert np.array_equal(allowed, grid[:, 1] <= grid[:, 0])
@@ -229,7 +229,7 @@ def test_gap_names_the_law_in_its_table_and_sentences(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "160")
     run = FreeRun(loop(), join_records(loop(), [record]))
-    assert PluggedValve(run, 0, type(law())).name == "valve:V1 stiction (falls_short)"
+    assert PluggedValve.of(run, 0, type(law())).name == "valve:V1 stiction (falls_short)"
     assert called("valve:V1", "stiction", "xch") == "stiction (xch) of valve V1"
     xch = effects.XchStiction(2.0, 1.0)
     effect = FoundEffect(
@@ -284,7 +284,7 @@ def test_the_interval_of_a_linear_figure_has_a_width() -> None:
     model = loop().with_ideal_valves()
     run = FreeRun(model, join_records(model, [dataclasses.replace(shown, pv=bumps)]))
     base = Baseline.of(run)
-    candidate = PluggedOutput(run, 0, "sensor", Bump, np.zeros(0))
+    candidate = PluggedOutput.of(run, 0, "sensor", Bump, np.zeros(0))
     fit = fit_candidate(base, run.gap, candidate)
     low, high = likelihood_intervals(base, fit)["height"]
     assert fit.point[0] == pytest.approx(1.0, abs=0.1)

@@ -11,7 +11,7 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
-from stiction_ros.identification.evidence.reach import Tuning
+from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.linear.response_prior import Reach

@@ -7,6 +7,7 @@ import pytest
 from evidence_loops import pi_loop, slow_loop
 
 from stiction_ros.identification import IdentificationOptions, identify
+from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.accepted import Accepted
 from stiction_ros.identification.evidence.engine import PRICE
 from stiction_ros.identification.evidence.problem import Problem
@@ -21,7 +22,6 @@ from stiction_ros.identification.evidence.rates import (
     looks,
     samples_between_reports,
 )
-from stiction_ros.identification.evidence.reach import Tuning
 from stiction_ros.identification.evidence.search import search, search_again
 
 

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.identification import IdentificationOptions
+from stiction_ros.identification.closed_loop.tuning import RESETS, Tuning, tunings
 from stiction_ros.identification.evidence.accepted import HARMLESS, accepted
 from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.output_fit import Whitened, beginnings, fit_output
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.rates import looks
-from stiction_ros.identification.evidence.reach import RESETS, Tuning, tunings
 from stiction_ros.identification.evidence.search import search
 from stiction_ros.identification.linear.response_prior import (
     FACTOR,
