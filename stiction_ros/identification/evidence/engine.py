@@ -17,6 +17,7 @@ from stiction_ros.identification.closed_loop.explanation import (
     is_wave_itself,
 )
 from stiction_ros.identification.engine import order_row
+from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.output_fit import OutputFit, noise_of
@@ -99,13 +100,9 @@ def identify(
     seen = looks(part, options)
     report(0.7)
     valves = tuple(_judged(part, seen, j, options) for j in range(len(part.valves)))
-    small = data if part is record else prepare(part, options)
-    model, table = _process(small, options, valves, part)
-    if part is not record:
-        valves, model = _over_all(record, data, valves, model)
+    heard = _Heard(record, data, part, data if part is record else prepare(part, options), options)
+    looped = heard.without_waves(seen, valves)
     report(1.0)
-    concluded = conclude(record, data, Findings(model, valves, table, (), None), 0.0)
-    looped = explained(record, dataclasses.replace(concluded, method="evidence"))
     judged = tuple(doubted(valve) for valve in looped.valves)
     surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
     return dataclasses.replace(
@@ -114,6 +111,74 @@ def identify(
         row_samples=round(surest.evidence["rate"]),
         seconds=time.perf_counter() - begun,
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Heard:
+    """A record, and the part of it that is searched, which may be all of it.
+
+    Attributes:
+        record, data: the whole, and made ready.
+        part, small: the part, and made ready.
+        options: of the search.
+    """
+
+    record: Record
+    data: Data
+    part: Record
+    small: Data
+    options: IdentificationOptions
+
+    def looped(self, valves: tuple[ValveEstimate, ...]) -> Identification:
+        """Return the process for the stems of these valves, and their loops closed again."""
+        model, table = _process(self.small, self.options, valves, self.part)
+        if self.part is not self.record:
+            valves, model = _over_all(self.record, self.data, valves, model)
+        findings = Findings(model, valves, table, (), None)
+        concluded = conclude(self.record, self.data, findings, 0.0)
+        return explained(self.record, dataclasses.replace(concluded, method="evidence"))
+
+    def without_waves(
+        self, seen: tuple[Look, ...], valves: tuple[ValveEstimate, ...]
+    ) -> Identification:
+        """Return :meth:`looped`, by frictions behind which no wave is left where there are such.
+
+        A wave that enters behind a valve is there whatever its friction is: one that another
+        friction takes away, which the record does not reject, was left by the first.
+        """
+        best = self.looped(valves)
+        for j, valve in enumerate(best.valves):
+            if not (valve.verdict.has_friction and _is_wave(valve)):
+                continue
+            look = agreement(seen, j).look
+            for other in not_rejected(look.found, j, self.options.confidence)[1:]:
+                tried = list(valves)
+                tried[j] = _at(valves[j], other, look, self.part)
+                found = self.looped(tuple(tried))
+                if not _is_wave(found.valves[j]):
+                    valves, best = tuple(tried), found
+                    break
+        return best
+
+
+def _at(valve: ValveEstimate, other: Candidate, look: Look, record: Record) -> ValveEstimate:
+    """Return an estimate with the friction of another candidate, which its intervals hold."""
+    j = record.valves.index(valve.name)
+    span = float(look.problem.span[j])
+    static, dynamic = (span * float(value) for value in other.friction[j])
+    return dataclasses.replace(
+        valve,
+        static_friction=static,
+        dynamic_friction=dynamic,
+        stem_start=float(record.op[0, j]) + span * float(other.starts[j]),
+        jump=0.0 if valve.jump == 0.0 else static - dynamic,
+    )
+
+
+def _is_wave(valve: ValveEstimate) -> bool:
+    """Tell whether the stem of a valve is a wave itself."""
+    band_share = valve.evidence["share"] * (1.0 + valve.dynamic_friction / valve.static_friction)
+    return is_wave_itself(valve.evidence, band_share)
 
 
 def doubted(valve: ValveEstimate) -> ValveEstimate:
@@ -131,9 +196,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     endless = told.get("moved_with", 0.0) >= ENDLESS
     idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
     idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
-    band_share = told["share"] * (1.0 + valve.dynamic_friction / valve.static_friction)
     wide = valve.band_share > WIDER
-    if not (idle or wide or is_wave_itself(told, band_share)):
+    if not (idle or wide or _is_wave(valve)):
         return valve
     return dataclasses.replace(
         valve,
