@@ -108,11 +108,13 @@ class Look:
     def sees_process(self, valve: int) -> bool:
         """Return whether what this rate takes for the process is the one that is controlled.
 
-        It has news, sees all of the response, and this gets as far as the controller tells.
+        It has news, sees all of the response, and this has the sign for which the controller was
+        tuned.
         """
         fits = zip(self.found.ideal.fits, self.problem.reaches, strict=True)
         backwards = any(
             fit.prior.reach == FREE
+            and float(reach.heights @ fit.responses[valve]) * reach.unit <= 0.0
             for fit, reach in fits
             if reach is not None and reach.valve == valve
         )

@@ -178,8 +178,12 @@ def test_a_rate_that_takes_the_controller_for_the_process_sees_none() -> None:
     look = looks(pi_loop(0.0, 0.0), IdentificationOptions())[0]
     assert look.sees_process(0)
     fits = look.found.ideal.fits
-    free = tuple(dataclasses.replace(f, prior=ResponsePrior(reach=FREE)) for f in fits)
-    backwards = dataclasses.replace(look.found.ideal, fits=free)
+    free = [dataclasses.replace(f, prior=ResponsePrior(reach=FREE)) for f in fits]
+    turned = tuple(dataclasses.replace(f, responses=-f.responses) for f in free)
+    far = dataclasses.replace(look.found.ideal, fits=tuple(free))
+    found = dataclasses.replace(look.found, ideal=far)
+    assert dataclasses.replace(look, found=found).sees_process(0)  # farther than it was tuned for
+    backwards = dataclasses.replace(look.found.ideal, fits=turned)
     other = dataclasses.replace(look, found=dataclasses.replace(look.found, ideal=backwards))
     assert not other.sees_process(0)
     assert not dataclasses.replace(look, carries_news=False).sees_process(0)
