@@ -239,43 +239,6 @@ class Products(NamedTuple):
 
 
 @compiled_fused
-def products_of(
-    noise: FloatArray, stems: FloatArray, signals: FloatArray, edges: IntArray
-) -> Products:
-    """Return the products of stems, scaled, shape (m, N), with signals, shape (c, n).
-
-    Args:
-        noise: monic polynomial D, shape (d + 1,).
-        stems: not whitened.
-        signals: whitened.
-        edges: of the groups, as in :func:`grouped`.
-    """
-    valves, rows = stems.shape
-    taps, size, count = edges[-1], len(edges) - 1, signals.shape[1]
-    past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps + EIGHT))
-    whole = valves * size
-    beside, shared = np.empty((len(signals), whole)), np.empty((whole, whole))
-    seen = np.empty((len(signals), rows + taps + EIGHT))
-    for row in range(len(signals)):
-        seen[row] = step_products(noise, signals[row], rows, taps)
-    for i in range(valves):
-        moves, at = moves_of(stems[i]), i * size
-        past[i] = with_past(whitened(noise, stems[i], stems[i, 0]), taps)[-(taps + count + 1) :]
-        first[i] = step_products(noise, past[i, -1 - count : -1], rows, taps)
-        for row in range(len(signals)):
-            beside[row, at : at + size] = grouped(lag_products(moves, seen[row], taps), edges)
-        for j in range(i):
-            along, theirs = j * size, moves_of(stems[j])
-            begun = (lag_products(moves, first[j], taps), lag_products(theirs, first[i], taps))
-            found = lagged_products(past[i], past[j], begun, edges)
-            shared[at : at + size, along : along + size] = found
-            shared[along : along + size, at : at + size] = found.T
-        own = own_products(past[i], lag_products(moves, first[i], taps), edges)
-        shared[at : at + size, at : at + size] = own
-    return Products(past, first, beside, shared)
-
-
-@compiled_fused
 def beside_lags(
     noise: FloatArray, stems: FloatArray, signals: FloatArray, edges: IntArray
 ) -> FloatArray:
@@ -297,6 +260,39 @@ def beside_lags(
             at = i * size
             out[row, at : at + size] = grouped(lag_products(moves[i], seen, taps), edges)
     return out
+
+
+@compiled_fused
+def products_of(
+    noise: FloatArray, stems: FloatArray, signals: FloatArray, edges: IntArray
+) -> Products:
+    """Return the products of stems, scaled, shape (m, N), with signals, shape (c, n).
+
+    Args:
+        noise: monic polynomial D, shape (d + 1,).
+        stems: not whitened.
+        signals: whitened.
+        edges: of the groups, as in :func:`grouped`.
+    """
+    valves, rows = stems.shape
+    taps, size, count = edges[-1], len(edges) - 1, signals.shape[1]
+    past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps + EIGHT))
+    whole = valves * size
+    shared = np.empty((whole, whole))
+    beside = beside_lags(noise, stems, signals, edges)
+    for i in range(valves):
+        moves, at = moves_of(stems[i]), i * size
+        past[i] = with_past(whitened(noise, stems[i], stems[i, 0]), taps)[-(taps + count + 1) :]
+        first[i] = step_products(noise, past[i, -1 - count : -1], rows, taps)
+        for j in range(i):
+            along, theirs = j * size, moves_of(stems[j])
+            begun = (lag_products(moves, first[j], taps), lag_products(theirs, first[i], taps))
+            found = lagged_products(past[i], past[j], begun, edges)
+            shared[at : at + size, along : along + size] = found
+            shared[along : along + size, at : at + size] = found.T
+        own = own_products(past[i], lag_products(moves, first[i], taps), edges)
+        shared[at : at + size, at : at + size] = own
+    return Products(past, first, beside, shared)
 
 
 @compiled_fused
