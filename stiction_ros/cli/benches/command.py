@@ -39,7 +39,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     ),
     "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
     "world": ("family", "given", "first", "loops", "full", "jobs", "log", "resume", "write"),
-    "field": ("seeds", "method", "jobs"),
+    "field": ("seeds", "method", "jobs", "oracle"),
     "gain": ("seeds", "jobs"),
     "stability": ("seeds", "method", "data", "jobs"),
 }

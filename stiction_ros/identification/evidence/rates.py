@@ -86,9 +86,7 @@ class Look:
     @property
     def price(self) -> float:
         """−2 log likelihood that friction must gain at this rate to be believed."""
-        if self.wave_gain is None:
-            return PRICE
-        return PRICE + BESIDE + INEXACT * self.wave_gain
+        return price_beside(self.wave_gain)
 
     def beyond_price(self, valve: int) -> float:
         """Return what the friction of a valve gains beyond :attr:`price`."""
@@ -138,6 +136,23 @@ class Agreement:
     alike: bool
 
 
+def price_beside(wave_gain: float | None) -> float:
+    """Return −2 log likelihood that friction must gain to be believed.
+
+    Args:
+        wave_gain: what waves from outside gain where there is no friction; None where none is
+            believed.
+    """
+    return PRICE if wave_gain is None else PRICE + BESIDE + INEXACT * wave_gain
+
+
+def at_all_rates(record: Record, options: IdentificationOptions) -> list[Problem]:
+    """Return a record without gaps at each rate for which enough rows are left, as it is first."""
+    rates = [rate for rate in RATES if rate == 1 or len(record) // rate >= LEAST_ROWS]
+    told = tunings(record)
+    return [Problem.of(record, options, rate, told) for rate in rates]
+
+
 def looks(
     record: Record,
     options: IdentificationOptions,
@@ -150,9 +165,7 @@ def looks(
         options: law, largest friction, smallest delay and level.
         providers: of seeds.
     """
-    rates = [rate for rate in RATES if rate == 1 or len(record) // rate >= LEAST_ROWS]
-    told = tunings(record)
-    problems = [Problem.of(record, options, rate, told) for rate in rates]
+    problems = at_all_rates(record, options)
     further = settled(problems[0])
     problems = [dataclasses.replace(problem, further=further) for problem in problems]
     found = _searched(problems, providers)

@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.box import SIMPLE
@@ -20,6 +20,9 @@ from stiction_ros.cli.runs.seeds import run_seeds
 from stiction_ros.errors import InputError
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
+
+if TYPE_CHECKING:
+    from stiction_ros.field import FieldLoop
 
 FIRST, LAST = 10_000, 10_099
 """Seeds when none are given; those below 1000 are for tuning."""
@@ -106,6 +109,8 @@ class Judged:
         valve, law, band, f_s, f_d, causes: of its truth.
         slips: in the part that was looked at.
         answer: what was said.
+        shown: −2 log likelihood that the stem which truly moved gains beyond the price of
+            friction; None where it was not asked.
     """
 
     seed: int
@@ -121,6 +126,7 @@ class Judged:
     causes: tuple[str, ...]
     slips: int
     answer: Answer
+    shown: float | None = None
 
     @property
     def group(self) -> str:
@@ -165,8 +171,14 @@ class Judged:
         }
 
 
-def judge(method: str, seed: int) -> Judged:
-    """Identify one loop of the field by a method, else with default options."""
+def judge(method: str, oracle: bool, seed: int) -> Judged:
+    """Identify one loop of the field by a method, else with default options.
+
+    Args:
+        method: search.
+        oracle: whether to ask what the true stem shows.
+        seed: of the loop.
+    """
     from stiction_ros.field import field_loop
 
     loop = field_loop(seed)
@@ -185,7 +197,19 @@ def judge(method: str, seed: int) -> Judged:
         causes=tuple(sorted(cause.value for cause in truth.causes)),
         slips=loop.judged_slips,
         answer=answer_of(loop.record, functools.partial(identified, method)),
+        shown=_shown(loop) if oracle and truth.valve.value != "healthy" else None,
     )
+
+
+def _shown(loop: FieldLoop) -> float | None:
+    """Return what the true stem of a loop gains beyond the price; None where it is refused."""
+    from stiction_ros.cli.benches.accuracy.known_stem import beyond_price
+
+    first, last = loop.judged_rows
+    try:
+        return beyond_price(longest_part([loop.record]), loop.stem[first:last, 0])
+    except InputError:
+        return None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -218,7 +242,14 @@ def shares(rows: Sequence[Judged]) -> list[Share]:
         known = [entry[name] for entry in held if name in entry]
         return sum(known), len(known)
 
+    asked = [row for row in much if row.shown is not None]
+    shown = [row for row in asked if row.shown is not None and row.shown > 0.0]
+    known = [
+        Share("true stem shows friction", len(shown), len(asked), ""),
+        Share("friction found, of these", sum(row.found for row in shown), len(shown), ""),
+    ]
     return [
+        *(known if asked else []),
         Share("friction found", sum(row.found for row in much), len(much), ">= 92 %"),
         Share("friction called healthy", _healthy(much), len(much), "<= 1 %"),
         Share("others called sticky or backlash", _found(others), len(others), "<= 1 %"),
@@ -293,14 +324,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--seeds", type=seed_range, metavar="A:B", help=f"of the field's loops ({FIRST}:{LAST})"
     )
     group.add_argument("--method", choices=choices.METHODS, help=f"search ({METHOD})")
+    group.add_argument(
+        "--oracle",
+        action="store_true",
+        default=None,
+        help="field: also count the loops in which the stem that truly moved shows the friction",
+    )
 
 
 def run(options: argparse.Namespace, machine: str) -> int:
     """Run the benchmark."""
     seeds = options.seeds or (FIRST, LAST)
-    rows = run_seeds(
-        functools.partial(judge, options.method or METHOD), seeds, options.jobs or 1, "field"
-    )
+    work = functools.partial(judge, options.method or METHOD, bool(options.oracle))
+    rows = run_seeds(work, seeds, options.jobs or 1, "field")
     hand_over(options.json, document(rows, machine), lambda: show(rows))
     return 0
 

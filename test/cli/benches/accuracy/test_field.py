@@ -66,6 +66,20 @@ def counts(rows: list[Judged]) -> dict[str, tuple[int, int]]:
     return {rate.name: (rate.count, rate.total) for rate in shares(rows)}
 
 
+def test_what_the_true_stem_shows_is_counted_where_it_was_asked() -> None:
+    rows = [
+        judged(1, said("sticky"), shown=30.0),
+        judged(2, said("undecided"), shown=1.0),
+        judged(3, said("backlash"), shown=-4.0),
+        judged(4, said("sticky")),
+        judged(5, said("sticky"), slips=3, shown=9.0),
+    ]
+    told = counts(rows)
+    assert told["true stem shows friction"] == (2, 3)
+    assert told["friction found, of these"] == (1, 2)
+    assert "true stem shows friction" not in counts(rows[3:4])
+
+
 def test_rates_count_what_they_say() -> None:
     rows = [
         judged(1, said("sticky", cause="valve")),
