@@ -4,7 +4,7 @@ Nothing here imports effects, processes, loop, blind, identification, control, d
 online; valves, plants, controllers and historians are written anew from what is published.
 """
 
-from stiction_ros.field.field_loop import MANY, FieldLoop, field_loop
+from stiction_ros.field.field_loop import MANY, FieldLoop, field_loop, with_friction
 from stiction_ros.field.truth import Cause, Truth, ValveKind
 
-__all__ = ["MANY", "Cause", "FieldLoop", "Truth", "ValveKind", "field_loop"]
+__all__ = ["MANY", "Cause", "FieldLoop", "Truth", "ValveKind", "field_loop", "with_friction"]

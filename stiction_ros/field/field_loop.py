@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import enum
 
@@ -86,12 +87,56 @@ def field_loop(seed: int) -> FieldLoop:
     return dataclasses.replace(loop, truth=truth)
 
 
+def with_friction(seed: int, share: float) -> FieldLoop | None:
+    """Return the loop of a seed with a valve of He's law in it, all else as it was drawn.
+
+    Loads, noise, controller and historian stay. Three fifths of the band are f_S, two fifths f_D.
+
+    Args:
+        seed: of the loop.
+        share: band, of OP's range before; what it is of the range then stands in the truth, whose
+            causes are left out.
+
+    Returns:
+        None where the loop does not stay finite with it.
+
+    Raises:
+        InputError: a negative seed.
+    """
+    found = _drawn(seed)
+    made = found.made
+    span = _range(run(made.loop, made.signals), made)
+    band = share * span
+    valve = dataclasses.replace(made.loop.valve, law=Law.HE, static=0.6 * band, sliding=0.4 * band)
+    other = dataclasses.replace(made, loop=dataclasses.replace(made.loop, valve=valve))
+    out = run(other.loop, made.signals)
+    if not np.isfinite(out.clean).all():
+        return None
+    c = draw_circumstances(np.random.default_rng([seed, 0]))
+    c = dataclasses.replace(c, friction=Friction.MUCH, law=Law.HE)
+    return _recorded(copy.deepcopy(found.random), c, other, out, seed)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Drawn:
+    """A loop, what it is made of, and the generator as it stood before the historian drew."""
+
+    made: Made
+    loop: FieldLoop
+    random: np.random.Generator
+
+
 def drawn(seed: int) -> tuple[Made, FieldLoop]:
     """Return what the loop of a seed is made of, and the loop but for what makes it cycle.
 
     Raises:
         InputError: a negative seed.
     """
+    found = _drawn(seed)
+    return found.made, found.loop
+
+
+def _drawn(seed: int) -> _Drawn:
     if seed < 0:
         raise InputError(f"{seed} is negative", where="seed", fix="use 0 or more")
     circumstances = draw_circumstances(np.random.default_rng([seed, 0]))
@@ -102,10 +147,11 @@ def drawn(seed: int) -> tuple[Made, FieldLoop]:
         out = run(made.loop, made.signals)
         if not np.isfinite(out.clean).all():
             continue
+        before = copy.deepcopy(random)
         loop = _recorded(random, circumstances, made, out, seed)
         fit = _fit(circumstances, loop, out)
         if best is None or fit > best_fit:
-            best, best_fit = (made, loop), fit
+            best, best_fit = _Drawn(made, loop, before), fit
         if fit is Fit.AS_WANTED:
             break
         shrink *= _correction(circumstances, loop)
@@ -164,7 +210,7 @@ def _recorded(
         for start in starts
         if (row := kept.row_of(int(start * clock.scan) // clock.sample)) is not None
     ]
-    span = float(np.subtract(*np.percentile(out.op[sampled], [98.0, 2.0])))
+    span = _range(out, made)
     sticks = c.friction is not Friction.NONE
     valve = ValveKind.HEALTHY
     if sticks:
@@ -187,6 +233,12 @@ def _recorded(
     stem = stem[:, None]
     stem.flags.writeable = False
     return FieldLoop(seed, kept.record, made.loop.process.kind, c.plant.value, c.names, truth, stem)
+
+
+def _range(out: Run, made: Made) -> float:
+    """Return OP's range at the samples of the record, %."""
+    sampled = out.op[made.warm :: made.loop.clock.sample]
+    return float(np.subtract(*np.percentile(sampled, [98.0, 2.0])))
 
 
 def _causes(made: Made) -> frozenset[Cause]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.errors import InputError
-from stiction_ros.field import MANY, Cause, FieldLoop, ValveKind, field_loop
+from stiction_ros.field import MANY, Cause, FieldLoop, ValveKind, field_loop, with_friction
 from stiction_ros.field.circumstances import (
     Friction,
     Hole,
@@ -91,3 +91,27 @@ def test_every_circumstance_is_drawn() -> None:
 def test_a_negative_seed_is_refused() -> None:
     with pytest.raises(InputError, match="negative"):
         field_loop(-1)
+
+
+def test_friction_that_is_put_in_leaves_all_else_as_it_was_drawn(loops: list[FieldLoop]) -> None:
+    before = next(
+        loop
+        for loop in loops
+        if loop.truth.valve is ValveKind.HEALTHY and loop.record.quality.any()
+    )
+    much = with_friction(before.seed, 0.3)
+    assert much is not None
+    assert (much.kind, much.plant, much.circumstances) == (
+        before.kind,
+        before.plant,
+        before.circumstances,
+    )
+    assert np.array_equal(much.record.quality, before.record.quality)
+    assert not np.array_equal(much.record.pv, before.record.pv)
+    assert much.truth.f_s is not None
+    assert much.truth.f_d is not None
+    assert much.truth.f_s == pytest.approx(1.5 * much.truth.f_d)
+    assert much.truth.band == pytest.approx(much.truth.f_s + much.truth.f_d, rel=0.02)
+    again = with_friction(before.seed, 0.3)
+    assert again is not None
+    assert np.array_equal(again.record.pv, much.record.pv, equal_nan=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -73,11 +74,14 @@ def test_what_the_true_stem_shows_is_counted_where_it_was_asked() -> None:
         judged(3, said("backlash"), shown=-4.0),
         judged(4, said("sticky")),
         judged(5, said("sticky"), slips=3, shown=9.0),
+        dataclasses.replace(healthy(6, "undecided"), shown=2.0),
+        dataclasses.replace(healthy(7, "healthy"), shown=-2.0),
     ]
     told = counts(rows)
-    assert told["true stem shows friction"] == (2, 3)
+    assert told["true stem shows its friction"] == (2, 3)
     assert told["friction found, of these"] == (1, 2)
-    assert "true stem shows friction" not in counts(rows[3:4])
+    assert told["friction put into others shows"] == (1, 2)
+    assert "true stem shows its friction" not in counts(rows[3:4])
 
 
 def test_rates_count_what_they_say() -> None:
