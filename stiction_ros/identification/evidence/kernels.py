@@ -59,6 +59,63 @@ def solved(factor: FloatArray, right: FloatArray) -> tuple[FloatArray, float]:
     return out, explained
 
 
+class Known(NamedTuple):
+    """What is known before the record, of several priors.
+
+    Attributes:
+        precisions: inverse of K, shape (K, r, r).
+        waves: 1 / variances of sines and cosines of waves, shape (K, 2 H).
+        held: precisions that a response adds whose sum is held, shape (K, r, r).
+        pulls: that it adds to its products with the output, shape (K, r).
+        energies: that it adds to the output's, shape (K,).
+        at: column at which that response begins; below 0 where there is none.
+    """
+
+    precisions: FloatArray
+    waves: FloatArray
+    held: FloatArray
+    pulls: FloatArray
+    energies: FloatArray
+    at: int
+
+
+@compiled_fused
+def evidences_of(
+    products: FloatArray, seen: FloatArray, energy: float, count: int, known: Known
+) -> FloatArray:
+    """Return −2 log of the marginal likelihood but for log det K, of several priors, shape (K,).
+
+    Args:
+        products: of a constant, waves and lags of stems with each other, shape (q, q).
+        seen: of these with the output, shape (q,).
+        energy: of the output.
+        count: n, rows.
+        known: the priors.
+    """
+    size, lines = known.precisions.shape[1], known.waves.shape[1]
+    out = np.empty(len(known.precisions))
+    for k in range(len(out)):
+        factor, right = products.copy(), seen.copy()
+        for w in range(lines):
+            factor[1 + w, 1 + w] += known.waves[k, w]
+        for begin in range(1 + lines, len(factor), size):
+            factor[begin : begin + size, begin : begin + size] += known.precisions[k]
+        if known.at >= 0:
+            end = known.at + size
+            factor[known.at : end, known.at : end] += known.held[k]
+            right[known.at : end] += known.pulls[k]
+        determinant = factorised(factor)
+        explained = 0.0
+        for i in range(len(right)):
+            for j in range(i):
+                right[i] -= factor[i, j] * right[j]
+            right[i] /= factor[i, i]
+            explained += right[i] * right[i]
+        left = max(energy + known.energies[k] - explained, LEAST * energy)
+        out[k] = count * np.log(left / count) + determinant
+    return out
+
+
 class Given(NamedTuple):
     """What stands beside one stem in one output, whitened.
 

@@ -21,7 +21,9 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     LEAST,
     Given,
+    Known,
     evidences,
+    evidences_of,
     factorised,
     solved,
 )
@@ -229,6 +231,23 @@ class Whitened:
         left = max(energy - explained, LEAST * _energy(self.seen))
         return float(count * np.log(left / count) + determinant), weights
 
+    def losses(self, priors: Sequence[ResponsePrior]) -> FloatArray:
+        """Return the loss of each of several priors, one at least, shape (K,)."""
+        size, count = len(self.edges) - 1, len(priors)
+        helds = [self.held(prior) for prior in priors] if self.at >= 0 else []
+        told = [held for held in helds if held is not None]
+        known = Known(
+            precisions=np.array([prior.precision(self.edges) for prior in priors]),
+            waves=np.array([1.0 / self.wave_variances(prior) for prior in priors]),
+            held=np.array([held.precision for held in told]).reshape(-1, size, size),
+            pulls=np.array([held.pull for held in told]).reshape(-1, size),
+            energies=np.array([held.energy for held in told]) if told else np.zeros(count),
+            at=self.block(self.at).start if told else -1,
+        )
+        energy = _energy(self.seen)
+        found = evidences_of(self.products, self.seen_products, energy, len(self.seen), known)
+        return found + np.array([self.log_determinant(prior) for prior in priors])
+
     def noise_step(self, fit: OutputFit) -> FloatArray:
         """Return D after a Gauss-Newton step in D, responses and level together, shape (d + 1,).
 
@@ -353,7 +372,7 @@ def _reached(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
     if whole.reach is None:
         return prior
     tried = [dataclasses.replace(prior, reach=k) for k in (FREE, *range(len(REACHES)))]
-    return min(tried, key=lambda one: whole.loss(one)[0])
+    return tried[int(np.argmin(whole.losses(tried)))]
 
 
 def white(problem: Problem, output: int, stems: FloatArray, memory: float) -> OutputFit:
@@ -419,16 +438,17 @@ def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
     """Return the prior to which no neighbour is better, downhill from ``prior``."""
     met: dict[ResponsePrior, float] = {}
 
-    def loss(one: ResponsePrior) -> float:
-        if one not in met:
-            met[one] = whole.loss(one)[0]
-        return met[one]
+    def best(tried: list[ResponsePrior]) -> ResponsePrior:
+        fresh = [one for one in tried if one not in met]
+        if fresh:
+            met.update(zip(fresh, whole.losses(fresh).tolist(), strict=True))
+        return min(tried, key=met.__getitem__)
 
     beside = len(whole.known) > 1
     while True:
-        better = min(prior.neighbours(), key=loss)
+        better = best(prior.neighbours())
         if beside:
-            better = min(better.neighbours(waves=True), key=loss)
+            better = best(better.neighbours(waves=True))
         if better == prior:
             return prior
         prior = better
