@@ -18,7 +18,9 @@ from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.linear.response_prior import FREE, ResponsePrior
 
-TOGETHER = 64  # stems that are judged in one go: few enough to stay near the processor
+TOGETHER = 256
+"""Stems that are simulated and judged in one go: few enough to be kept, and enough for laws that
+are stepped for all of them at once, sample by sample."""
 
 
 @dataclasses.dataclass(frozen=True)
