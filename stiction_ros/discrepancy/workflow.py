@@ -12,9 +12,11 @@ from stiction_ros.discrepancy.steps.closing import closing
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.loop import LoopModel
+from stiction_ros.one_thread import one_thread
 from stiction_ros.records import Record
 
 
+@one_thread()
 def find_discrepancy(
     model: LoopModel,
     records: Sequence[Record],

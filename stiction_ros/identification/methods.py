@@ -17,6 +17,7 @@ from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.identification.result.identification import Identification
 from stiction_ros.identification.side_by_side import at_once
+from stiction_ros.one_thread import one_thread
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -41,6 +42,7 @@ METHODS: Mapping[str, Method] = {
 }
 
 
+@one_thread()
 def identify(
     record: Record,
     options: IdentificationOptions | None = None,

@@ -246,7 +246,7 @@ class Whitened:
         )
         energy = _energy(self.seen)
         found = evidences_of(self.products, self.seen_products, energy, len(self.seen), known)
-        return found + np.array([self.log_determinant(prior) for prior in priors])
+        return np.asarray(found + [self.log_determinant(prior) for prior in priors])
 
     def noise_step(self, fit: OutputFit) -> FloatArray:
         """Return D after a Gauss-Newton step in D, responses and level together, shape (d + 1,).
