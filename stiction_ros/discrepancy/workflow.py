@@ -16,7 +16,6 @@ from stiction_ros.one_thread import one_thread
 from stiction_ros.records import Record
 
 
-@one_thread()
 def find_discrepancy(
     model: LoopModel,
     records: Sequence[Record],
@@ -53,8 +52,9 @@ def find_discrepancy(
         >>> print(found.verdict, *[effect.effect for effect in found.effects])
         named stiction
     """
-    task, state = begin(model, records, options or GapOptions(), progress)
-    state = look_on(task, state)
-    if not task.options.free_process:
-        state = settle(task, state)
-    return closing(task, state)
+    with one_thread():
+        task, state = begin(model, records, options or GapOptions(), progress)
+        state = look_on(task, state)
+        if not task.options.free_process:
+            state = settle(task, state)
+        return closing(task, state)

@@ -42,7 +42,6 @@ METHODS: Mapping[str, Method] = {
 }
 
 
-@one_thread()
 def identify(
     record: Record,
     options: IdentificationOptions | None = None,
@@ -75,7 +74,13 @@ def identify(
         >>> print(valve.verdict, round(valve.static_friction), round(valve.dynamic_friction))
         sticky 4 2
     """
-    options = options or IdentificationOptions()
+    with one_thread():
+        return _identify(record, options or IdentificationOptions(), progress)
+
+
+def _identify(
+    record: Record, options: IdentificationOptions, progress: Progress | None
+) -> Identification:
     checked = partial(swapped_columns, record)
     found: Identification | InputError
     if options.check_columns and options.method == "exact":  # as long as the check itself
