@@ -70,6 +70,9 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
+# Bytecode is kept, as hundreds of processes start in the tests: each would compile all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Machine code is made beside the linters, which leave a core for that: all workers would make the
 # same at once. Three of them keep two cores busy, as tests of the nodes wait for each other.
 test: setup

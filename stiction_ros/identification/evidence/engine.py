@@ -99,17 +99,31 @@ def identify(
     part = liveliest(record)
     seen = looks(part, options)
     report(0.7)
+    found = answered(record, data, part, seen, options)
+    report(1.0)
+    return dataclasses.replace(found, seconds=time.perf_counter() - begun)
+
+
+def answered(
+    record: Record, data: Data, part: Record, seen: tuple[Look, ...], options: IdentificationOptions
+) -> Identification:
+    """Return what is concluded of what the rates show.
+
+    Args:
+        record, data: the whole, and made ready.
+        part: of it that was looked at.
+        seen: each rate of that.
+        options: of the search.
+    """
     valves = tuple(_judged(part, seen, j, options) for j in range(len(part.valves)))
     heard = _Heard(record, data, part, data if part is record else prepare(part, options), options)
     looped = heard.without_waves(seen, valves)
-    report(1.0)
     judged = tuple(doubted(valve) for valve in looped.valves)
     surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
     return dataclasses.replace(
         looped,
         valves=judged,
         row_samples=round(surest.evidence["rate"]),
-        seconds=time.perf_counter() - begun,
     )
 
 

@@ -7,7 +7,6 @@ nothing is accepted that is worse than what is known, and everything that was fi
 from __future__ import annotations
 
 import dataclasses
-import enum
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,12 +50,26 @@ BETTER = 0.5  # of the loss: a seed from elsewhere that gains less is not polish
 SWEEPS = 3  # searches of a valve, at most
 
 
-class Provider(enum.StrEnum):
-    """Where frictions come from that are polished."""
+@dataclasses.dataclass(frozen=True)
+class Parts:
+    """What a search is made of; one is left out to see what it is worth.
 
-    GROWING = "growing"  # beginnings of the record as it is, under drifting noise
-    TRIANGLE = "triangle"  # a grid, also of it as it is, under the noise of the friction-free fit
-    DRIFTING = "drifting"  # the same grid at slower rates, under drifting noise
+    Attributes:
+        growing: seeds from beginnings of the record as it is, under drifting noise.
+        triangle: seeds from a grid, also of it as it is, under the noise of the friction-free fit.
+        drifting: seeds from the same grid at slower rates, under drifting noise.
+        waves: all once more beside a wave from outside, where one may be there.
+        tuning: what the controller tells of the process it was tuned for.
+    """
+
+    growing: bool = True
+    triangle: bool = True
+    drifting: bool = True
+    waves: bool = True
+    tuning: bool = True
+
+
+ALL = Parts()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -212,17 +225,17 @@ def _key(row: FloatArray) -> tuple[float, ...]:
 
 
 def search_valve(
-    problem: Problem, base: Candidate, valve: int, providers: Sequence[Provider] = tuple(Provider)
+    problem: Problem, base: Candidate, valve: int, parts: Parts = ALL
 ) -> list[Candidate]:
     """Return all candidates met in a search over the friction of one valve, best first."""
     looked = _Valve(problem, base, valve)
     drifting = [white(problem, i, base.stems, DRIFT) for i in range(len(base.fits))]
     slower = problem.rate > 1
-    if Provider.GROWING in providers and not slower:
+    if parts.growing and not slower:
         looked.grow(drifting)
-    if Provider.TRIANGLE in providers and not slower:
+    if parts.triangle and not slower:
         looked.look(base.fits)
-    if Provider.DRIFTING in providers and slower:
+    if parts.drifting and slower:
         looked.look(drifting)
     if looked.met:
         looked.settle(anew=True)
@@ -231,12 +244,12 @@ def search_valve(
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 
-def search(problem: Problem, providers: Sequence[Provider] = tuple(Provider)) -> Found:
+def search(problem: Problem, parts: Parts = ALL) -> Found:
     """Search the frictions of all valves, each anew when that of another has changed.
 
     Args:
         problem: the record.
-        providers: of seeds.
+        parts: of it that are used.
     """
     without = ideal(problem)
     met, best = [without], without
@@ -245,7 +258,7 @@ def search(problem: Problem, providers: Sequence[Provider] = tuple(Provider)) ->
         if not due:
             break
         valve = due.pop(0)
-        found = search_valve(problem, best, valve, providers)
+        found = search_valve(problem, best, valve, parts)
         met += found
         if found[0].loss < best.loss - GAIN:
             best = found[0]
