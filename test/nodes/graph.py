@@ -27,7 +27,7 @@ from stiction_ros.nodes.opcua import OpcuaNode
 from stiction_ros.nodes.plant import PlantNode
 from stiction_ros.nodes.player import PlayerNode
 from stiction_ros.nodes.recorder import RecorderNode
-from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS, ManagedNode
+from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, ManagedNode
 
 KINDS: dict[str, type[ManagedNode]] = {
     "plant": PlantNode,
@@ -100,7 +100,7 @@ class Graph:
         """Note every message of every topic, under the name that the nodes wait for."""
         node = self.peer(name)
         for topic, kind in SIGNALS.items():
-            node.create_subscription(kind, topic, self.seen[topic].append, SIGNAL_QOS)
+            node.create_subscription(kind, topic, self.seen[topic].append, READER_QOS)
         for topic, kind in LATCHED.items():
             node.create_subscription(kind, topic, self.seen[topic].append, LATCHED_QOS)
         diagnostics = self.seen["/diagnostics"]

@@ -122,13 +122,13 @@ class Given(NamedTuple):
     Attributes:
         noise: monic polynomial D, shape (d + 1,).
         judged: n, rows that count.
-        known: :func:`step_products` with signals of any kind, shape (c, N + M + 8).
+        known: :func:`step_products` with signals of any kind, shape (c, N + M).
         others: stems of the other valves, scaled, shape (m − 1, N).
         beside: their last M + n + 1 samples, whitened, shape (m − 1, M + n + 1).
-        others_first: :func:`step_products` with their first lag, shape (m − 1, N + M + 8).
+        others_first: :func:`step_products` with their first lag, shape (m − 1, N + M).
         root: L^-1, with L L^T the products of the known signals and of the lags of each of
             ``others`` with each other and what is known of them before the record, shape (q, q).
-        target: :func:`step_products` with what all these leave of the output, shape (N + M + 8,).
+        target: :func:`step_products` with what all these leave of the output, shape (N + M,).
         pull: that a held response adds to its products with the target, shape (r,).
         energy: of that and of the prior of what explains the rest.
         edges: of the groups of lags, shape (r + 1,).

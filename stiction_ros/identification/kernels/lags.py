@@ -9,7 +9,7 @@ import numpy as np
 from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 
-EIGHT = 8  # lags that are summed up at once, stems that are turned at once: a line of the cache
+EIGHT = 8  # stems that are turned at once: a line of the cache
 
 
 @compiled_fused
@@ -97,9 +97,9 @@ def step_products(noise: FloatArray, other: FloatArray, rows: int, taps: int) ->
 
     Returns:
         Products of ``other`` with the last n samples of D(q) of a step at row k, from N on zero,
-        shape (N + M + 8,).
+        shape (N + M,).
     """
-    out, first = np.zeros(rows + taps + EIGHT), rows - len(other)
+    out, first = np.zeros(rows + taps), rows - len(other)
     for i in range(len(noise)):
         by, early = noise[i], out[first - i : rows - i]
         for k in range(len(other)):
@@ -120,25 +120,18 @@ def lag_products(moves: Moves, products: FloatArray, taps: int) -> FloatArray:
         products: of steps with that signal, by :func:`step_products`.
         taps: M.
     """
-    out = np.empty(taps + EIGHT)
-    at, by, begin = moves.at, moves.by, moves.begin * products[0]
-    for lag in range(0, taps, EIGHT):
-        a, b, c, d = begin, begin, begin, begin
-        e, f, g, h = begin, begin, begin, begin
-        for m in range(len(at)):
-            size, k = by[m], at[m] + 1 + lag
-            step = products[k : k + EIGHT]
-            a += size * step[0]
-            b += size * step[1]
-            c += size * step[2]
-            d += size * step[3]
-            e += size * step[4]
-            f += size * step[5]
-            g += size * step[6]
-            h += size * step[7]
-        out[lag], out[lag + 1], out[lag + 2], out[lag + 3] = a, b, c, d
-        out[lag + 4], out[lag + 5], out[lag + 6], out[lag + 7] = e, f, g, h
-    return out[:taps]
+    out = np.full(taps, moves.begin * products[0])
+    at, by = moves.at, moves.by
+    pairs = len(at) // 2 * 2
+    for m in range(0, pairs, 2):  # two at once, as sums are fetched and put back as often then
+        first, then = products[at[m] + 1 :], products[at[m + 1] + 1 :]
+        for i in range(taps):
+            out[i] = (out[i] + by[m] * first[i]) + by[m + 1] * then[i]
+    for m in range(pairs, len(at)):
+        step = products[at[m] + 1 :]
+        for i in range(taps):
+            out[i] += by[m] * step[i]
+    return out
 
 
 @compiled_fused
@@ -276,7 +269,7 @@ def products_of(
     """
     valves, rows = stems.shape
     taps, size, count = edges[-1], len(edges) - 1, signals.shape[1]
-    past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps + EIGHT))
+    past, first = np.empty((valves, taps + count + 1)), np.empty((valves, rows + taps))
     whole = valves * size
     shared = np.empty((whole, whole))
     beside = beside_lags(noise, stems, signals, edges)

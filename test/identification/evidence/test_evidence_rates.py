@@ -22,7 +22,7 @@ from stiction_ros.identification.evidence.rates import (
     looks,
     samples_between_reports,
 )
-from stiction_ros.identification.evidence.search import search, search_again
+from stiction_ros.identification.evidence.search import Parts, search, search_again
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,8 @@ def test_there_is_a_look_for_each_rate_that_leaves_rows_enough(seen: tuple[Look,
 
 def test_what_is_best_at_one_rate_is_tried_at_the_others() -> None:
     problem = Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1))
-    poor = search(problem, ())  # nothing but the friction-free fit
+    nothing = Parts(growing=False, triangle=False, drifting=False)
+    poor = search(problem, nothing)  # nothing but the friction-free fit
     slow = search(Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1), rate=2))
     better = search_again(problem, poor, [slow.best])
     assert better.best.loss < poor.best.loss - 100.0
