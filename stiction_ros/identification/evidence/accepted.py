@@ -10,8 +10,8 @@ from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import (
     Candidate,
+    Judge,
     candidates_apart,
-    losses,
 )
 from stiction_ros.identification.evidence.problem import LIMIT, Problem
 from stiction_ros.identification.evidence.search import APART, Found
@@ -125,11 +125,8 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
     grid = np.vstack([grid, deadbands])
     start = np.full(len(grid), best.starts[valve])
     rows.append(grid)
-    tried = np.column_stack([grid, start])
-    held, free = (
-        losses(problem, best, valve, tried, best.fits, held=each) for each in (True, False)
-    )
-    lost.append(np.minimum(held, free))
+    judge = Judge.of(problem, best, valve, best.fits, held=True)
+    lost.append(judge.losses(np.column_stack([grid, start])))
     return np.vstack(rows), np.concatenate(lost)
 
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.output_fit import (
+    Criterion,
     OutputFit,
     Whitened,
-    beginnings,
     fit_output,
 )
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.kernels.scan import best_apart
-from stiction_ros.identification.linear.response_prior import FREE, ResponsePrior
+from stiction_ros.identification.linear.response_prior import FREE
 
 TOGETHER = 256
 """Stems that are simulated and judged in one go: few enough to be kept, and enough for laws that
@@ -49,40 +49,69 @@ class Candidate:
         return float(sum(fit.loss for fit in self.fits))
 
 
-def losses(
-    problem: Problem,
-    beside: Candidate,
-    valve: int,
-    rows: FloatArray,
-    fits: Sequence[OutputFit],
-    *,
-    held: bool = False,
-) -> FloatArray:
-    """Return the loss of many frictions of one valve, shape (G,).
+@dataclasses.dataclass(frozen=True)
+class Judge:
+    """What judges stems of one valve, all else given.
 
-    It is infinite where the valve hardly moves and beyond the largest friction.
-
-    Args:
+    Attributes:
         problem: the record.
-        beside: whose other valves are kept.
         valve: index.
-        rows: (f_S, f_D, start), shape (G, 3), further parameters of the law before the start.
-        fits: whose noise and prior are taken.
-        held: whether responses get as far as in these fits; otherwise each as far as it may.
+        ways: criteria, one per output, of each way to do it; the best counts.
     """
-    priors = [fit.prior if held else dataclasses.replace(fit.prior, reach=FREE) for fit in fits]
-    others = np.delete(beside.stems, valve, axis=0)
-    judges = [
-        Whitened.of(problem, i, others, fit.noise, valve).under(prior)
-        for i, (fit, prior) in enumerate(zip(fits, priors, strict=True))
-    ]
-    out = np.full(len(rows), np.inf)
-    within = np.flatnonzero(rows[:, 0] <= problem.limit[valve])
-    for begin in range(0, len(within), TOGETHER):
-        some = within[begin : begin + TOGETHER]
-        stems = problem.stems(valve, rows[some, :-1], rows[some, -1])
-        out[some] = sum(judge.losses(stems, problem.least_moves) for judge in judges)
-    return out
+
+    problem: Problem
+    valve: int
+    ways: tuple[tuple[Criterion, ...], ...]
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        beside: Candidate,
+        valve: int,
+        fits: Sequence[OutputFit],
+        *,
+        held: bool = False,
+    ) -> Judge:
+        """Return what judges stems under the noise and prior of ``fits``.
+
+        Args:
+            problem: the record.
+            beside: whose other valves are kept.
+            valve: index.
+            fits: one per output.
+            held: whether responses may also get as far as in these fits, not only anywhere.
+        """
+        others = np.delete(beside.stems, valve, axis=0)
+        whitened = [Whitened.of(problem, i, others, fit.noise, valve) for i, fit in enumerate(fits)]
+        ways = [[dataclasses.replace(fit.prior, reach=FREE) for fit in fits]]
+        if held:
+            ways.append([fit.prior for fit in fits])
+        criteria = (
+            tuple(one.under(prior) for one, prior in zip(whitened, priors, strict=True))
+            for priors in ways
+        )
+        return cls(problem, valve, tuple(criteria))
+
+    def losses(self, rows: FloatArray) -> FloatArray:
+        """Return the loss of many frictions, shape (G,).
+
+        It is infinite where the valve hardly moves and beyond the largest friction.
+
+        Args:
+            rows: (f_S, f_D, start), shape (G, 3), further parameters of the law before the start.
+        """
+        problem, valve = self.problem, self.valve
+        out = np.full(len(rows), np.inf)
+        within = np.flatnonzero(rows[:, 0] <= problem.limit[valve])
+        for begin in range(0, len(within), TOGETHER):
+            some = within[begin : begin + TOGETHER]
+            stems = problem.stems(valve, rows[some, :-1], rows[some, -1])
+            found = np.array(
+                [[one.losses(stems, problem.least_moves) for one in way] for way in self.ways]
+            )
+            out[some] = found.sum(axis=1).min(axis=0)
+        return out
 
 
 def rows_apart(places: FloatArray, found: FloatArray, count: int, distance: float) -> list[int]:
@@ -91,17 +120,22 @@ def rows_apart(places: FloatArray, found: FloatArray, count: int, distance: floa
     return [int(i) for i in best_apart(places, found, count, beyond)]
 
 
-def ideal(problem: Problem, starts: Iterable[Sequence[OutputFit]] = ()) -> Candidate:
-    """Return the best fit without friction, from white noise and from ``starts``."""
+def ideal(problem: Problem) -> Candidate:
+    """Return the best fit without friction from where fits without neighbours begin."""
     stems = problem.ideal_stems()
-    begun: list[list[OutputFit | ResponsePrior]] = [
-        [*beginnings(problem, i)] for i in range(len(problem.pv))
-    ]
-    for fits in starts:
-        for row, fit in zip(begun, fits, strict=True):
-            row.append(fit)
-    fits = tuple(fit_output(problem, i, stems, row) for i, row in enumerate(begun))
+    fits = tuple(fit_output(problem, i, stems) for i in range(len(problem.pv)))
     return Candidate(np.zeros((len(stems), 2)), np.zeros(len(stems)), stems, fits)
+
+
+def fitted_from(problem: Problem, known: Candidate, others: Sequence[Candidate]) -> Candidate:
+    """Return a candidate, each output fitted from those of others too where that is better."""
+    if not others:
+        return known
+    fits = []
+    for i, fit in enumerate(known.fits):
+        found = fit_output(problem, i, known.stems, [other.fits[i] for other in others])
+        fits.append(min(fit, found, key=lambda one: one.loss))
+    return dataclasses.replace(known, fits=tuple(fits))
 
 
 def candidates_apart(

@@ -9,7 +9,7 @@ import numpy as np
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.accepted import FREEDOM, MISFIT
-from stiction_ros.identification.evidence.candidate import Candidate, ideal, losses
+from stiction_ros.identification.evidence.candidate import Candidate, Judge, ideal
 from stiction_ros.identification.evidence.output_fit import white
 from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.search import DRIFT, Found, search
@@ -78,10 +78,8 @@ def _nearby(problem: Problem, best: Candidate, valve: int) -> Settled:
 
 
 def _search(problem: Problem, beside: Candidate, valve: int) -> FurtherSearch:
-    def loss(rows: FloatArray) -> FloatArray:
-        return losses(problem, beside, valve, rows, beside.fits)
-
-    return FurtherSearch(problem.law, float(problem.limit[valve]), loss)
+    judge = Judge.of(problem, beside, valve, beside.fits)
+    return FurtherSearch(problem.law, float(problem.limit[valve]), judge.losses)
 
 
 def _with_further(problem: Problem, valve: int, row: FloatArray) -> Problem:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.candidate import Candidate, losses, rows_apart
+from stiction_ros.identification.evidence.candidate import Candidate, Judge, rows_apart
 from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.problem import LIMIT, Problem
 from stiction_ros.identification.exact.growing_windows import samples_of_turns
@@ -62,7 +62,7 @@ def grown(
     over: list[FloatArray] = []
     while True:
         part, whole = problem.beginning(count), count == problem.rows
-        found = losses(part, base.beginning(count), valve, tried, fits)
+        found = Judge.of(part, base.beginning(count), valve, fits).losses(tried)
         best = rows_apart(tried[:, :2], found, LAST if whole else KEPT, 0.5 * step)
         if whole:
             over.append(np.column_stack([tried, found]))

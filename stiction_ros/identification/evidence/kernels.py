@@ -116,17 +116,68 @@ def evidences_of(
     return out
 
 
+class Lines(NamedTuple):
+    """A constant, and sines and cosines, over the rows that count.
+
+    Attributes:
+        rows: the constant, all sines, and all cosines, shape (1 + 2 H, n).
+        before: their values one row earlier, shape (1 + 2 H,).
+        turns: of each sine and its cosine, rad a row, shape (H,).
+        gram: products of the rows with each other, shape (1 + 2 H, 1 + 2 H).
+    """
+
+    rows: FloatArray
+    before: FloatArray
+    turns: FloatArray
+    gram: FloatArray
+
+
+@compiled_fused
+def beside_lines(past: FloatArray, lines: Lines, edges: IntArray) -> FloatArray:
+    """Return the products of the groups of lags of a signal with lines, shape (r, 1 + 2 H).
+
+    A lag later, a line stands to the signal as it did, turned: only the rows at both ends differ.
+
+    Args:
+        past: the last M + n + 1 samples, those before the record included.
+        lines: a constant, sines and cosines.
+        edges: of the groups, as in :func:`..kernels.lags.grouped`.
+    """
+    taps, count, lasting = edges[-1], lines.rows.shape[1], len(lines.turns)
+    begun = np.dot(lines.rows, past[taps : taps + count])
+    out = np.empty((len(edges) - 1, len(begun)))
+    lags, others = np.empty(taps), np.empty(taps)
+    level, by = begun[0], lines.before[0]
+    for i in range(taps):
+        lags[i] = level
+        level += by * (past[taps - 1 - i] - past[taps - 1 - i + count])
+    out[:, 0] = grouped(lags, edges)
+    for h in range(1, lasting + 1):
+        sine, cosine = begun[h], begun[lasting + h]
+        enters = lines.before[h], lines.before[lasting + h]
+        leaves = lines.rows[h, count - 1], lines.rows[lasting + h, count - 1]
+        along, across = np.cos(lines.turns[h - 1]), np.sin(lines.turns[h - 1])
+        for i in range(taps):
+            lags[i], others[i] = sine, cosine
+            new, old = past[taps - 1 - i], past[taps - 1 - i + count]
+            sine += enters[0] * new - leaves[0] * old
+            cosine += enters[1] * new - leaves[1] * old
+            sine, cosine = along * sine + across * cosine, along * cosine - across * sine
+        out[:, h], out[:, lasting + h] = grouped(lags, edges), grouped(others, edges)
+    return out
+
+
 class Given(NamedTuple):
     """What stands beside one stem in one output, whitened.
 
     Attributes:
         noise: monic polynomial D, shape (d + 1,).
         judged: n, rows that count.
-        known: :func:`step_products` with signals of any kind, shape (c, N + M).
+        lines: a constant and waves from outside.
         others: stems of the other valves, scaled, shape (m − 1, N).
         beside: their last M + n + 1 samples, whitened, shape (m − 1, M + n + 1).
         others_first: :func:`step_products` with their first lag, shape (m − 1, N + M).
-        root: L^-1, with L L^T the products of the known signals and of the lags of each of
+        root: L^-1, with L L^T the products of the lines and of the lags of each of
             ``others`` with each other and what is known of them before the record, shape (q, q).
         target: :func:`step_products` with what all these leave of the output, shape (N + M,).
         pull: that a held response adds to its products with the target, shape (r,).
@@ -136,7 +187,7 @@ class Given(NamedTuple):
 
     noise: FloatArray
     judged: int
-    known: FloatArray
+    lines: Lines
     others: FloatArray
     beside: FloatArray
     others_first: FloatArray
@@ -164,14 +215,13 @@ def evidence(
         given: everything else.
         precision: inverse of K, shape (r, r).
     """
-    size, known, edges = len(precision), len(given.known), given.edges
+    size, known, edges = len(precision), len(given.lines.rows), given.edges
     taps, count = edges[-1], given.judged
     signal = with_past(whitened(given.noise, stem, stem[0]), taps)[-(taps + count + 1) :]
     first = step_products(given.noise, signal[-1 - count : -1], len(stem), taps)
     gram = own_products(signal, lag_products(moves, first, taps), edges)
     shared = np.empty((size, len(given.root)))
-    for row in range(known):
-        shared[:, row] = grouped(lag_products(moves, given.known[row], taps), edges)
+    shared[:, :known] = beside_lines(signal, given.lines, edges)
     for other in range(len(given.others)):
         at, theirs = known + other * size, moves_of(given.others[other])
         begun = (

@@ -22,6 +22,8 @@ from stiction_ros.identification.evidence.kernels import (
     LEAST,
     Given,
     Known,
+    Lines,
+    beside_lines,
     evidences,
     evidences_of,
     factorised,
@@ -102,11 +104,10 @@ class Whitened:
     Attributes:
         noise: D.
         seen: the output, shape (n,).
-        known: a constant and waves from outside, shape (1 + 2 H, n): a wave stays one when it is
-            whitened.
+        known: a constant and waves from outside: a wave stays one when it is whitened.
         passed: what D makes of each harmonic, complex, shape (H,).
         stems: scaled, shape (m, N).
-        lags: of the stems, with each other and with ``known`` and the output.
+        lags: of the stems, with each other and with the output.
         products: of ``known`` and of the lags of every stem with each other, shape (q, q).
         seen_products: of these with the output, shape (q,).
         edges: of the groups of taps.
@@ -116,7 +117,7 @@ class Whitened:
 
     noise: FloatArray
     seen: FloatArray
-    known: FloatArray
+    known: Lines
     passed: ComplexArray
     stems: FloatArray
     lags: Products
@@ -147,14 +148,16 @@ class Whitened:
         y = problem.pv[output]
         seen = whitened(noise, y, float(y[0]))[problem.first :]
         known = problem.known[output]
-        lags = products_of(noise, stems, np.vstack([known, seen]), problem.edges)
-        count = len(known)
+        lags = products_of(noise, stems, seen[None], problem.edges)
+        count, size = len(known.rows), len(problem.edges) - 1
         products = np.empty((count + len(lags.shared),) * 2)
-        products[:count, :count] = known @ known.T
-        products[:count, count:] = lags.beside[:count]
-        products[count:, :count] = lags.beside[:count].T
+        products[:count, :count] = known.gram
+        for begin, past in zip(range(count, len(products), size), lags.past, strict=True):
+            beside = beside_lines(past, known, problem.edges)
+            products[begin : begin + size, :count] = beside
+            products[:count, begin : begin + size] = beside.T
         products[count:, count:] = lags.shared
-        seen_products = np.concatenate([known @ seen, lags.beside[count]])
+        seen_products = np.concatenate([known.rows @ seen, lags.beside[0]])
         turns = np.outer(problem.turns(output), np.arange(len(noise)))
         passed = np.exp(-1j * turns) @ noise
         reach, at = problem.reaches[output], -1
@@ -176,8 +179,6 @@ class Whitened:
 
     def wave_variances(self, prior: ResponsePrior) -> FloatArray:
         """Return the variances of the sines and cosines, whitened, over σ², shape (2 H,)."""
-        if not len(self.passed):  # most records, tens of thousands of times
-            return np.empty(0)
         harmonics = np.arange(1, len(self.passed) + 1)
         return np.tile(prior.wave_variances(harmonics) * np.abs(self.passed) ** 2, 2)
 
@@ -188,7 +189,7 @@ class Whitened:
     def block(self, valve: int) -> slice:
         """Return where the lags of a stem stand among what explains the output."""
         size = len(self.edges) - 1
-        return slice(len(self.known) + valve * size, len(self.known) + (valve + 1) * size)
+        return slice(len(self.known.rows) + valve * size, len(self.known.rows) + (valve + 1) * size)
 
     def equations(self, prior: ResponsePrior) -> tuple[FloatArray, FloatArray, float]:
         """Return what is known before the record with the products, those with y, and y's energy.
@@ -207,17 +208,17 @@ class Whitened:
 
     def _with_precision(self, prior: ResponsePrior) -> FloatArray:
         out, precision = self.products.copy(), prior.precision(self.edges)
-        if len(self.known) > 1:
-            waves = np.arange(1, len(self.known))
+        if len(self.known.rows) > 1:
+            waves = np.arange(1, len(self.known.rows))
             out[waves, waves] += 1.0 / self.wave_variances(prior)
-        for start in range(len(self.known), len(out), len(precision)):
+        for start in range(len(self.known.rows), len(out), len(precision)):
             block = slice(start, start + len(precision))
             out[block, block] += precision
         return out
 
     def log_determinant(self, prior: ResponsePrior) -> float:
         """Return log det of the prior covariance of everything but the constant."""
-        waves = float(np.log(self.wave_variances(prior)).sum())
+        waves = float(np.log(self.wave_variances(prior)).sum()) if len(self.passed) else 0.0
         held = self.held(prior)
         known = 0.0 if held is None else held.determinant
         return waves + len(self.stems) * prior.log_determinant(self.edges) + known
@@ -236,9 +237,12 @@ class Whitened:
         size, count = len(self.edges) - 1, len(priors)
         helds = [self.held(prior) for prior in priors] if self.at >= 0 else []
         told = [held for held in helds if held is not None]
+        waves = np.empty((count, len(self.known.rows) - 1))
+        if len(self.passed):  # few records have any, and this is called tens of thousands of times
+            waves[:] = [1.0 / self.wave_variances(prior) for prior in priors]
         known = Known(
             precisions=np.array([prior.precision(self.edges) for prior in priors]),
-            waves=np.array([1.0 / self.wave_variances(prior) for prior in priors]),
+            waves=waves,
             held=np.array([held.precision for held in told]).reshape(-1, size, size),
             pulls=np.array([held.pull for held in told]).reshape(-1, size),
             energies=np.array([held.energy for held in told]) if told else np.zeros(count),
@@ -259,7 +263,7 @@ class Whitened:
         past = np.array([fit.rest[first - i : len(fit.rest) - i] for i in lags])
         equations, seen, _ = self.equations(fit.prior)
         beside = beside_lags(self.noise, self.stems, past, self.edges)
-        cross = np.hstack([past @ self.known.T, beside])
+        cross = np.hstack([past @ self.known.rows.T, beside])
         solution = np.linalg.solve(equations, np.column_stack([cross.T, seen]))
         gram = past @ past.T
         gram += LOAD * float(fit.rest @ fit.rest) * np.eye(NOISE_ORDER)
@@ -277,8 +281,8 @@ class Whitened:
         root = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
         half = root @ seen
         weights = root.T @ half
-        target = self.seen - weights[: len(self.known)] @ self.known
-        levels = weights[len(self.known) :].reshape(len(self.stems), len(self.edges) - 1)
+        target = self.seen - weights[: len(self.known.rows)] @ self.known.rows
+        levels = weights[len(self.known.rows) :].reshape(len(self.stems), len(self.edges) - 1)
         for past, level in zip(self.lags.past, levels, strict=True):
             target -= answered(past, np.repeat(level, np.diff(self.edges)))[-len(target) :]
         energy -= float(half @ half)
@@ -289,12 +293,11 @@ class Whitened:
         determinant = 2.0 * float(np.log(np.diag(factor)).sum()) + self.log_determinant(prior)
         rows, taps = self.stems.shape[1], int(self.edges[-1])
         noise, count = self.noise, len(self.seen)
-        known = np.array([step_products(noise, row, rows, taps) for row in self.known])
         return Criterion(
             Given(
                 noise=noise,
                 judged=count,
-                known=known,
+                lines=self.known,
                 others=self.stems,
                 beside=self.lags.past,
                 others_first=self.lags.first,
@@ -444,7 +447,7 @@ def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
             met.update(zip(fresh, whole.losses(fresh).tolist(), strict=True))
         return min(tried, key=met.__getitem__)
 
-    beside = len(whole.known) > 1
+    beside = len(whole.known.rows) > 1
     while True:
         better = best(prior.neighbours())
         if beside:
@@ -456,7 +459,7 @@ def _tuned(whole: Whitened, prior: ResponsePrior) -> ResponsePrior:
 
 def _fitted(problem: Problem, output: int, whole: Whitened, prior: ResponsePrior) -> OutputFit:
     loss, weights = whole.loss(prior)
-    known = len(whole.known)
+    known = len(whole.known.rows)
     responses = weights[known:].reshape(len(whole.stems), len(problem.edges) - 1)
     rest = problem.pv[output].copy()
     for stem, levels in zip(whole.stems, responses, strict=True):

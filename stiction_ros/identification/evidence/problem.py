@@ -12,6 +12,7 @@ from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
 from stiction_ros.identification.closed_loop.tuning import Tuning
+from stiction_ros.identification.evidence.kernels import Lines
 from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.linear.response_prior import Reach
@@ -180,10 +181,15 @@ class Problem:
         return tuple(np.concatenate([np.sin(angle), np.cos(angle)]) for angle in angles)
 
     @functools.cached_property
-    def known(self) -> tuple[FloatArray, ...]:
-        """A constant and the waves of each output over the rows that count, (1 + 2 H, n) each."""
-        constant = np.full((1, self.count), 1.0 / np.sqrt(self.count))
-        return tuple(np.concatenate([constant, waves[:, self.first :]]) for waves in self.waves)
+    def known(self) -> tuple[Lines, ...]:
+        """A constant and the waves of each output over the rows that count."""
+        level = 1.0 / np.sqrt(self.count)
+        found = []
+        for i, waves in enumerate(self.waves):
+            rows = np.vstack([np.full((1, self.count), level), waves[:, self.first :]])
+            before = np.append(level, waves[:, self.first - 1])
+            found.append(Lines(rows, before, self.turns(i), rows @ rows.T))
+        return tuple(found)
 
     def turns(self, output: int) -> FloatArray:
         """Return the frequencies of the lines of an output, rad per row, shape (H,)."""

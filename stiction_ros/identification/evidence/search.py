@@ -14,9 +14,10 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import (
     Candidate,
+    Judge,
     candidates_apart,
+    fitted_from,
     ideal,
-    losses,
     rows_apart,
 )
 from stiction_ros.identification.evidence.growing import grown
@@ -55,16 +56,14 @@ class Parts:
     """What a search is made of; one is left out to see what it is worth.
 
     Attributes:
-        growing: seeds from beginnings of the record as it is, under drifting noise.
-        triangle: seeds from a grid, also of it as it is, under the noise of the friction-free fit.
-        drifting: seeds from the same grid at slower rates, under drifting noise.
+        growing: seeds from beginnings of the record as it is.
+        triangle: seeds from a grid at slower rates.
         waves: all once more beside a wave from outside, where one may be there.
         tuning: what the controller tells of the process it was tuned for.
     """
 
     growing: bool = True
     triangle: bool = True
-    drifting: bool = True
     waves: bool = True
     tuning: bool = True
 
@@ -98,6 +97,7 @@ class _Valve:
         """Begin beside the other valves of ``base``; what is ``known`` is not tried again."""
         self.problem, self.base, self.valve = problem, base, valve
         self.met: list[Candidate] = []
+        self._last: tuple[Sequence[OutputFit], Judge] | None = None
         others = np.arange(len(problem.op)) != valve
         self._keys = {
             _key(self.row_of(one))
@@ -201,9 +201,15 @@ class _Valve:
     def _take(
         self, rows: FloatArray, fits: Sequence[OutputFit], count: int, distance: float
     ) -> None:
-        found = losses(self.problem, self.base, self.valve, rows, fits)
+        found = self._judge(fits).losses(rows)
         for i in rows_apart(rows[:, :2], found, count, distance):
             self.add(rows[i], fits, whole=False)
+
+    def _judge(self, fits: Sequence[OutputFit]) -> Judge:
+        """Return what judges under ``fits``, kept as the same head is looked round many times."""
+        if self._last is None or self._last[0] is not fits:
+            self._last = (fits, Judge.of(self.problem, self.base, self.valve, fits))
+        return self._last[1]
 
     def _lines(self, head: Candidate) -> FloatArray:
         """Return rows of the same J or S, with the stem's beginning and with its first slip kept.
@@ -230,12 +236,9 @@ def search_valve(
     """Return all candidates met in a search over the friction of one valve, best first."""
     looked = _Valve(problem, base, valve)
     drifting = [white(problem, i, base.stems, DRIFT) for i in range(len(base.fits))]
-    slower = problem.rate > 1
-    if parts.growing and not slower:
+    if problem.rate == 1 and parts.growing:
         looked.grow(drifting)
-    if parts.triangle and not slower:
-        looked.look(base.fits)
-    if parts.drifting and slower:
+    if problem.rate > 1 and parts.triangle:
         looked.look(drifting)
     if looked.met:
         looked.settle(anew=True)
@@ -264,7 +267,7 @@ def search(problem: Problem, parts: Parts = ALL) -> Found:
             best = found[0]
             others = (j for j in range(len(problem.op)) if j != valve and j not in due)
             due += others
-    return _concluded(problem, met)
+    return _concluded(problem, met, without)
 
 
 def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> Found:
@@ -288,7 +291,9 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
             tried.settle()
         met += tried.met
         best = min([best, *tried.met], key=lambda one: one.loss)
-    return found if best is found.best else _concluded(problem, met)
+    if best is found.best:
+        return found
+    return _concluded(problem, met, found.ideal, tried=found.met[:HEADS])
 
 
 def better(plain: Found, other: Found) -> Found:
@@ -305,9 +310,20 @@ def heads(found: Found, valve: int, count: int, distance: float) -> list[Candida
     return candidates_apart(met, valve, count, distance)
 
 
-def _concluded(problem: Problem, met: list[Candidate]) -> Found:
-    near = [one.fits for one in sorted(met, key=lambda one: one.loss)[:HEADS]]
-    without = ideal(problem, near)
+def _concluded(
+    problem: Problem, met: list[Candidate], without: Candidate, tried: Sequence[Candidate] = ()
+) -> Found:
+    """Return what is found.
+
+    Args:
+        problem: the record.
+        met: every candidate.
+        without: the best fit without friction, not yet fitted from the best of these.
+        tried: but from these it has been.
+    """
+    met = sorted(met, key=lambda one: one.loss)
+    fresh = [one for one in met[:HEADS] if all(one is not other for other in tried)]
+    without = fitted_from(problem, without, fresh)
     met = sorted([without, *met], key=lambda one: one.loss)
     return Found(met[0], without, _one_by_one(problem, met, without), tuple(met))
 
@@ -324,10 +340,12 @@ def _one_by_one(
         friction, starts, stems = best.friction.copy(), best.starts.copy(), best.stems.copy()
         friction[valve], starts[valve] = 0.0, 0.0
         stems[valve] = problem.ideal_stems()[valve]
-        fits = tuple(
-            fit_output(problem, i, stems, (*beginnings(problem, i), fit))
-            for i, fit in enumerate(best.fits)
-        )
         known = [one for one in met if not one.friction[valve].any()]
-        told.append(min([Candidate(friction, starts, stems, fits), *known], key=lambda c: c.loss))
+        if not any(np.array_equal(one.stems, stems) for one in (best, without)):
+            fits = tuple(
+                fit_output(problem, i, stems, (*beginnings(problem, i), fit))
+                for i, fit in enumerate(best.fits)
+            )
+            known.append(Candidate(friction, starts, stems, fits))
+        told.append(min(known, key=lambda one: one.loss))
     return tuple(told)

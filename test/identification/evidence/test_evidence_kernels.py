@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.evidence.kernels import (
     Given,
+    Lines,
+    beside_lines,
     evidence,
     evidences,
     factorised,
@@ -78,6 +80,23 @@ def test_products_of_lags_are_those_of_the_rows(
     other = random.standard_normal(count)
     seen = lag_products(moves[0], step_products(NOISE, other, 60, taps), taps)
     assert grouped(seen, edges) == pytest.approx(rows @ other, abs=1e-9)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10**6), EDGES, st.integers(2, 20), st.integers(0, 3))
+def test_products_of_lags_with_lines_are_those_of_the_rows(
+    seed: int, edges: IntArray, first: int, harmonics: int
+) -> None:
+    random, taps, count = np.random.default_rng(seed), int(edges[-1]), 60 - first
+    turns = random.uniform(0.05, 3.0, harmonics)
+    angles = np.outer(turns, np.arange(first - 1, 60))
+    lines = np.vstack([np.full((1, count + 1), 0.3), np.sin(angles), np.cos(angles)])
+    signal = random.standard_normal(60)
+    lags = _groups(signal, 0.7, first, edges)
+    past = np.append(np.full(taps, 0.7), signal)[-(taps + count + 1) :]
+    rows = np.ascontiguousarray(lines[:, 1:])
+    found = beside_lines(past, Lines(rows, lines[:, 0].copy(), turns, rows @ rows.T), edges)
+    assert found == pytest.approx(lags @ rows.T, abs=1e-8)
 
 
 @settings(deadline=None, max_examples=25)
@@ -166,7 +185,7 @@ def _given(noise: FloatArray, y: FloatArray, edges: IntArray) -> Given:
     return Given(
         noise=noise,
         judged=len(y),
-        known=step_products(noise, np.zeros(len(y)), rows, taps)[None],
+        lines=Lines(np.zeros((1, len(y))), np.zeros(1), np.empty(0), np.zeros((1, 1))),
         others=np.empty((0, rows)),
         beside=np.empty((0, taps + len(y) + 1)),
         others_first=np.empty((0, rows + taps + 8)),

@@ -78,7 +78,7 @@ def test_there_is_a_look_for_each_rate_that_leaves_rows_enough(seen: tuple[Look,
 
 def test_what_is_best_at_one_rate_is_tried_at_the_others() -> None:
     problem = Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1))
-    nothing = Parts(growing=False, triangle=False, drifting=False)
+    nothing = Parts(growing=False, triangle=False)
     poor = search(problem, nothing)  # nothing but the friction-free fit
     slow = search(Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1), rate=2))
     better = search_again(problem, poor, [slow.best])

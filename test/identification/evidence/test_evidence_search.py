@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.identification.evidence.accepted import accepted
 from stiction_ros.identification.evidence.problem import Problem
-from stiction_ros.identification.evidence.search import Found, Parts, search
+from stiction_ros.identification.evidence.search import Found, search
 from stiction_ros.identification.kernels.scan import best_apart
 
 STATIC, DYNAMIC = 3.0, 1.0
@@ -96,7 +96,7 @@ def test_places_apart_are_the_best_first_and_none_that_is_impossible() -> None:
 
 def test_a_needle_is_found_that_no_grid_of_the_triangle_meets() -> None:
     clean = Problem.of(pi_loop(STATIC, DYNAMIC, samples=1600, noise=0.002))
-    grown = search(clean, Parts(triangle=False, drifting=False)).best
+    grown = search(clean).best
     assert grown.friction[0] * clean.span[0] == pytest.approx([STATIC, DYNAMIC], abs=0.02)
 
 
