@@ -39,8 +39,8 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
     scaled,
     scaled_process,
 )
+from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.outside_waves import outside_wave
-from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.rates import LEAST_ROWS, RATES
 from stiction_ros.identification.result.identification import (
     FitStatus,

@@ -19,9 +19,9 @@ from stiction_ros.identification.closed_loop.explanation import (
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
+from stiction_ros.identification.evidence.fit.output_fit import OutputFit, noise_of
+from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.further import with_further
-from stiction_ros.identification.evidence.output_fit import OutputFit, noise_of
-from stiction_ros.identification.evidence.problem import NOISE_ORDER, Problem
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
     PRICE,

@@ -10,8 +10,8 @@ from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.accepted import FREEDOM, MISFIT
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, ideal
-from stiction_ros.identification.evidence.output_fit import white
-from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.fit.output_fit import white
+from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.search import DRIFT, Found, search
 from stiction_ros.identification.exact.further_fit import EQUAL, widened
 from stiction_ros.identification.friction.further import (

@@ -25,9 +25,9 @@ import numpy as np
 from stiction_ros.identification.closed_loop.tuning import tunings
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
+from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
-from stiction_ros.identification.evidence.problem import Problem
 from stiction_ros.identification.evidence.search import (
     ALL,
     APART,

@@ -1,6 +1,6 @@
 """The frictions that explain a record best: seeds, polish, and what was met on the way.
 
-One function judges, the loss of :mod:`.output_fit`. A seed is only where it is looked at first;
+One function judges, the loss of :mod:`.fit`. A seed is only where it is looked at first;
 nothing is accepted that is worse than what is known, and everything that was fitted is kept.
 """
 
@@ -20,15 +20,15 @@ from stiction_ros.identification.evidence.candidate import (
     ideal,
     rows_apart,
 )
-from stiction_ros.identification.evidence.growing import grown
-from stiction_ros.identification.evidence.output_fit import (
+from stiction_ros.identification.evidence.fit.output_fit import (
     OutputFit,
     beginnings,
     fit_output,
     follow,
     white,
 )
-from stiction_ros.identification.evidence.problem import LIMIT, Problem
+from stiction_ros.identification.evidence.fit.problem import LIMIT, Problem
+from stiction_ros.identification.evidence.growing import grown
 from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, finer_grid
 
 SEEDS = 6  # frictions taken from one look at the whole triangle

@@ -19,7 +19,7 @@ from stiction_ros.identification.evidence.engine import (
     _stability,
     _verdict,
 )
-from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.rates import Agreement, Look
 from stiction_ros.identification.evidence.search import Found, ideal
 from stiction_ros.identification.inference.verdict import DEADBAND

@@ -14,8 +14,9 @@ from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.closed_loop.tuning import RESETS, Tuning, tunings
 from stiction_ros.identification.evidence.accepted import HARMLESS, accepted
 from stiction_ros.identification.evidence.candidate import ideal
-from stiction_ros.identification.evidence.output_fit import Whitened, beginnings, fit_output
-from stiction_ros.identification.evidence.problem import Problem
+from stiction_ros.identification.evidence.fit.output_fit import beginnings, fit_output
+from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit.whitened import Whitened
 from stiction_ros.identification.evidence.rates import looks
 from stiction_ros.identification.evidence.search import search
 from stiction_ros.identification.linear.response_prior import (
@@ -148,7 +149,7 @@ def test_a_step_of_noise_and_responses_at_once_is_better_than_turns() -> None:
     fit = fit_output(problem, 0, stems)
     whole = Whitened.of(problem, 0, stems, fit.noise)
     assert whole.loss(fit.prior)[0] == pytest.approx(fit.loss)
-    again = Whitened.of(problem, 0, stems, whole.noise_step(fit))
+    again = Whitened.of(problem, 0, stems, whole.noise_step(fit.prior, fit.rest))
     assert again.loss(fit.prior)[0] < fit.loss + 1.0  # at rest already: no step leads away
 
 

@@ -12,7 +12,7 @@ from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
 from stiction_ros.identification.closed_loop.tuning import Tuning
-from stiction_ros.identification.evidence.kernels import Lines
+from stiction_ros.identification.evidence.fit.kernels import Lines
 from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.linear.response_prior import Reach

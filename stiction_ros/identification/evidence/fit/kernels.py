@@ -141,7 +141,7 @@ def beside_lines(past: FloatArray, lines: Lines, edges: IntArray) -> FloatArray:
     Args:
         past: the last M + n + 1 samples, those before the record included.
         lines: a constant, sines and cosines.
-        edges: of the groups, as in :func:`..kernels.lags.grouped`.
+        edges: of the groups, as in :func:`...kernels.lags.grouped`.
     """
     taps, count, lasting = edges[-1], lines.rows.shape[1], len(lines.turns)
     begun = np.dot(lines.rows, past[taps : taps + count])
