@@ -53,7 +53,7 @@ def materiality(estimate: ValveEstimate) -> str:
     if gone <= 0.0:
         return f"{said}; in simulation the loop moves as much without it."
     away = 100.0 * min(gone, 1.0)
-    return f"{said}; in simulation {away:.0f} % of that movement goes away without it."
+    return f"{said}; in simulation {away:.0f} % of the loop's movement goes away without it."
 
 
 def next_step(found: Identification, valve: int) -> str:

@@ -95,8 +95,8 @@ class ValveLoop:
             recorded set-point alone.
         band_share: f_S + f_D over the width of OP's movement about its slow mean.
         moved_with, moved_without: movement of OP over the recorded one when the record is
-            repeated with its set-point and noise, with the friction and without.
-        gone: share of that movement that goes away with the friction.
+            repeated with its noise, with the friction and without; see :class:`.Moved`.
+        gone: share of the movement of OP, or of PV − SP, that goes away with the friction.
         before: a line from outside in OP, beside what comes from PV.
         outside: a line from outside in PV, beside what comes from the stem.
     """
@@ -282,7 +282,7 @@ def _valve(
         return ValveLoop(
             tag, "", LoopStatus.UNTESTABLE, law.reason, oscillation=swing, band_share=share
         )
-    recorded = repeated.recorded(j)
+    recorded = repeated.recorded(j, period)
     free = compare(repeated.without_friction(j), recorded, period)
     linear = LinearController(law.coefficients, law.lag, law.smoothing)
     cycle = outputs[i].oscillation
@@ -308,9 +308,9 @@ def _valve(
         ringing(_beside(loop, repeated.process, i, at), 0, j, linear),
         repeated.driven(j),
         share,
-        moved[0],
-        moved[1],
-        max(0.0, 1.0 - moved[1] / moved[0]) if 0.0 < moved[0] < math.inf else 0.0,
+        moved.with_friction,
+        moved.without_friction,
+        moved.gone,
         outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
         outputs[i].after,
     )

@@ -48,7 +48,8 @@ def ringing(
     .. math:: A(q)(1 - q)(1 - s q) + (1 - s) C(q) B(q) q^{1 + t_d + lag}, \quad
               C = K (1 - q) + K_i + K_d (1 - q)^2
 
-    in the backward shift q, over which the loop is closed, are the inverse poles.
+    in the backward shift q, over which the loop is closed, are the inverse poles. One on the
+    negative axis rings from sample to sample, with a period of two.
     """
     gain, reset, rate = (float(value) for value in controller.tuning)
     share = controller.smoothing
@@ -61,7 +62,9 @@ def ringing(
     both[: len(left)] += left
     both[: len(right)] += right
     poles = np.roots(np.trim_zeros(both, "b"))
-    turning = poles[poles.imag > 1e-9 * np.abs(poles) + 1e-12]
+    rounding = 1e-9 * np.abs(poles) + 1e-12
+    real = np.abs(poles.imag) <= rounding
+    turning = poles[(poles.imag > rounding) | (real & (poles.real < -rounding))]
     periods = 2 * np.pi / np.abs(np.angle(turning))
     growth = np.abs(turning) ** periods
     order = np.argsort(-growth)

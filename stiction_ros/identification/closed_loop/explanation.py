@@ -27,6 +27,12 @@ BELIEVED = 10.0
 MATERIAL = 0.15
 """Share of OP's movement that must go away with the friction for the valve to be the cause."""
 
+LEFT_OVER = 0.25
+"""The same of a friction that was not found, where nothing else explains the oscillation."""
+
+MANY_TIMES = 3.0
+"""Movement over the recorded one from which on a repeated loop is another one."""
+
 SURE = 40.0
 """Evidence beyond the margin from which on a friction is not doubted for what a model of the loop
 says, unless that grows without end: the linear process and the controller are less certain."""
@@ -147,24 +153,54 @@ def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> 
     swing = output.oscillation
     if swing is None:
         return Cause(CauseKind.NONE, None, 0.0, 0.0, "There is no room for four cycles.")
-    acting = [
+    there = [
         (estimate, loop)
         for estimate, loop in zip(found.valves, closed.valves, strict=True)
-        if found.outputs[i].b[estimate.name] and _is_cause(estimate, loop, output)
+        if found.outputs[i].b[estimate.name]
+        and estimate.static_friction > 0.0
+        and output.rivalry < RIVAL
     ]
-    kind, sentence = _kind(output, closed, acting)
+    kind, sentence = _kind(output, closed, [one for one in there if _is_cause(*one)])
+    if kind is CauseKind.UNKNOWN:
+        kind, sentence = _left_over(sentence, there)
     driver = output.set_point if kind is CauseKind.SET_POINT else None
     period = (driver or swing).period * record.sample_time
     return Cause(kind, period, swing.regularity, swing.amplitude, sentence)
 
 
-def _is_cause(valve: ValveEstimate, loop: ValveLoop, output: OutputLoop) -> bool:
+def _is_cause(valve: ValveEstimate, loop: ValveLoop) -> bool:
     """Tell whether the friction of a valve makes its loop move."""
+    believed = valve.evidence.get("delta_bic", 0.0) > BELIEVED
+    return believed and (_gone(loop) > MATERIAL or _open_and_sure(valve, loop))
+
+
+def _gone(loop: ValveLoop) -> float:
+    """Return what goes away with a friction; none of a loop that does not repeat the record."""
+    return loop.gone if loop.moved_with < MANY_TIMES else 0.0
+
+
+def _left_over(
+    otherwise: str, there: list[tuple[ValveEstimate, ValveLoop]]
+) -> tuple[CauseKind, str]:
+    """Return the valve without whose friction much goes away, where nothing else explains it.
+
+    The evidence for this friction may be little; that there is an oscillation, and nothing else
+    to make it, speaks for it.
+
+    Args:
+        otherwise: what is said where there is no such valve.
+        there: valves that the output answers, and their loops.
+    """
+    valve, loop = max(there, key=lambda one: _gone(one[1]), default=(None, None))
+    if valve is None or loop is None:
+        return CauseKind.UNKNOWN, otherwise
+    if _gone(loop) <= (MATERIAL if valve.verdict.has_friction else LEFT_OVER):
+        return CauseKind.UNKNOWN, otherwise
+    share = f"{100 * min(_gone(loop), 1.0):.0f} %"
     return (
-        valve.static_friction > 0.0
-        and valve.evidence.get("delta_bic", 0.0) > BELIEVED
-        and (loop.gone > MATERIAL or _open_and_sure(valve, loop))
-        and output.rivalry < RIVAL
+        CauseKind.VALVE,
+        f"Nothing else explains it, and without the friction that {valve.name} may have "
+        f"{share} of the movement goes away.",
     )
 
 
@@ -187,8 +223,8 @@ def _kind(
     if regular and _set_point(output, loop):
         return CauseKind.SET_POINT, "The set-point moves the loop at this period."
     if acting:
-        valve, with_it = max(acting, key=lambda one: one[1].gone)
-        if with_it.gone <= MATERIAL:
+        valve, with_it = max(acting, key=lambda one: _gone(one[1]))
+        if _gone(with_it) <= MATERIAL:
             return (
                 CauseKind.VALVE,
                 f"{valve.name} sticks; what else moves OP its controller does not tell.",
@@ -196,7 +232,7 @@ def _kind(
         gone = f"{100 * min(with_it.gone, 1.0):.0f} %"
         return (
             CauseKind.VALVE,
-            f"Without the friction of {valve.name}, {gone} of OP's movement goes away.",
+            f"Without the friction of {valve.name}, {gone} of the movement goes away.",
         )
     rings = regular and loop is not None and _growth(loop.ringing, swing.period) > RINGING
     line = max(output.after.gain, output.alone.gain) > (LINE if regular else PLAIN_LINE)
@@ -207,6 +243,8 @@ def _kind(
     if rings and (itself or not line):
         return CauseKind.TUNING, "Controller and process ring at this period without friction."
     if line:
+        if (output.set_point_line or 0.0) > DRIVEN and _cycles(output):
+            return CauseKind.SET_POINT, "The set-point swings at this period, and PV with it."
         return (
             CauseKind.DISTURBANCE,
             "A wave that keeps its period to the sample enters behind the valve.",
@@ -225,9 +263,15 @@ def _set_point(output: OutputLoop, loop: ValveLoop | None) -> bool:
     if loop is None or loop.controller is None:
         return False
     if output.set_point_line is not None:
-        return output.set_point_line > DRIVEN and loop.driven > DRIVEN
+        swings = output.set_point_line > DRIVEN and loop.driven > DRIVEN
+        return swings and _cycles(output)
     ahead = loop.before.gain > output.after.gain and loop.controller.r_squared < HALF_OPEN
     return loop.before.gain > LINE and (ahead or loop.controller.r_squared < OPEN)
+
+
+def _cycles(output: OutputLoop) -> bool:
+    """Tell whether the recorded set-point is a cycle itself: single moves are none."""
+    return output.set_point is not None and output.set_point.regularity > REGULAR
 
 
 def _growth(ringing: tuple[Ringing, ...], period: float) -> float:

@@ -46,6 +46,22 @@ class Movement:
 STILL = Movement(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+@dataclasses.dataclass(frozen=True)
+class Moved:
+    """How a loop moves when its record is repeated, between moves of its set-point.
+
+    Attributes:
+        with_friction, without_friction: movement of OP over the recorded one.
+        gone: share that goes away with the friction, of OP's movement or of that of PV − SP,
+            whichever is more: a controller that passes noise on to the valve moves OP anyway,
+            and one that is slow hardly moves it at all.
+    """
+
+    with_friction: float
+    without_friction: float
+    gone: float
+
+
 def moving(values: FloatArray, period: float) -> FloatArray:
     """Return ``values``, shape (N,), about their slow mean and without their fast noise."""
     fast = slow_mean(values, period / FAST) if period >= 2 * FAST else values
@@ -72,6 +88,11 @@ def own_period(moved: FloatArray) -> float:
     if len(turns) < 3:
         return 0.0
     return float(2.0 * (turns[-1] - turns[0]) / (len(turns) - 1))
+
+
+def gone(stuck: float, free: float) -> float:
+    """Return the share of a movement that is gone where it is another one without a friction."""
+    return max(0.0, 1.0 - free / stuck) if 0.0 < stuck < np.inf else 0.0
 
 
 def compare(runs: FloatArray, recorded: float, period: float) -> Movement:

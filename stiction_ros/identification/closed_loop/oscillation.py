@@ -39,8 +39,8 @@ SHORTEST = 6.0
 FINE = 16
 """Frequencies per line width: a step turns the phase by 1/16 of a cycle over a stretch."""
 
-FASTEST = 3.0
-"""Samples of a period that a regular autocorrelation may show."""
+FASTEST = 2.0
+"""Samples of a period: what turns at each sample."""
 
 CROSSINGS = 6, 13
 """Zero crossings of the autocorrelation needed, and looked at: later ones are noise."""
@@ -106,7 +106,8 @@ def oscillation(values: FloatArray, stretches: Stretches) -> Oscillation | None:
     first, last = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
     regular, period = regularity(level[first:last])
     periods = (SHORTEST, slowest)
-    if regular > REGULAR and FASTEST < period < slowest:
+    period = max(period, FASTEST)
+    if regular > REGULAR and period < slowest:
         periods = (max(period / NEAR, FASTEST), min(period * NEAR, slowest))
     cycle = dominant_cycle(level[:, None], stretches, periods)
     if cycle is None:
@@ -125,7 +126,8 @@ def dominant_cycle(
     Args:
         error: PV − SP, shape (N, p).
         stretches: the holds.
-        periods: shortest and longest looked for, samples; None for all up to the longest hold.
+        periods: shortest and longest looked for, samples, none below :data:`FASTEST`; None for
+            all up to the longest hold.
 
     Returns:
         None when no hold has room for one period, or nothing moves at all.
@@ -139,7 +141,7 @@ def dominant_cycle(
     count = sum(b - a for a, b in settled)
     shortest, slowest = periods or (SHORTEST, float(longest))
     least = max(FINE, int(np.ceil(FINE * longest / slowest)))
-    bins = np.arange(least, int(np.ceil(FINE * longest / shortest)))
+    bins = np.arange(least, int(np.ceil(FINE * longest / max(shortest, FASTEST))))
     if not len(bins):
         return None
     frequencies = bins / (FINE * longest)

@@ -9,9 +9,11 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
-from stiction_ros.identification.closed_loop.movement import moving, size
+from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
 from stiction_ros.identification.closed_loop.oscillation import (
+    REGULAR,
     Oscillation,
+    oscillation,
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import DIGITS, ScaledLoop, free_run
@@ -123,13 +125,17 @@ class Repeated:
         """Return OP, shape (R, n), of a valve that follows it."""
         return self._run(valve, np.zeros((1, 2)))
 
-    def recorded(self, valve: int) -> float:
+    def recorded(self, valve: int, period: float) -> float:
         """Return the size of the recorded movement of OP about its slow mean.
 
         The samples for one period after a move of the set-point are left out while enough
         others remain.
+
+        Args:
+            valve: index.
+            period: of the cycle, samples.
         """
-        period, op = self.periods[valve], self.loop.op[:, valve]
+        op = self.loop.op[:, valve]
         moved = np.full(len(op), np.nan)
         for first, last in self.loop.stretches:
             moved[first:last] = moving(op[first:last], period)
@@ -149,7 +155,8 @@ class Repeated:
             return 0.0
         frictions = self.frictions[:, 0].copy()
         frictions[valve] = 0.0
-        op = self._again(first, last, frictions[None], np.zeros((1, last - first, self._p)))
+        none = np.zeros((1, last - first, self._p))
+        op, _ = self._again(first, self._set_points(rows), frictions[None], none)
         if not np.isfinite(op).all():
             return 0.0
         period = self.periods[valve]
@@ -158,12 +165,13 @@ class Repeated:
         apart = recorded - moving(op[0, :, valve], period)
         return max(0.0, 1.0 - float(apart @ apart) / max(float(recorded @ recorded), 1e-300))
 
-    def moved(self, valve: int, period: float) -> tuple[float, float]:
-        """Return the movement of OP over the recorded one, with friction and without.
+    def moved(self, valve: int, period: float) -> Moved:
+        """Return how the loop moves with the friction of a valve and without.
 
-        The record is repeated from its start with its set-point, and with noise of the
-        spectrum of what the model leaves, without the line at the period. Medians of the
-        frictions and noises tried; infinite where most runs grow without end.
+        The record is repeated from its start with noise of the spectrum of what the model
+        leaves, without the line at the period. Set-points rest but for those that cycle: what
+        others move OP is no cycle, and hides what a friction does. Medians of the frictions and
+        noises tried; infinite where most runs grow without end.
 
         Args:
             valve: index.
@@ -183,13 +191,24 @@ class Repeated:
             for k, pair in enumerate(tried):
                 frictions[n * len(tried) + k, valve] = pair
                 load[n * len(tried) + k] = load[number + n]
-        op = self._again(first, last, frictions, load)[:, :, valve]
-        recorded = size(moving(self.loop.op[first + self.past : last, valve], period))
-        sizes = [size(moving(run, period)) if np.isfinite(run).all() else np.inf for run in op]
-        with_friction, without = np.sort(sizes[:number]), np.sort(sizes[number:])
-        return (
-            float(with_friction[number // 2]) / recorded,
-            float(without[NOISES // 2]) / recorded,
+        sp = self._at_rest(first, last)
+        op, pv = self._again(first, sp, frictions, load)
+        output = max(self.pairs[valve][0], 0)
+        errors = pv[:, :, output] - sp[self.past :, output]
+        sizes = [
+            np.array(
+                [size(moving(run, period)) if np.isfinite(run).all() else np.inf for run in runs]
+            )
+            for runs in (op[:, :, valve], errors)
+        ]
+        middle = [
+            (np.sort(of[:number])[number // 2], np.sort(of[number:])[NOISES // 2]) for of in sizes
+        ]
+        recorded = self.recorded(valve, period)
+        return Moved(
+            float(middle[0][0]) / recorded,
+            float(middle[0][1]) / recorded,
+            max(gone(float(stuck), float(free)) for stuck, free in middle),
         )
 
     @property
@@ -211,13 +230,27 @@ class Repeated:
                 sp[:, i] = law.set_point[rows]
         return sp
 
-    def _again(self, first: int, last: int, frictions: FloatArray, load: FloatArray) -> FloatArray:
-        """Return OP, shape (R, n, m), from the recorded state after ``past`` samples on.
+    def _at_rest(self, first: int, last: int) -> FloatArray:
+        """Return set-points, shape (n, p), that stay after ``past`` samples, or cycle on."""
+        sp = self._set_points(slice(first, last))
+        for i in range(self._p):
+            swing = None
+            if self.loop.sp is not None:
+                swing = oscillation(self.loop.sp[:, i], self.loop.stretches)
+            if swing is None or swing.regularity <= REGULAR:
+                sp[self.past :, i] = sp[self.past - 1, i]
+        return sp
+
+    def _again(
+        self, first: int, sp: FloatArray, frictions: FloatArray, load: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return OP, shape (R, n − H, m), and PV, shape (R, n − H, p), after ``past`` samples H.
 
         Args:
-            first, last: rows.
+            first: row, which H samples follow as recorded.
+            sp: set-points from there on, shape (n, p).
             frictions: shape (R, m, 2).
-            load: shape (R or 1, last − first, p).
+            load: shape (R or 1, n, p).
         """
         number, past = len(frictions), self.past
         rows = slice(first, first + past)
@@ -228,8 +261,8 @@ class Repeated:
             np.repeat(self.loop.stem[rows].T[None], number, axis=0),
             np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
         )
-        sp = np.repeat(self._set_points(slice(first, last))[None], number, axis=0)
-        return run_loops(self.process, self.controllers, runs, sp, np.ascontiguousarray(load))[0]
+        repeated = np.repeat(sp[None], number, axis=0)
+        return run_loops(self.process, self.controllers, runs, repeated, np.ascontiguousarray(load))
 
     def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
         """Return OP of one valve, shape (R, n), without a load and with resting set-points."""

@@ -60,7 +60,7 @@ from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
 
-LEAST_GONE = 0.08  # share of OP's movement that must go away with a friction
+LEAST_GONE = 0.08  # share of OP's recorded movement that must go away with a friction
 WIDER = 2.0  # of OP's movement: a wider band is not what makes it
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 REJECTED = 6.0
@@ -208,7 +208,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     told = valve.evidence
     known = told.get("controller_fit", 0.0) > OPEN
     endless = told.get("moved_with", 0.0) >= ENDLESS
-    idle = known and told.get("loop_gone", 1.0) < LEAST_GONE
+    gone = told.get("loop_gone", 1.0) * min(told.get("moved_with", 1.0), 1.0)
+    idle = known and gone < LEAST_GONE
     idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
     wide = valve.band_share > WIDER
     if not (idle or wide or _is_wave(valve)):

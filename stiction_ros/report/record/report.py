@@ -48,7 +48,7 @@ _MEANING = {
     "loop_alike": "share of the simulated loops that move as recorded",
     "moved_with": "movement of the repeated record with friction over the recorded one",
     "moved_without": "the same without friction",
-    "loop_gone": "share of OP's movement that goes away without friction",
+    "loop_gone": "share of the movement of OP or PV − SP that goes away without friction",
     "controller_fit": "share of OP's moves that the recovered controller explains",
     "outside_line": "BIC gained by a wave that enters behind the valve",
     "line_rivalry": "BIC gained by a wave alone over that by friction",

@@ -69,7 +69,11 @@ def test_why(verdict: VerdictKind, said: str) -> None:
 @pytest.mark.parametrize(
     ("evidence", "share", "said"),
     [
-        ({"loop_gone": 0.8}, 0.42, "42 % of OP's movement; in simulation 80 % of that movement"),
+        (
+            {"loop_gone": 0.8},
+            0.42,
+            "42 % of OP's movement; in simulation 80 % of the loop's movement",
+        ),
         ({"loop_gone": 0.0}, 0.42, "in simulation the loop moves as much without it"),
         ({}, 0.42, "what goes away without it is not known"),
         ({"loop_gone": 0.8}, 1.7, "takes 100 % of OP's movement"),

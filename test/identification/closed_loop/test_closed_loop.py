@@ -11,6 +11,8 @@ from stiction_ros.identification.closed_loop.closed_loop import (
     LoopStatus,
     close_loop,
 )
+from stiction_ros.identification.closed_loop.damping import LinearController, ringing
+from stiction_ros.identification.closed_loop.loop_run import Process
 
 STICKY = Kind(friction=(3.0, 1.0))
 
@@ -67,6 +69,33 @@ def test_units_change_nothing(
     assert second.oscillation.period == pytest.approx(first.oscillation.period)
     assert second.oscillation.amplitude == pytest.approx(pv * first.oscillation.amplitude, rel=1e-6)
     assert second.after.gain == pytest.approx(first.after.gain, abs=1e-2)
+
+
+@pytest.mark.parametrize("size", [2.0, 10.0])
+def test_moves_of_the_set_point_hide_no_friction(size: float) -> None:
+    moves = np.random.default_rng(5).uniform(-size, size, 9)
+    moved = closed(known(Kind(friction=(3.0, 1.0), noise=0.05), sp=20.0 + np.repeat(moves, 100)))
+    still = closed(known(Kind(friction=(3.0, 1.0), noise=0.05)))
+    assert moved.valves[0].gone == pytest.approx(still.valves[0].gone, abs=0.2)
+    assert moved.valves[0].gone > 0.7
+
+
+def test_a_set_point_that_cycles_goes_on_when_the_record_is_repeated() -> None:
+    sp = 20.0 + 6.0 * np.sign(np.sin(2 * np.pi * np.arange(900) / 90.0))
+    valve = closed(known(Kind(friction=(1.0, 0.5), noise=0.05), sp=sp)).valves[0]
+    assert 0.7 < valve.moved_with < 1.3
+    assert valve.gone < 0.3
+
+
+def test_what_turns_at_each_sample_has_a_period_of_two() -> None:
+    found = ringing(
+        Process(np.array([[-0.2]]), np.array([[[1.0]]]), np.zeros((1, 1), np.int64), np.zeros(1)),
+        0,
+        0,
+        LinearController(np.array([0.8, 0.3, 0.0]), 0, 0.0),
+    )
+    assert found[0].period == pytest.approx(2.0)
+    assert 0.3 < found[0].growth < 1.0
 
 
 def test_a_loop_whose_controller_is_not_found_is_untestable() -> None:

@@ -8,12 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_loops import Kind, Known, changed, known
 
-from stiction_ros.identification.closed_loop.closed_loop import OutputLoop, close_loop
+from stiction_ros.identification.closed_loop.closed_loop import (
+    ClosedLoop,
+    OutputLoop,
+    close_loop,
+)
 from stiction_ros.identification.closed_loop.explanation import cause as cause_of
 from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.closed_loop.outside_line import NO_LINE
 from stiction_ros.identification.result.cause import Cause, CauseKind
-from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.result.identification import Identification, VerdictKind
 
 
 def wave(shape: str, period: float, samples: int = 900) -> np.ndarray:
@@ -61,6 +65,27 @@ def test_a_controller_that_is_not_known_acquits_no_surely_sticky_valve(
     assert (told.kind is CauseKind.VALVE) == blamed
 
 
+@pytest.mark.parametrize(
+    ("moves", "gone", "blamed"),
+    [(1.0, 0.5, True), (1.0, 0.2, False), (20.0, 0.5, False)],
+    ids=["much goes away", "little goes away", "the repeated loop is another one"],
+)
+def test_where_nothing_else_explains_a_cycle_a_friction_does_that_is_not_sure(
+    moves: float, gone: float, blamed: bool
+) -> None:
+    one = known(Kind(friction=(6.0, 2.0), noise=0.05))
+    valve = dataclasses.replace(
+        one.found.valves[0], verdict=VerdictKind.UNDECIDED, evidence={"delta_bic": -3.0}
+    )
+    found = dataclasses.replace(one.found, valves=(valve,))
+    closed = close_loop(one.record, found)
+    loop = dataclasses.replace(closed.valves[0], moved_with=moves, gone=gone)
+    output = dataclasses.replace(closed.outputs[0], after=NO_LINE, alone=NO_LINE)
+    told = cause_of(one.record, found, ClosedLoop((loop,), (output,)), 0)
+    assert told.kind is (CauseKind.VALVE if blamed else CauseKind.UNKNOWN)
+    assert ("Nothing else explains it" in told.sentence) == blamed
+
+
 def test_where_there_is_no_line_there_is_no_rival() -> None:
     worse = dataclasses.replace(NO_LINE, gain=-4.0)
     assert OutputLoop("PV1", None, after=worse, alone=worse).rivalry <= 0.0
@@ -85,6 +110,29 @@ def test_a_set_point_that_swings_is_the_cause(kept: bool) -> None:
     found = cause(Known(record, one.found))
     assert found.kind is CauseKind.SET_POINT
     assert found.period == pytest.approx(5.0 * 80.0, rel=0.03)
+
+
+def test_a_set_point_that_moves_now_and_then_is_no_cause() -> None:
+    moves = np.random.default_rng(5).uniform(-6.0, 6.0, 9)
+    one = known(Kind(friction=(3.0, 1.0), noise=0.05), sp=20.0 + np.repeat(moves, 100))
+    closed = close_loop(one.record, one.found)
+    output = dataclasses.replace(closed.outputs[0], set_point_line=2.0)
+    loop = dataclasses.replace(closed.valves[0], driven=0.95)
+    told = cause_of(one.record, one.found, ClosedLoop((loop,), (output,)), 0)
+    assert told.kind is CauseKind.VALVE
+
+
+def test_a_clock_in_the_set_point_is_no_disturbance() -> None:
+    one = known(Kind(noise=0.05), sp=20.0 + wave("square", 80.0))
+    closed = close_loop(one.record, one.found)
+    loop = dataclasses.replace(closed.valves[0], driven=0.2)
+    clock = dataclasses.replace(NO_LINE, gain=90.0, period=80.0)
+    output = dataclasses.replace(closed.outputs[0], after=clock, alone=clock)
+    told = cause_of(one.record, one.found, ClosedLoop((loop,), (output,)), 0)
+    assert told.kind is CauseKind.SET_POINT
+    still = dataclasses.replace(output, set_point=None)
+    told = cause_of(one.record, one.found, ClosedLoop((loop,), (still,)), 0)
+    assert told.kind is CauseKind.DISTURBANCE
 
 
 def test_a_controller_that_rings_is_the_cause() -> None:

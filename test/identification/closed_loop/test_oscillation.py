@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from stiction_ros.identification.closed_loop.oscillation import (
     LEAST_LINE,
     REGULAR,
+    dominant_cycle,
     oscillation,
     regularity,
     slow_mean,
@@ -34,6 +35,23 @@ def test_a_sine_in_noise_on_a_drift_is_seen(
     assert found is not None
     assert found.period == pytest.approx(period, rel=0.03)
     assert found.amplitude == pytest.approx(size, rel=0.15)
+    assert found.regularity > 1.5
+    assert found.share > LEAST_LINE
+
+
+def test_nothing_is_faster_than_two_samples() -> None:
+    values = np.random.default_rng(4).standard_normal((901, 1))
+    found = dominant_cycle(values, [(0, 901)], (1.5, 3.0))
+    assert found is not None
+    assert found.period >= 2.0
+
+
+def test_what_turns_at_each_sample_is_an_oscillation() -> None:
+    noise = np.random.default_rng(4).standard_normal(901)
+    values = noise[1:] * 0.2 + np.where(np.arange(900) % 2, 1.0, -1.0)
+    found = oscillation(values, [(0, 900)])
+    assert found is not None
+    assert found.period == pytest.approx(2.0, rel=0.02)
     assert found.regularity > 1.5
     assert found.share > LEAST_LINE
 
