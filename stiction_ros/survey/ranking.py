@@ -13,13 +13,14 @@
 
 *Confidence* in a friction that was found is the product of: how well its size is known (1 for a
 point, .5 for an interval as wide as twice its middle), how often it was seen (n/(n + 3) for a stem
-that turned back n times, as a friction shows when the stem turns), whether the closed loop agrees
+that turned back n times, as a friction shows when the stem turns), how much of the record speaks
+for it (g/(g + 17), with g what it gains as −2 log likelihood at the rates that agree: a gain of
+17, which a friction must have to be believed, is an even chance), whether the closed loop agrees
 (1 where it says the valve is the cause, .8 where it does not tell, .6 where it names another
 one), and the share of the rates and halves of the record that agree.
 
 A valve that is *undecided* shows friction, and something speaks against believing it. Among these
-confidence is g/(g + 7.5), .3 at most, with g what friction gains in evidence (ln units) at the rate
-at which it gains most: a gain of 7.5, which a friction must have to be believed, is an even chance.
+confidence is g/(g + 17), .3 at most, with g the gain at the rate at which it is most.
 What a verdict asks beyond that, the same at a second rate, in both halves and in the closed loop,
 keeps wrong ones out of what is found; here it tells little.
 """
@@ -67,18 +68,27 @@ def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> f
     low, high = valve["f_s_interval"]
     known = 1.0 / (1.0 + (high - low) / max(high + low, 1e-12))
     seen = reversals / (reversals + HALF_SEEN)
-    return float(known) * seen * AGREES.get(cause or "unknown", DISAGREES) * steady
+    agrees = AGREES.get(cause or "unknown", DISAGREES)
+    return float(known) * seen * _sure(valve) * agrees * steady
 
 
 def _shown(valve: Mapping[str, Any]) -> float:
-    """Return how much speaks for the friction of an undecided valve, 0 to 1.
-
-    A gain of :data:`PRICE`, which a believed friction must have, counts half.
-    """
+    """Return how much speaks for the friction of an undecided valve, 0 to 1."""
     told = valve.get("evidence", {})
-    gains = [gain for name, gain in told.items() if name.startswith("gain_")]
-    most = max([*gains, 0.0])
-    return float(most / (most + PRICE))
+    return _even_at_price(
+        max([gain for name, gain in told.items() if name.startswith("gain_")] + [0.0])
+    )
+
+
+def _sure(valve: Mapping[str, Any]) -> float:
+    """Return how much speaks for a friction that was found, above .5; 1 where it is not told."""
+    beyond = valve.get("evidence", {}).get("delta_bic")
+    return 1.0 if beyond is None else _even_at_price(PRICE + max(float(beyond), 0.0))
+
+
+def _even_at_price(gain: float) -> float:
+    """Return a gain as a share, 0 to 1; :data:`PRICE`, which friction must gain, counts half."""
+    return float(gain / (gain + PRICE))
 
 
 def kind(entry: Entry) -> int:

@@ -77,6 +77,12 @@ def test_confidence_falls_with_what_is_not_known() -> None:
         < confidence(sure, "none", 10**6)
         < confidence(sure, "valve", 10**6)
     )
+    barely, well, surely = (
+        confidence({**sure, "evidence": {"delta_bic": beyond}}, "valve", 10**6)
+        for beyond in (0.0, 50.0, 1e6)
+    )
+    assert barely == pytest.approx(0.5 * surely, rel=1e-4)
+    assert barely < well < surely < confidence(sure, "valve", 10**6)
     half = {"tried": [{}, {}], "agreed": ["first half"]}
     assert confidence({**sure, "stability": half}, "valve", 10**6) == 0.5 * confidence(
         sure, "valve", 10**6
