@@ -61,6 +61,10 @@ FAINT = 0.05
 DRIVEN = 0.5
 """Share of the cycle, of PV and of OP, that the set-point must make to be the cause."""
 
+FOLLOWED = 0.75
+"""Share of PV's line that the line of a set-point that cycles must have to be the cause however
+regular PV is, and whatever the model says that it moves."""
+
 ALL_DRIVEN = 0.9
 """Share of OP's movement that moves of the set-point without a line must make to be the cause."""
 
@@ -220,7 +224,8 @@ def _kind(
     assert swing is not None
     loop = next((one for one in closed.valves if one.output == output.name), None)
     regular = swing.regularity > REGULAR
-    if regular and _set_point(output, loop):
+    followed = _cycles(output) and (output.set_point_line or 0.0) > FOLLOWED
+    if followed or (regular and _set_point(output, loop)):
         return CauseKind.SET_POINT, "The set-point moves the loop at this period."
     if acting:
         valve, with_it = max(acting, key=lambda one: _gone(one[1]))
@@ -243,8 +248,6 @@ def _kind(
     if rings and (itself or not line):
         return CauseKind.TUNING, "Controller and process ring at this period without friction."
     if line:
-        if (output.set_point_line or 0.0) > DRIVEN and _cycles(output):
-            return CauseKind.SET_POINT, "The set-point swings at this period, and PV with it."
         return (
             CauseKind.DISTURBANCE,
             "A wave that keeps its period to the sample enters behind the valve.",

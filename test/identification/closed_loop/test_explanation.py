@@ -122,17 +122,28 @@ def test_a_set_point_that_moves_now_and_then_is_no_cause() -> None:
     assert told.kind is CauseKind.VALVE
 
 
-def test_a_clock_in_the_set_point_is_no_disturbance() -> None:
-    one = known(Kind(noise=0.05), sp=20.0 + wave("square", 80.0))
+@pytest.mark.parametrize("friction", [(0.0, 0.0), (3.0, 1.0)])
+def test_a_clock_that_pv_follows_is_the_cause_whatever_else_is_there(
+    friction: tuple[float, float],
+) -> None:
+    one = known(Kind(friction=friction, noise=0.05), sp=20.0 + wave("square", 80.0))
     closed = close_loop(one.record, one.found)
     loop = dataclasses.replace(closed.valves[0], driven=0.2)
     clock = dataclasses.replace(NO_LINE, gain=90.0, period=80.0)
-    output = dataclasses.replace(closed.outputs[0], after=clock, alone=clock)
+    swing = closed.outputs[0].oscillation
+    assert swing is not None
+    output = dataclasses.replace(
+        closed.outputs[0],
+        after=clock,
+        alone=clock,
+        oscillation=dataclasses.replace(swing, regularity=0.5),
+        set_point_line=0.9,
+    )
     told = cause_of(one.record, one.found, ClosedLoop((loop,), (output,)), 0)
     assert told.kind is CauseKind.SET_POINT
     still = dataclasses.replace(output, set_point=None)
     told = cause_of(one.record, one.found, ClosedLoop((loop,), (still,)), 0)
-    assert told.kind is CauseKind.DISTURBANCE
+    assert told.kind is not CauseKind.SET_POINT
 
 
 def test_a_controller_that_rings_is_the_cause() -> None:
