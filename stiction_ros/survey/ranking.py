@@ -14,15 +14,16 @@
 *Confidence* in a friction that was found is the product of: how well its size is known (1 for a
 point, .5 for an interval as wide as twice its middle), how often it was seen (n/(n + 3) for a stem
 that turned back n times, as a friction shows when the stem turns), how much of the record speaks
-for it (g/(g + 17), with g what it gains as −2 log likelihood at the rates that agree: a gain of
-17, which a friction must have to be believed, is an even chance), whether the closed loop agrees
-(1 where it says the valve is the cause, .8 where it does not tell, .6 where it names another
-one), and the share of the rates and halves of the record that agree.
+for it (.3 where it gains no more than a friction must to be believed, 17 as −2 log likelihood, and
+from there to 1 with b/(b + 17), b what it gains beyond), whether the closed loop agrees (1 where it
+says the valve is the cause, .8 where it does not tell, .6 where it names another one), and the
+share of the rates and halves of the record that agree.
 
-A valve that is *undecided* shows friction, and something speaks against believing it. Among these
-confidence is g/(g + 17), .3 at most, with g the gain at the rate at which it is most.
-What a verdict asks beyond that, the same at a second rate, in both halves and in the closed loop,
-keeps wrong ones out of what is found; here it tells little.
+A valve that is *undecided* shows friction, and something speaks against believing it. Its
+confidence is .3 at most, where that of those that were found begins: times g/(g + 17), with g the
+gain at the rate at which it is most, whether the closed loop agrees, and (1 + h)/2, with h the
+share of the movement that goes away without the friction. That the same is seen at a second rate
+and in both halves, as a verdict asks, keeps wrong ones out of what is found; here it tells little.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros.identification.closed_loop.explanation import MANY_TIMES
 from stiction_ros.identification.evidence.rates import PRICE
 from stiction_ros.survey.entry import Entry, Status
 
@@ -42,7 +44,7 @@ AGREES = {"valve": 1.0, "none": 0.8, "unknown": 0.8}
 DISAGREES = 0.6
 
 OPEN = 0.3
-"""Confidence in a verdict that is open."""
+"""Confidence in a verdict that is open, at most, and where that in a friction begins."""
 
 HEALTHY = 0.9
 """Confidence in a healthy valve: friction that never had to slip is not seen."""
@@ -59,8 +61,9 @@ def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> f
         cause: of the oscillation of its output.
         reversals: of the estimated stem in the record.
     """
+    agrees = AGREES.get(cause or "unknown", DISAGREES)
     if valve["verdict"] == "undecided":
-        return OPEN * _shown(valve)
+        return OPEN * _shown(valve) * agrees
     stability = valve.get("stability")
     steady = len(stability["agreed"]) / len(stability["tried"]) if stability else 1.0
     if valve["verdict"] == "healthy":
@@ -68,22 +71,24 @@ def confidence(valve: Mapping[str, Any], cause: str | None, reversals: int) -> f
     low, high = valve["f_s_interval"]
     known = 1.0 / (1.0 + (high - low) / max(high + low, 1e-12))
     seen = reversals / (reversals + HALF_SEEN)
-    agrees = AGREES.get(cause or "unknown", DISAGREES)
     return float(known) * seen * _sure(valve) * agrees * steady
 
 
 def _shown(valve: Mapping[str, Any]) -> float:
     """Return how much speaks for the friction of an undecided valve, 0 to 1."""
     told = valve.get("evidence", {})
-    return _even_at_price(
-        max([gain for name, gain in told.items() if name.startswith("gain_")] + [0.0])
-    )
+    gains = [gain for name, gain in told.items() if name.startswith("gain_")]
+    repeats = told.get("moved_with", 0.0) < MANY_TIMES
+    gone = min(told.get("loop_gone", 0.0), 1.0) if repeats else 0.0
+    return _even_at_price(max([*gains, 0.0])) * (1.0 + gone) / 2.0
 
 
 def _sure(valve: Mapping[str, Any]) -> float:
-    """Return how much speaks for a friction that was found, above .5; 1 where it is not told."""
+    """Return how much speaks for a friction that was found, :data:`OPEN` to 1; 1 if not told."""
     beyond = valve.get("evidence", {}).get("delta_bic")
-    return 1.0 if beyond is None else _even_at_price(PRICE + max(float(beyond), 0.0))
+    if beyond is None:
+        return 1.0
+    return OPEN + (1.0 - OPEN) * _even_at_price(max(float(beyond), 0.0))
 
 
 def _even_at_price(gain: float) -> float:

@@ -81,7 +81,7 @@ def test_confidence_falls_with_what_is_not_known() -> None:
         confidence({**sure, "evidence": {"delta_bic": beyond}}, "valve", 10**6)
         for beyond in (0.0, 50.0, 1e6)
     )
-    assert barely == pytest.approx(0.5 * surely, rel=1e-4)
+    assert barely == pytest.approx(0.3 * surely, rel=1e-4)
     assert barely < well < surely < confidence(sure, "valve", 10**6)
     half = {"tried": [{}, {}], "agreed": ["first half"]}
     assert confidence({**sure, "stability": half}, "valve", 10**6) == 0.5 * confidence(
@@ -90,6 +90,16 @@ def test_confidence_falls_with_what_is_not_known() -> None:
     shown = {"gain_1": 1e6}
     open_verdict = {**sure, "verdict": "undecided", "evidence": shown}
     assert confidence(open_verdict, "valve", 10**6) < confidence(wide, "valve", 10**6)
+
+
+def test_an_undecided_valve_stands_higher_where_the_closed_loop_speaks_for_it() -> None:
+    def believed(cause: str, **told: float) -> float:
+        evidence = {"gain_1": 40.0, **told}
+        return confidence({"verdict": "undecided", "evidence": evidence}, cause, 0)
+
+    assert believed("disturbance") < believed("none") < believed("valve")
+    assert believed("none") < believed("none", loop_gone=0.5, moved_with=1.0)
+    assert believed("none") == believed("none", loop_gone=0.5, moved_with=20.0)
 
 
 @given(
