@@ -20,8 +20,8 @@ from stiction_ros.identification.result.identification import Identification
 from stiction_ros.records.record import Record
 
 AGREED = 0.25
-"""Share of the median by which 5th and 95th percentile of the embedding's runs may lie about it:
-where they lie farther apart the record does not tell what it would bring."""
+"""Share of what comes by which a figure may miss it. One that would miss more in a loop at the 5th
+or 95th percentile of those drawn is not given: the record does not tell what would come."""
 
 AGREED_NOW = 0.05
 """The same as a share of now."""
@@ -96,6 +96,16 @@ class Option:
         }
         return dataclasses.replace(self, measures=Measures(**measures), interval=interval)
 
+    def where_agreed(self, now: Measures) -> Option:
+        """Return the option, without figures where they would not hold in each drawn loop."""
+        for key in ("iae_per_hour", "amplitude"):
+            if key in self.interval and self.measures is not None:
+                said, small = getattr(self.measures, key), AGREED_NOW * getattr(now, key)
+                if any(abs(said - came) > max(AGREED * came, small) for came in self.interval[key]):
+                    note = f"{self.note} The drawn loops do not agree on what it would bring."
+                    return dataclasses.replace(self, measures=None, note=note)
+        return self
+
     def to_json(self) -> dict[str, Any]:
         """Return an entry of ``options`` of ``gain --json``."""
         measures = dict.fromkeys(KEYS) if self.measures is None else self.measures.to_json()
@@ -169,7 +179,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
     service = _service(loop, draws, now).beside(now, left.measures)
     retuned = _retune(loop, draws, found, now).beside(now, left.measures)
     options = (service, _embedding(loop, draws, found), retuned)
-    told = tuple(_where_agreed(option, now) for option in options)
+    told = tuple(option.where_agreed(now) for option in options)
     return Gain(*names, now, (*told, left.beside(now, left.measures)))
 
 
@@ -252,18 +262,6 @@ def _embedding(loop: RecordedLoop, draws: Draws, found: Identification) -> Optio
 def embedding_part(loop: RecordedLoop) -> RecordedLoop:
     """Return the rows of a loop on which the embedding is run, behind those it takes over."""
     return loop.last(EMBEDDING_SAMPLES, TAKEN_OVER)
-
-
-def _where_agreed(option: Option, now: Measures) -> Option:
-    """Return the option, without figures where its runs do not say the same."""
-    for key in ("iae_per_hour", "amplitude"):
-        if key in option.interval and option.measures is not None:
-            low, high = option.interval[key]
-            room = max(AGREED * getattr(option.measures, key), AGREED_NOW * getattr(now, key))
-            if high - low > 2.0 * room:
-                note = f"{option.note} The drawn loops do not agree on what it would bring."
-                return dataclasses.replace(option, measures=None, note=note)
-    return option
 
 
 def option_of(

@@ -8,7 +8,8 @@ import pytest
 from stiction_ros.errors import InputError
 from stiction_ros.gain.draws import DRAWS, Draws, drawn_frictions, resampled
 from stiction_ros.gain.embedding import RUNS, EmbeddingDesign, embedded, pair_of
-from stiction_ros.gain.gain import Gain, What, embedding_part, gain_of
+from stiction_ros.gain.gain import Gain, Option, What, embedding_part, gain_of
+from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.model_gain import gain_of_model
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.gain.stems import stems_of
@@ -160,6 +161,24 @@ def test_what_drawn_loops_do_not_agree_on_has_no_figures(
     assert low < high
     assert option.measures is None
     assert "do not agree" in option.note
+
+
+@pytest.mark.parametrize(
+    ("said", "interval", "given"),
+    [
+        (0.85, (0.70, 1.00), True),
+        (0.80, (0.60, 1.00), False),  # a third more than the least, though a quarter of itself
+        (0.74, (0.73, 1.00), False),
+        (0.06, (0.02, 0.09), True),  # what is small beside now
+    ],
+)
+def test_a_figure_is_given_where_it_would_hold_in_each_drawn_loop(
+    said: float, interval: tuple[float, float], *, given: bool
+) -> None:
+    now = Measures(None, 1.0, 0.0, 0.0, 0.0)
+    measures = dataclasses.replace(now, iae_per_hour=said)
+    option = Option(What.SERVICE, measures, {"iae_per_hour": interval}, "")
+    assert (option.where_agreed(now).measures is not None) == given
 
 
 def test_drawn_loops_repeat_the_record(loop: RecordedLoop, draws: Draws) -> None:
