@@ -209,6 +209,11 @@ class Candidate(ABC):
         """Whether another linear process would do as well."""
         return self.about.absorbed
 
+    @property
+    def curved(self) -> bool:
+        """Whether it bends what OP does to PV by one figure that is searched."""
+        return self.about.bends and len(self.axes) == 1 and not self.factors
+
     def at_bound(self, point: FloatArray) -> bool:
         """Tell whether a figure lies on the bound of its range: then it is no figure."""
         return any(axis.bounds(v) for axis, v in zip(self.axes, point.tolist(), strict=True))

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.discrepancy.decision.extend import AddedEffect, run_with
+from stiction_ros.discrepancy.decision.extend import AddedEffect, open_columns, run_with
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import left_by, whiten
 from stiction_ros.discrepancy.process.refit import equations_of, with_equations
 from stiction_ros.discrepancy.process.slower import Changeable
-from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
@@ -23,6 +23,7 @@ TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
 NORMAL = 1.96
 NOTHING = 1e-9  # of what is left, that a unit of a figure moves: nothing is known of it
+BEND, LARGEST_BEND = 0.02, 0.5  # of a valve's curvature: probe of its derivative, longest step
 NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
 
 
@@ -59,10 +60,12 @@ class ChangedProcess:
     Attributes:
         model: without effects.
         changes: figures that were changed.
+        effects: that stand beside it, the curves of valves at their best behind it.
     """
 
     model: LoopModel
     changes: tuple[ProcessChange, ...]
+    effects: tuple[AddedEffect, ...]
 
 
 def changed_process(
@@ -71,7 +74,8 @@ def changed_process(
     """Return the model with gain, time constants and dead time at their best behind effects.
 
     The gain of an output, each of its time constants and its dead time are stepped by
-    Gauss-Newton on the likelihood; one figure after the other that is not surely another than
+    Gauss-Newton on the likelihood, together with what stands in for them: the curves of valves
+    and the linear figures of effects. One figure after the other that is not surely another than
     the model's goes back to it.
 
     Args:
@@ -84,23 +88,34 @@ def changed_process(
     """
     if not isinstance(bare.process, ArxProcess):
         return None
-    model, changes = bare, []
+    model, changes, beside = bare, [], tuple(effects)
     for output, name in enumerate(bare.outputs):
-        search = _Search(model, runs, effects, output)
+        search = _Search(model, runs, beside, output)
         if not search.run():
             continue
-        model = search.changed(search.values)
+        model, beside = search.changed(search.values), search.effects
         changes += search.changes(name)
-    return ChangedProcess(model, tuple(changes)) if changes else None
+    return ChangedProcess(model, tuple(changes), beside) if changes else None
+
+
+def _bent(effect: AddedEffect, run: FreeRun, more: float) -> AddedEffect:
+    """Return the curve of a valve with another curvature, inside of what is searched."""
+    (axis,) = effect.fit.candidate.axes
+    point = np.clip(effect.fit.point + more, axis.low, axis.high)
+    fit = dataclasses.replace(effect.fit, point=point)
+    behaviour = fit.behaviour(run)
+    assert behaviour is not None
+    return dataclasses.replace(effect, fit=fit, behaviour=behaviour)
 
 
 class _Search:
     """The figures of one output, stepped from the model's own."""
 
     def __init__(
-        self, model: LoopModel, runs: Runs, effects: Sequence[AddedEffect], output: int
+        self, model: LoopModel, runs: Runs, effects: tuple[AddedEffect, ...], output: int
     ) -> None:
         self.model, self.runs, self.effects, self.output = model, runs, effects, output
+        self.curves = [k for k, each in enumerate(effects) if each.fit.candidate.curved]
         self.equation = Changeable(equations_of(model)[output])
         self.figures = self.equation.figures
         self.most = np.array([each.most for each in self.figures])
@@ -131,34 +146,49 @@ class _Search:
     def _settle(self) -> None:
         output, free = self.output, self.free
         for _ in range(STEPS):
-            base = Baseline.of(self._run(self.values))
+            run = self._run(self.values)
+            base = Baseline.of(run, columns=open_columns(run, self.effects))
             noise, train = base.noise[output], base.blocks[output].train
             ar = base.declared[output][0] if base.declared[output] else noise.ar
-            gap = base.run.gap[:, output]
-            slopes = np.column_stack(
-                [
-                    (self._run(self.values + self.probes * each).gap[:, output] - gap)
-                    / self.probes[k]
-                    for k, each in enumerate(np.eye(len(free)))
-                    if free[k]
-                ]
-            )
+            gap = run.gap[:, output]
             basis = base.basis(output, ar)
             target = left_by(basis, whiten(gap, ar)[train])
-            white = left_by(basis, whiten(slopes, ar)[train])
+            white = left_by(basis, whiten(self._slopes(run, gap), ar)[train])
             step, *_ = np.linalg.lstsq(white, -target, rcond=1e-8)
             left = target + white @ step
             variance = float(left @ left) / max(len(left) - len(step), 1)
-            spread = np.linalg.pinv(white.T @ white) * variance
+            spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(white.T @ white)) * variance, 0.0))
             seen = np.linalg.norm(white, axis=0) > NOTHING * np.linalg.norm(target)
-            self.errors[free] = np.where(seen, np.sqrt(np.maximum(np.diag(spread), 0.0)), np.inf)
+            count = int(free.sum())
+            self.errors[free] = np.where(seen, spread, np.inf)[:count]
             moved = np.zeros(len(free))
-            moved[free] = np.clip(step, -0.5 * self.most[free], 0.5 * self.most[free])
+            moved[free] = np.clip(step[:count], -0.5 * self.most[free], 0.5 * self.most[free])
             self.values = np.clip(self.values + moved, -self.most, self.most)
-            if np.all(np.abs(moved) < TINY_STEP * self.probes):
+            bends = np.clip(step[count:], -LARGEST_BEND, LARGEST_BEND).tolist()
+            for k, more in zip(self.curves, bends, strict=True):
+                self.effects = self._with_bent(run, k, more)
+            settled = np.all(np.abs(moved) < TINY_STEP * self.probes)
+            if settled and all(abs(more) < TINY_STEP * BEND for more in bends):
                 break
 
-    def _run(self, values: FloatArray) -> Any:
+    def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:
+        """Return what a unit of every free figure and of every curve moves, shape (N, figures)."""
+        moved = [
+            (self._run(self.values + self.probes * each).gap[:, self.output] - gap) / self.probes[k]
+            for k, each in enumerate(np.eye(len(self.free)))
+            if self.free[k]
+        ]
+        model = run.model if not self.curves else self.changed(self.values)
+        for k in self.curves:
+            bent = run_with(model, self.runs, self._with_bent(run, k, BEND))
+            moved.append((bent.gap[:, self.output] - gap) / BEND)
+        return np.column_stack(moved)
+
+    def _with_bent(self, run: FreeRun, k: int, more: float) -> tuple[AddedEffect, ...]:
+        bent = _bent(self.effects[k], run, more)
+        return (*self.effects[:k], bent, *self.effects[k + 1 :])
+
+    def _run(self, values: FloatArray) -> FreeRun:
         return run_with(self.changed(values), self.runs, self.effects)
 
     def changed(self, values: FloatArray) -> LoopModel:

@@ -32,8 +32,8 @@ def mended(task: Task, state: State) -> State | None:
         return None
     margin = task.options.margin
     now = whole(state.bare, task.runs, state.added)
-    behind = [] if state.added else singles(state)[:BEHIND]
-    found = best_with_process(state.given, task.runs, state.added, behind, margin)
+    rest = [] if state.added else singles(state)[:BEHIND]
+    found = best_with_process(state.given, task.runs, state.added, rest, margin)
     due = margin if state.added else 0.0
     if found is None or found.worth >= now.worth(margin) + _price(task, state, now) - due:
         return None
@@ -71,7 +71,7 @@ def process_first(task: Task, state: State, scores: Scores) -> State | None:
     rivals = [fit.candidate.effect for fit in inside if fit.evidence > explained - margin]
     if best is not None and same_thing(found.changed.changes, [best.candidate.effect, *rivals]):
         return None
-    return _behind(state, found)
+    return behind(state, found)
 
 
 def changed_again(task: Task, state: State) -> State:
@@ -82,7 +82,7 @@ def changed_again(task: Task, state: State) -> State:
     now = whole(state.bare, task.runs, state.added)
     found = with_process(state.given, task.runs, state.added, margin)
     if found is not None and found.worth < now.worth(margin) + _price(task, state, now):
-        return _behind(state, found)
+        return behind(state, found)
     return state
 
 
@@ -97,6 +97,18 @@ def singles(state: State) -> list[AddedEffect]:
     return found
 
 
+def behind(state: State, found: Mended) -> State:
+    """Return the state with a changed process, and what it has of effects refitted behind it."""
+    return dataclasses.replace(
+        state,
+        bare=found.changed.model,
+        changes=found.changed.changes,
+        added=found.whole.effects,
+        base=found.whole.base,
+        earlier=(),
+    )
+
+
 def _left_in_doubt(state: State) -> list[str]:
     """Return the effects of the set that the last look left in doubt; none where it left none.
 
@@ -107,18 +119,6 @@ def _left_in_doubt(state: State) -> list[str]:
     if last.chosen is None:
         return []
     return [last.chosen.candidate.effect, *(effect for _, effect in last.alternatives)]
-
-
-def _behind(state: State, found: Mended) -> State:
-    """Return the state with a changed process, and what it has of effects refitted behind it."""
-    return dataclasses.replace(
-        state,
-        bare=found.changed.model,
-        changes=found.changed.changes,
-        added=found.whole.effects,
-        base=found.whole.base,
-        earlier=(),
-    )
 
 
 def _price(task: Task, state: State, now: Whole) -> float:

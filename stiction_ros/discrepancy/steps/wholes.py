@@ -211,7 +211,7 @@ def with_process(
     changed = changed_process(bare, runs, part)
     if changed is None:
         return None
-    effects = refit_together(changed.model, runs, part) if part else ()
+    effects = refit_together(changed.model, runs, changed.effects) if part else ()
     own = whole(changed.model, runs, effects)
     rows = max(fit.rows for fit in own.base.noise)
     return Mended(changed, own, own.worth(margin) + price_of(changed.changes, rows, margin))

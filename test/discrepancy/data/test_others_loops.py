@@ -100,6 +100,20 @@ def test_a_gain_that_a_curve_explains_as_well_is_no_correction_of_the_model() ->
     assert answer.process_changes == ()
 
 
+def test_a_gain_beside_a_curve_of_another_law_is_the_slope_of_that_curve() -> None:
+    answer = answered(141)  # a quadratic characteristic; what is searched is exponential
+    assert names(answer) == [("valve:V1", "characteristic")]
+    (change,) = answer.process_changes
+    assert change.what == "gain"
+    assert 1.0 < change.value < 1.15
+
+
+def test_a_curve_is_stepped_with_the_process_that_stands_in_for_it() -> None:
+    answer = answered(302, given="off")
+    assert names(answer) == [("valve:V1", "characteristic")]
+    assert not any(noise.memory for noise in answer.noise)
+
+
 def test_a_rounded_op_in_a_healthy_loop_is_no_coloured_noise() -> None:
     answer = answered(875)
     assert answer.verdict is GapVerdict.NONE
