@@ -9,13 +9,17 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
+from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP: what rounding of the signals may leave
-MANY = 0.2  # of the samples: where OP moves less often, its rounding stays what it is
+MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
+FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
+FINEST = 1e-4  # of the span of OP: what is finer says nothing
+DIGITS = 1e-7  # of the span of OP, that its digits may leave
 NEARLY_ALL = 0.9  # of the samples: where OP rests more often, no scan lies between them
 HALF = 0.5  # of a sample, for which an OP between two samples is held
 NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
@@ -53,13 +57,15 @@ class ControllerCheck:
     clock_known: bool
 
 
-def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[float, ...]:
-    """Return per valve the variance of what may act beside the recorded OP, %².
+def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], ...]:
+    """Return per valve what may act beside the recorded OP.
 
-    A rounded OP is off by up to half a step; where it moves at many samples, by another amount
-    at each. A controller that scans again between two samples holds another OP for half of
-    them, which lies off the mean of its neighbours as far as a recorded one does off that of its
-    own; that is asked only where no PI law gives the recorded OP.
+    A rounded OP is off by up to half a step: by another amount at each sample where it moves at
+    many, and by one amount until the next move where somebody moves it. Values that somebody
+    chose are what they are, unless they lie finer than anybody chooses them. A controller that
+    scans again between two samples holds another OP for half of them, which lies off the mean of
+    its neighbours as far as a recorded one does off that of its own; that is asked only where no
+    PI law gives the recorded OP.
 
     Args:
         runs: the records.
@@ -70,13 +76,30 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[float, ...]:
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
         often = float(np.mean(moves != 0.0))
-        variance = quantum_of(op) ** 2 / 12.0 if often > MANY else 0.0
+        quantum = quantum_of(op) if often > MANY else _chosen(op)
+        keep = 1.0 - often if often <= MANY else 0.0
+        beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
         if asked and often > NEARLY_ALL:
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
             spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
-            variance += (HALF * spread) ** 2
-        found.append(variance)
+            beside.append(Unseen((HALF * spread) ** 2))
+        found.append(tuple(beside))
     return tuple(found)
+
+
+def _chosen(values: FloatArray) -> float:
+    """Return the distance of which all few values are multiples; 0 where it is no rounding.
+
+    By Euclid: few values need not lie one step apart.
+    """
+    distinct = np.unique(values)
+    span = float(np.ptp(values))
+    quantum = 0.0
+    for step in np.diff(distinct).tolist():
+        while step > DIGITS * span:
+            quantum, step = step, math.fmod(quantum, step)
+            step = 0.0 if quantum - step <= DIGITS * span else step
+    return quantum if FINEST * span < quantum <= FINE * span else 0.0
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:

@@ -84,6 +84,15 @@ def _beside_white(
     return DeclaredNoise(float(np.sqrt(max(variance, 0.0))), ar[:last])
 
 
+def counting(ar: FloatArray) -> FloatArray:
+    """Return φ without those at the end that together do not count.
+
+    A slow noise is remembered a little at each of many lags, which together are much.
+    """
+    rest = np.cumsum(np.abs(ar)[::-1])[::-1]
+    return ar[: int(np.sum(rest > NEGLIGIBLE))]
+
+
 def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
     """Return a noise as values rounded to a quantum show it, however fine they are.
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.likelihood.declared_noise import (
-    LONGEST,
     NEGLIGIBLE,
     UNSEEN,
     DeclaredNoise,
+    counting,
     declared_noise,
     rounded,
 )
@@ -20,17 +21,31 @@ from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess
 
+REMEMBERED = 60  # samples that an OP off its record is remembered behind the process
+
+
+@dataclasses.dataclass(frozen=True)
+class Unseen:
+    """What may act beside the recorded OP of a valve.
+
+    Attributes:
+        variance: %².
+        keep: correlation of neighbouring samples, 0 (white) to 1.
+    """
+
+    variance: float
+    keep: float = 0.0
+
 
 def seen_noise(
-    model: LoopModel, quanta: Sequence[float], unseen: Sequence[float]
+    model: LoopModel, quanta: Sequence[float], unseen: Sequence[Sequence[Unseen]]
 ) -> tuple[tuple[DeclaredNoise, ...], ...]:
     """Return per output the forms in which its declared noise may be seen; none without one.
 
     Args:
         model: that declares it.
         quanta: per output the distance of PV's values; 0 where there is none.
-        unseen: per valve the variance of what may act beside the recorded OP, %²; empty for
-            nothing.
+        unseen: per valve what may act beside the recorded OP; empty for nothing.
     """
     found = []
     for i, (noise, quantum) in enumerate(zip(declared_noise(model), quanta, strict=True)):
@@ -43,9 +58,13 @@ def seen_noise(
 
 
 def beside_unseen(
-    noise: DeclaredNoise, model: LoopModel, output: int, quantum: float, unseen: Sequence[float]
+    noise: DeclaredNoise,
+    model: LoopModel,
+    output: int,
+    quantum: float,
+    unseen: Sequence[Sequence[Unseen]],
 ) -> DeclaredNoise | None:
-    r"""Return a noise beside white noise of the OP that has passed the process.
+    r"""Return a noise beside first-order noise of the OP that has passed the process.
 
     .. math:: r_k = n_k + \sum_j \frac{B_j(q)}{A(q)} w_{j,k}
 
@@ -56,44 +75,56 @@ def beside_unseen(
         model: of the loop.
         output: its index.
         quantum: distance of PV's values.
-        unseen: per valve the variance of w, %².
+        unseen: per valve the parts of w.
     """
     inner = model.process.inner if isinstance(model.process, AlteredProcess) else model.process
     if not isinstance(inner, ArxProcess):
         return None
-    passed, driven = _of_op(inner.equations[output], model, unseen)
+    passed, driven, shown = _of_op(inner.equations[output], model, unseen)
     white = quantum**2 / 12.0 + (0.0 if len(noise.ar) else noise.std**2)
     own = _companion(noise.ar)
     excited = np.zeros(own.shape)
     if len(own):
         excited[0, 0] = noise.std**2
     states, moved = block_diag(own, passed), block_diag(excited, driven)
-    look = np.concatenate([np.eye(1, len(own))[0], np.eye(1, len(passed))[0]])
+    look = np.concatenate([np.eye(1, len(own))[0], shown])
     steady = steady_gain(states, moved, look, max(white, UNSEEN * noise.std**2))
     if steady is None:
         return None
     gain, missed = steady
-    whitening, kept, state = np.zeros(LONGEST), states - np.outer(gain, look), gain.copy()
-    for lag in range(LONGEST):
+    whitening, kept, state = np.zeros(REMEMBERED), states - np.outer(gain, look), gain.copy()
+    for lag in range(REMEMBERED):
         whitening[lag] = look @ state
         state = kept @ state
-    last = int(np.max(np.flatnonzero(np.abs(whitening) > NEGLIGIBLE), initial=-1)) + 1
-    found = DeclaredNoise(float(np.sqrt(missed)), whitening[:last])
+    found = DeclaredNoise(float(np.sqrt(missed)), counting(whitening))
     return None if _alike(found, noise) else found
 
 
 def _of_op(
-    equation: ArxOutput, model: LoopModel, unseen: Sequence[float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return the states of B/A, and what noise of the OP adds to their covariance."""
+    equation: ArxOutput, model: LoopModel, unseen: Sequence[Sequence[Unseen]]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return states of B/A and of w, what is added to their covariance, and what is seen of them.
+
+    White parts of w are no states.
+    """
     ways = [np.asarray(equation.b.get(name, ()), dtype=float) for name in model.valve_names]
     count = max(len(equation.a), *(len(way) for way in ways))
     states = _companion(-np.pad(np.asarray(equation.a, dtype=float), (0, count - len(equation.a))))
-    driven = np.zeros((count, count))
-    for way, variance in zip(ways, unseen, strict=True):
-        padded = np.pad(way, (0, count - len(way)))
-        driven += variance * np.outer(padded, padded)
-    return states, driven
+    parts = [
+        (np.pad(way, (0, count - len(way))), each)
+        for way, beside in zip(ways, unseen, strict=True)
+        for each in beside
+    ]
+    lasting = [(way, each) for way, each in parts if each.keep > 0.0]
+    driven = np.zeros((count + len(lasting),) * 2)
+    for way, each in parts:
+        if not each.keep > 0.0:
+            driven[:count, :count] += each.variance * np.outer(way, way)
+    whole = block_diag(states, np.diag([each.keep for _, each in lasting]))
+    for k, (way, each) in enumerate(lasting, start=count):
+        whole[:count, k] = way
+        driven[k, k] = each.variance * (1.0 - each.keep**2)
+    return whole, driven, np.eye(1, len(whole))[0]
 
 
 def _companion(ar: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks, BoolArray
+from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
 from stiction_ros.errors import InputError
@@ -36,8 +37,7 @@ class Runs:
         lattices: per output the distance of PV's values, however fine; 0 where there is none.
         thinned: per output whether values were held or interpolated, so that their noise is
             no longer that of the loop.
-        unseen: per valve the variance of what may act beside the recorded OP, %²; empty where
-            nothing does.
+        unseen: per valve what may act beside the recorded OP; empty where nothing does.
     """
 
     records: tuple[Record, ...]
@@ -49,7 +49,7 @@ class Runs:
     quanta: tuple[float, ...]
     thinned: tuple[bool, ...]
     lattices: tuple[float, ...]
-    unseen: tuple[float, ...] = ()
+    unseen: tuple[tuple[Unseen, ...], ...] = ()
 
     @property
     def sample_time(self) -> float:
