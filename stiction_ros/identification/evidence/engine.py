@@ -288,21 +288,28 @@ def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
     """Return the named figures behind the verdict on one valve."""
     problem, found = agreed.look.problem, agreed.look.found
     best, without = found.best, found.without[valve]
-    halves = half_gains(
-        (_innovations(problem, one), _innovations(problem, other))
-        for one, other in zip(best.fits, without.fits, strict=True)
-    )
+    equals = [agreed.look] if agreed.tied is None else [agreed.look, agreed.tied]
+    halves = np.min([_half_gains(look, valve) for look in equals], axis=0)
     return {
         "delta_bic": agreed.gain,
         "free_run_ratio": _free_run(problem, without) / _free_run(problem, best),
-        "half_1": halves[0],
-        "half_2": halves[1],
+        "half_1": float(halves[0]),
+        "half_2": float(halves[1]),
         "share": float(best.friction[valve, 0]),
         "moves": float(np.count_nonzero(np.diff(best.stems[valve]))),
         "rate": float(problem.rate),
         "alike": float(agreed.alike),
         "deadband_loss": agreed.look.accepted[valve].deadband_loss,
     }
+
+
+def _half_gains(look: Look, valve: int) -> tuple[float, float]:
+    """Return what the friction of a valve gains in either half of the rows of a rate."""
+    best, without = look.found.best, look.found.without[valve]
+    return half_gains(
+        (_innovations(look.problem, one), _innovations(look.problem, other))
+        for one, other in zip(best.fits, without.fits, strict=True)
+    )
 
 
 def _innovation(op: FloatArray) -> float:

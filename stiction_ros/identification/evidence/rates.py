@@ -62,6 +62,7 @@ BESIDE = 10.0
 INEXACT = 0.03
 """Share of a wave's own gain that it must gain besides: no wave is one to the letter, and what it
 misses moves in time with it, as a friction may."""
+TIED = 2.0  # of −2 log likelihood: two gains that differ by less are the same
 UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on beyond it
 
 
@@ -130,11 +131,13 @@ class Agreement:
             likelihood.
         alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
             have a say.
+        tied: the other one, where which of both has more evidence only tells where a fit has ended.
     """
 
     look: Look
     gain: float
     alike: bool
+    tied: Look | None = None
 
 
 def price_beside(wave_gain: float | None) -> float:
@@ -238,7 +241,9 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
         low, high = max(one.band[0] for one in held), min(one.band[1] for one in held)
         gains = [look.beyond_price(valve) for look in two]
         alike = low <= ALIKE * high and say[k] and say[k + 1]
-        pairs.append(Agreement(two[gains.index(max(gains))], min(gains), alike))
+        more = gains.index(max(gains))
+        tied = two[1 - more] if max(gains) - min(gains) < TIED else None
+        pairs.append(Agreement(two[more], min(gains), alike, tied))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
 
 

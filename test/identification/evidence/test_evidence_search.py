@@ -12,6 +12,7 @@ from stiction_ros.identification.evidence.accepted import accepted
 from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.search import Found, search
 from stiction_ros.identification.kernels.scan import best_apart
+from stiction_ros.records.record import Record
 
 STATIC, DYNAMIC = 3.0, 1.0
 
@@ -74,6 +75,18 @@ def test_units_change_no_answer(op_unit: float, op_zero: float, pv_unit: float) 
     assert two.best.friction == pytest.approx(one.best.friction, rel=1e-3)
     gains = [each.ideal.loss - each.best.loss for each in (one, two)]
     assert gains[1] == pytest.approx(gains[0], abs=0.5)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_units_leave_no_trace_in_what_is_searched(seed: int) -> None:
+    """Samples as a historian keeps them lie on a lattice, where a turned digit turns many."""
+    random = np.random.default_rng(seed)
+    op, pv = (np.cumsum(random.standard_normal((750, 1))).round(2)[:, None] for _ in range(2))
+    record = Record("kept", 10.0, ("V1",), ("PV1",), 50.0 + op, 3.0 + pv)
+    other = dataclasses.replace(record, op=20.0 * record.op + 50.0, pv=1e-3 * record.pv + 7.0)
+    one, two = Problem.of(record), Problem.of(other)
+    assert np.array_equal(one.op, two.op)
+    assert np.array_equal(one.pv, two.pv)
 
 
 def test_what_is_accepted_holds_the_truth_and_grows_with_the_level(

@@ -25,7 +25,9 @@ COARSER = 8
 """A tap i of a response is resolved to i / 8 samples: late taps are smooth, and a third of the
 weights does."""
 LIMIT = 1.0  # largest f_S of all: a valve that moves at all turns within the span of OP
-DIGITS = 12  # of OP and PV in their own scale: no unit leaves a trace, not even in rounding
+DIGITS = 9
+"""Of OP and PV in their own scale: no unit leaves a trace. What units change in the last of sixteen
+digits would now and then turn the twelfth of some sample."""
 LEFT_OUT = 0.05  # share of the rows at the begin, where a stem may not have found its place
 NOISE_ORDER = 6
 MOVES = 6  # of a stem over a whole record, fewest of a friction that is judged
