@@ -17,6 +17,7 @@ from rich.table import Table
 from stiction_ros.cli.benches import against
 from stiction_ros.cli.benches.accuracy import field as bench_field
 from stiction_ros.cli.benches.accuracy import gap as bench_gap
+from stiction_ros.cli.benches.accuracy import plant as bench_plant
 from stiction_ros.cli.benches.accuracy import stability as bench_stability
 from stiction_ros.cli.benches.accuracy import world as bench_world
 from stiction_ros.cli.benches.speed.row import Row
@@ -41,6 +42,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "world": ("family", "given", "first", "loops", "full", "jobs", "log", "resume", "write"),
     "field": ("seeds", "method", "jobs", "oracle"),
     "gain": ("seeds", "jobs"),
+    "plant": ("truth", "survey"),
     "stability": ("seeds", "method", "data", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
@@ -54,7 +56,8 @@ def add(commands: Any) -> None:
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
         "loops that share nothing with it), how often identification is (field), whether its "
-        "answers hold still (stability), and whether what gain promises comes about (gain).",
+        "answers hold still (stability), whether what gain promises comes about (gain), and what "
+        "the list of a survey is worth (plant).",
     )
     parser.add_argument(
         "name",
@@ -85,6 +88,7 @@ def add(commands: Any) -> None:
     bench_world.add_options(parser)
     bench_field.add_options(parser)
     bench_stability.add_options(parser)
+    bench_plant.add_options(parser)
     turns = parser.add_argument_group("another version, side by side")
     turns.add_argument(
         "--against",
@@ -238,6 +242,7 @@ BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
 COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
     "gain": _gain,
+    "plant": bench_plant.run,
     "stability": bench_stability.run,
     "world": bench_world.run,
 }
