@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
@@ -15,11 +16,11 @@ from stiction_ros.discrepancy.likelihood.noise import (
     SURPRISE,
     VANISHED,
     Blocks,
+    BoolArray,
 )
 from stiction_ros.discrepancy.likelihood.state_noise import (
     innovations,
     left_by_columns,
-    steady_gain,
 )
 from stiction_ros.effects import (
     Behaviour,
@@ -31,8 +32,7 @@ from stiction_ros.processes import AlteredProcess, ArxProcess
 
 TIMES = (5.0, 30.0, 150.0)  # samples, of the first guesses of a coloured noise's memory
 RATIOS = (0.03, 0.3)  # of a random walk's step to the declared noise, first guesses
-SMALLEST, LARGEST = 1e-4, 100.0  # of the declared noise, and of what is left, that is searched
-RECORDS = 10.0  # that a random walk remembers
+SMALLEST = 1e-4  # of the declared noise, that is searched
 SIDES = (-1.0, 1.0)
 REJECTED = 8.0  # −2 log likelihood, above that of the best figures
 SHORTEST_WAY = 1e-3
@@ -64,13 +64,49 @@ class NoiseEffect:
 
 
 @dataclasses.dataclass(frozen=True)
+class _Block:
+    """States of a noise.
+
+    Attributes:
+        a, q: shape (n, n).
+        c: what is seen of them, shape (n,).
+        start: their covariance at the first sample; what is left open of it is a free column.
+        r: variance of a white part.
+    """
+
+    a: FloatArray
+    q: FloatArray
+    c: FloatArray
+    start: FloatArray
+    r: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class _Shown:
+    """What is judged: the gap and the columns that every fit projects out.
+
+    Attributes:
+        values: shape (1 + q, N).
+        seen: rows that are measurements, shape (N,).
+        begins: first rows of records, shape (N,).
+    """
+
+    values: FloatArray
+    seen: BoolArray
+    begins: BoolArray
+
+
+@dataclasses.dataclass(frozen=True)
 class _Law:
-    """A noise by the logarithms of its figures: its states beside those of the declared one."""
+    """A noise by the logarithms of its figures: its states beside those of the declared one.
+
+    The first figure is a size. It has no upper bound: the declared noise may be nothing beside it.
+    """
 
     place: str
     starts: list[FloatArray]
     range: tuple[FloatArray, FloatArray]
-    block: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+    block: Callable[[FloatArray], _Block]
     behaviour: Callable[[FloatArray], Behaviour]
 
 
@@ -119,15 +155,9 @@ def _without_walks(laws: list[NoiseEffect], lasts: float) -> list[NoiseEffect]:
 
 def _without(base: Baseline, output: int, declared: DeclaredNoise) -> float:
     """Return the score of the declared noise alone, rounded values included."""
-    none = _Law(
-        "",
-        [],
-        (np.zeros(0), np.zeros(0)),
-        lambda _: (np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)),
-        _nothing,
-    )
-    own, values = _declared_block(base, output, declared), _values(base, output)
-    whole, held, *_ = _score(np.zeros(0), none, own, values, base.blocks[output])
+    none = _Law("", [], (np.zeros(0), np.zeros(0)), lambda _: _white(0.0), _nothing)
+    own, shown = _declared_block(base, output, declared), _shown(base, output)
+    whole, held, *_ = _score(np.zeros(0), none, own, shown, base.blocks[output])
     return whole + held
 
 
@@ -135,10 +165,17 @@ def _nothing(x: FloatArray) -> Behaviour:
     raise NotImplementedError("the declared noise is no effect")
 
 
-def _values(base: Baseline, output: int) -> FloatArray:
-    """Return the gap and the columns that every fit projects out, shape (1 + q, N)."""
+def _white(variance: float) -> _Block:
+    nothing = np.zeros((0, 0))
+    return _Block(nothing, nothing, np.zeros(0), nothing, variance)
+
+
+def _shown(base: Baseline, output: int) -> _Shown:
+    runs = base.run.runs
     values = np.column_stack([base.run.gap[:, output], base.columns[output]])
-    return np.ascontiguousarray(values.T)
+    begins = np.zeros(len(runs), dtype=bool)
+    begins[[rows.start for rows in runs.slices]] = True
+    return _Shown(np.ascontiguousarray(values.T), runs.usable[output], begins)
 
 
 def named_laws(found: Sequence[NoiseEffect], margin: float) -> tuple[NoiseEffect, ...]:
@@ -150,13 +187,14 @@ def _laws(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Law]:
     model, step = base.run.model, base.run.runs.sample_time
     tag, unit = model.outputs[output], declared.std
 
-    def coloured(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        keep = math.exp(-step / math.exp(float(x[1])))
-        spread = math.exp(2.0 * float(x[0])) * (1.0 - keep**2)
-        return np.array([[keep]]), np.array([[spread]]), np.ones(1)
+    def coloured(x: FloatArray) -> _Block:
+        keep, variance = math.exp(-step / math.exp(float(x[1]))), math.exp(2.0 * float(x[0]))
+        one = np.ones((1, 1))
+        return _Block(keep * one, variance * (1.0 - keep**2) * one, np.ones(1), variance * one)
 
-    def walk(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return np.array([[stays]]), np.array([[math.exp(2.0 * float(x[0])) * step]]), np.ones(1)
+    def walk(x: FloatArray) -> _Block:
+        one = np.ones((1, 1))
+        return _Block(one, math.exp(2.0 * float(x[0])) * step * one, np.ones(1), 0.0 * one)
 
     def walked(x: FloatArray) -> Behaviour:
         return RandomWalkDisturbance(math.exp(float(x[0])))
@@ -164,21 +202,19 @@ def _laws(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Law]:
     spread = float(np.std(base.noise[output].residual[base.blocks[output].train]))
     size = max(spread, 2.0 * unit)
     lasts = float(base.run.runs.time.max())
-    # Beside a process that integrates, a walk that forgets nothing could not be observed.
-    stays = math.exp(-step / (RECORDS * lasts))
-    walks = np.log([SMALLEST * unit]), np.log([max(spread, unit) / math.sqrt(step)])
+    least, endless = math.log(SMALLEST * unit), np.full(1, math.inf)
     found = [
         _Law(
             f"disturbance:{tag}",
             [np.log([size, time * step]) for time in TIMES],
-            (np.log([SMALLEST * unit, 0.5 * step]), np.log([LARGEST * size, lasts])),
+            (np.array([least, math.log(0.5 * step)]), np.array([math.inf, math.log(lasts)])),
             coloured,
             lambda x: ColouredDisturbance(math.exp(float(x[0])), math.exp(float(x[1]))),
         ),
         _Law(
             f"disturbance:{tag}",
             [np.log([ratio * unit / math.sqrt(step)]) for ratio in RATIOS],
-            walks,
+            (np.array([least]), endless),
             walk,
             walked,
         ),
@@ -187,23 +223,22 @@ def _laws(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Law]:
         if not base.run.responses.reaches(output, j):
             continue
         a, b, c = _path(base, output, j)
-        gain = max(abs(float(base.run.model.process.linear(step).gain[output, j])), 1e-9)
+        gain = _reach(a, b, c, base.run.runs.longest)
 
         def through(
             x: FloatArray, a: FloatArray = a, b: FloatArray = b, c: FloatArray = c
-        ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        ) -> _Block:
             count = len(a)
-            whole = np.zeros((count + 1, count + 1))
-            whole[:count, :count], whole[:count, count], whole[count, count] = a, b, stays
-            spread = np.zeros_like(whole)
+            whole, spread = np.zeros((count + 1, count + 1)), np.zeros((count + 1, count + 1))
+            whole[:count, :count], whole[:count, count], whole[count, count] = a, b, 1.0
             spread[count, count] = math.exp(2.0 * float(x[0])) * step
-            return whole, spread, np.append(c, 0.0)
+            return _Block(whole, spread, np.append(c, 0.0), np.zeros_like(whole))
 
         found.append(
             _Law(
                 f"load:{valve}",
                 [np.log([ratio * unit / gain / math.sqrt(step)]) for ratio in (0.3, 3.0)],
-                (walks[0] - math.log(gain), walks[1] - math.log(gain) + math.log(LARGEST)),
+                (np.array([least - math.log(gain)]), endless),
                 through,
                 walked,
             )
@@ -228,30 +263,37 @@ def _path(base: Baseline, output: int, valve: int) -> tuple[FloatArray, FloatArr
     return a, b, np.eye(count)[0]
 
 
-def _declared_block(
-    base: Baseline, output: int, declared: DeclaredNoise
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return A, Q, c and R of the declared noise, rounding in R; no states where it is white."""
+def _reach(a: FloatArray, b: FloatArray, c: FloatArray, rows: slice) -> float:
+    """Return how far a step moves an output within a record, in the mean."""
+    state, seen = np.zeros(len(a)), np.empty(rows.stop - rows.start)
+    for k in range(len(seen)):
+        seen[k] = c @ state
+        state = a @ state + b
+    return max(float(np.sqrt(np.mean(seen**2))), 1e-9)
+
+
+def _declared_block(base: Baseline, output: int, declared: DeclaredNoise) -> _Block:
+    """Return the declared noise, rounding in its white part; no states where it is white."""
     variance = declared.std**2
     rounding = base.run.runs.lattices[output] ** 2 / 12.0
     count = len(declared.ar)
     if not count:
-        return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0), variance + rounding
+        return _white(variance + rounding)
     a, q = np.zeros((count, count)), np.zeros((count, count))
     a[:, 0] = declared.ar
     a[:-1, 1:] += np.eye(count - 1)
     q[0, 0] = variance
-    return a, q, np.eye(count)[0], FLOOR * variance + rounding
+    return _Block(a, q, np.eye(count)[0], q, FLOOR * variance + rounding)
 
 
 def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: _Law) -> NoiseEffect | None:
     from scipy.optimize import minimize
 
-    own, values = _declared_block(base, output, declared), _values(base, output)
+    own, shown = _declared_block(base, output, declared), _shown(base, output)
     blocks = base.blocks[output]
 
     def loss(x: FloatArray) -> float:
-        return _score(x, law, own, values, blocks)[0]
+        return _score(x, law, own, shown, blocks)[0]
 
     best, found = math.inf, law.starts[0]
     for start in law.starts:
@@ -263,13 +305,13 @@ def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: _Law) -> 
     low, high = law.range
     if not math.isfinite(best) or np.any(found < low + CLEAR) or np.any(found > high - CLEAR):
         return None  # a figure on the bound of its range is no name
-    whole, held, std, louder = _score(found, law, own, values, blocks)
+    whole, held, std, louder = _score(found, law, own, shown, blocks)
     rows = max(int(blocks.train.sum()), 2)
     price = len(found) * math.log(rows) + ENLARGED
     first = np.eye(len(found))[0]  # is a size: σ is its unit
     behaviours = [law.behaviour(found + math.log(louder) * first)]
     for k, end in enumerate(_ends(loss, found, law.range)):
-        scale = math.log(_score(end, law, own, values, blocks)[3])
+        scale = math.log(_score(end, law, own, shown, blocks)[3])
         scale += SIDES[k % 2] * NORMAL / math.sqrt(2.0 * rows)
         behaviours.append(law.behaviour(end + scale * first))
     keys = [(p.key, p.attribute) for p in behaviours[0].parameters()]
@@ -317,11 +359,7 @@ def _ends(
 
 
 def _score(
-    x: FloatArray,
-    law: _Law,
-    own: tuple[FloatArray, FloatArray, FloatArray, float],
-    values: FloatArray,
-    blocks: Blocks,
+    x: FloatArray, law: _Law, own: _Block, shown: _Shown, blocks: Blocks
 ) -> tuple[float, float, float, float]:
     """Return −2 log likelihood of fitted and of held-out rows, and σ of the innovations.
 
@@ -331,26 +369,26 @@ def _score(
     low, high = law.range
     if np.any(x < low) or np.any(x > high):
         return math.inf, 0.0, 0.0, 1.0
-    a, q, c, r = own
-    a2, q2, c2 = law.block(x)
-    size, more = len(a), len(a2)
-    whole, noise = np.zeros((size + more,) * 2), np.zeros((size + more,) * 2)
-    whole[:size, :size], whole[size:, size:] = a, a2
-    noise[:size, :size], noise[size:, size:] = q, q2
-    look = np.concatenate([c, c2])
-    unit = max(r, float(np.trace(q)), _TINY)
-    steady = steady_gain(whole, noise / unit, look, max(r, FLOOR * unit) / unit)
-    if steady is None:
+    block = law.block(x)
+    unit = max(own.r, float(np.trace(own.q)), _TINY)
+    white, variances = innovations(
+        block_diag(own.a, block.a),
+        block_diag(own.q, block.q) / unit,
+        np.concatenate([own.c, block.c]),
+        max(own.r, FLOOR * unit) / unit,
+        block_diag(own.start, block.start) / unit,
+        shown.values,
+        shown.seen,
+        shown.begins,
+    )
+    if not np.isfinite(white).all():
         return math.inf, 0.0, 0.0, 1.0
-    gain, foretold = steady
-    kept = np.ascontiguousarray(whole - np.outer(gain, look))
-    white = innovations(kept, gain, look, values)
-    if not float(np.abs(white).max()) < 1e6 * float(np.abs(values).max()):
-        return math.inf, 0.0, 0.0, 1.0
-    left = left_by_columns(white, values, blocks.train, VANISHED)
+    left, logs = left_by_columns(white, shown.values, blocks.train, VANISHED), np.log(variances)
     inside, outside = left[blocks.train], left[blocks.held]
     variance = max(float(inside @ inside) / len(inside), _TINY)
     log = math.log(2.0 * math.pi * variance)
     outside = np.minimum(outside**2 / variance, SURPRISE**2)
-    fitted, kept_back = len(inside) * (log + 1.0), len(outside) * log + float(outside.sum())
-    return fitted, kept_back, math.sqrt(variance), math.sqrt(variance / (unit * foretold))
+    fitted = len(inside) * (log + 1.0) + float(logs[blocks.train].sum())
+    kept_back = len(outside) * log + float(logs[blocks.held].sum()) + float(outside.sum())
+    usual = float(np.median(variances[blocks.train]))
+    return fitted, kept_back, math.sqrt(variance * usual), math.sqrt(variance / unit)

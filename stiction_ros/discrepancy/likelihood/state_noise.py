@@ -49,35 +49,72 @@ def steady_gain(
 
 @compiled
 def innovations(
-    kept: FloatArray, gain: FloatArray, look: FloatArray, values: FloatArray
-) -> FloatArray:
-    """Return what one-step predictions miss of each row of ``values``, shape (G, N).
+    a: FloatArray,
+    q: FloatArray,
+    c: FloatArray,
+    r: float,
+    start: FloatArray,
+    values: FloatArray,
+    seen: BoolArray,
+    begins: BoolArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return what one-step predictions miss of each row of ``values``, and their variances.
+
+    The predictions are those of a Kalman filter that begins with each record, so that it needs
+    no steady state: what is not known of the states at first is foretold as such. Innovations
+    are in units of their standard deviations, shape (G, N); variances have the shape (N,).
 
     Args:
-        kept: A − K c, shape (n, n).
-        gain: K, shape (n,).
-        look: c, shape (n,).
+        a, q: of the states, shape (n, n).
+        c: of the one output, shape (n,).
+        r: its variance.
+        start: covariance of the states at the first sample of a record, shape (n, n).
         values: shape (G, N).
+        seen: rows that are measurements, shape (N,); the others are foretold alone.
+        begins: first rows of records, shape (N,).
     """
     columns, count = values.shape
-    size = len(gain)
-    missed = np.empty((columns, count))
-    state, following = np.zeros(size), np.zeros(size)
-    for g in range(columns):
-        state[:] = 0.0
-        for k in range(count):
-            foretold = 0.0
+    size = len(c)
+    missed, variance = np.empty((columns, count)), np.empty(count)
+    states, p = np.zeros((columns, size)), start.copy()
+    shown, moved, gain = np.zeros(size), np.zeros((size, size)), np.zeros(size)
+    following = np.zeros(size)
+    for k in range(count):
+        if begins[k]:
+            states[:] = 0.0
+            p[:] = start
+        total = r
+        for i in range(size):
+            shown[i] = 0.0
+            for j in range(size):
+                shown[i] += p[i, j] * c[j]
+            total += c[i] * shown[i]
+        variance[k] = total
+        for i in range(size):
+            gain[i] = 0.0
+            for j in range(size):
+                gain[i] += a[i, j] * shown[j] / total if seen[k] else 0.0
+                moved[i, j] = 0.0
+                for m in range(size):
+                    moved[i, j] += a[i, m] * p[m, j]
+        for i in range(size):
+            for j in range(i, size):
+                value = q[i, j] - gain[i] * gain[j] * total
+                for m in range(size):
+                    value += moved[i, m] * a[j, m]
+                p[i, j] = p[j, i] = value
+        for g in range(columns):
+            left = values[g, k]
             for i in range(size):
-                foretold += look[i] * state[i]
-            missed[g, k] = values[g, k] - foretold
+                left -= c[i] * states[g, i]
+            missed[g, k] = left / np.sqrt(total)
             for i in range(size):
-                total = gain[i] * values[g, k]
+                following[i] = gain[i] * left
                 for j in range(size):
-                    total += kept[i, j] * state[j]
-                following[i] = total
+                    following[i] += a[i, j] * states[g, j]
             for i in range(size):
-                state[i] = following[i]
-    return missed
+                states[g, i] = following[i]
+    return missed, variance
 
 
 @compiled

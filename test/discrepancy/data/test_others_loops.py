@@ -119,3 +119,16 @@ def test_a_rounded_op_in_a_healthy_loop_is_no_coloured_noise(seed: int) -> None:
     answer = answered(seed)
     assert answer.verdict is GapVerdict.NONE
     assert names(answer) == []
+
+
+@pytest.mark.parametrize(
+    ("seed", "effect"),
+    [
+        (143, ("disturbance:PV1", "coloured")),  # eighteen times the declared noise
+        (187, ("load:V1", "drift")),  # of a level, whose sensor has spikes
+    ],
+)
+def test_a_walk_is_named_where_there_is_one(seed: int, effect: tuple[str, str]) -> None:
+    answer = answered(seed)
+    assert names(answer) == [effect]
+    assert answer.effects[0].verdict is GapVerdict.NAMED
