@@ -96,8 +96,8 @@ class Candidate(ABC):
         contains: places and effects of the catalogue that are parts of it.
         most_of: share of what it gains that such a part has to gain to be looked at first.
         needle: whether its optimum is narrower than any lattice is fine.
-        sharp: whether its likelihood has peaks a sample wide, so that it is searched under
-            white noise as well, which blurs them.
+        sharp: whether its likelihood may have peaks a sample wide, so that it is searched under
+            noises as well that blur them.
         inside: whether it belongs to the catalogue; others show only that something is amiss.
     """
 

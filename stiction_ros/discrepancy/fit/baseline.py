@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import Any, cast
 
@@ -20,6 +21,7 @@ from stiction_ros.discrepancy.likelihood.noise import (
 from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
+from stiction_ros.processes import AlteredProcess, ArxProcess
 
 BASES = 8  # of shared columns, that are kept for the next grids
 _FIRST_GUESSES = (None, np.array([0.99]))  # white and slow: the turns may end in either
@@ -95,6 +97,18 @@ class Baseline:
         gap, columns, blocks = self.run.gap[:, output], self.columns[output], self.blocks[output]
         fits = [given_noise(gap, columns, blocks, ar) for ar in self.declared[output]]
         return best_noise(fits, self.run.runs.quanta[output], blocks)
+
+    @functools.cached_property
+    def plausible(self) -> tuple[FloatArray, ...]:
+        """Return per output φ of the declared noise, or of noise in its equation without one."""
+        process = self.run.model.process
+        inner = process.inner if isinstance(process, AlteredProcess) else process
+        found = []
+        for i, forms in enumerate(self.declared):
+            if not forms and isinstance(inner, ArxProcess):
+                forms = (-np.asarray(inner.equations[i].a, dtype=float),)
+            found.append(forms[0] if forms else np.zeros(0))
+        return tuple(found)
 
     @property
     def bic(self) -> float:

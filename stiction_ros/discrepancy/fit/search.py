@@ -37,8 +37,11 @@ CENTRES = 5
 ROUNDS = 5
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
+NO_MEMORY = np.zeros(0)
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
 _TINY = 1e-300
+
+Under = Mapping[int, FloatArray]  # φ of an output's noise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,8 +92,8 @@ def fit_candidate(
     for centre in centres:
         search.refine(centre, 0.7)
     if candidate.sharp and around is None:
-        for centre in search.coarse_white():
-            search.refine(centre, 0.7, white=True)
+        for ar, centre in search.blurred():
+            search.refine(centre, 0.7, ar)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
         search.scatter()
     if candidate.dated:
@@ -127,30 +130,28 @@ class _Search:
         self.base, self.gap, self.candidate = base, gap, candidate
         self.found: CandidateFit | None = None
         self.judged: dict[tuple[float, ...], CandidateFit] = {}
-        self.white = np.zeros(0)  # misfits of the first grid under white noise
+        self.misfits: list[tuple[Under, FloatArray]] = []  # of the first grid, under noises
 
     def coarse(self) -> list[FloatArray]:
         """Return the best points of the first grid, under several guesses of the noise."""
         grid = self.candidate.grid()
         values = self.candidate.values(grid)
         response = self.candidate.respond(self.base.run, values)
-        white: Mapping[int, FloatArray] = {i: np.zeros(0) for i in response.outputs}
-        guesses: list[Mapping[int, FloatArray]] = [
+        plausible = {i: self.base.plausible[i] for i in response.outputs}
+        blurring: list[Under] = [dict.fromkeys(response.outputs, NO_MEMORY)]
+        blurring += [plausible for _ in range(any(map(len, plausible.values())))]
+        self.misfits = [(ar, misfit(self.base, self.gap, response, ar)) for ar in blurring]
+        guesses: list[Under] = [
             {i: self.base.noise[i].ar for i in response.outputs},
-            white,
             dict.fromkeys(response.outputs, SLOW),
-        ]
-        guesses += [
-            {i: self.base.declared[i][0] for i in response.outputs}
-            for _ in range(all(len(forms) and len(forms[0]) for forms in self.base.declared))
         ]
         leaders: dict[int, float] = {}
         before: CandidateFit | None = None
         for _ in range(3):
-            for ar in guesses:
-                squares = misfit(self.base, self.gap, response, ar)
-                if ar is white:
-                    self.white = squares
+            tried = [misfit(self.base, self.gap, response, ar) for ar in guesses]
+            if before is None:
+                tried += [squares for _, squares in self.misfits]
+            for squares in tried:
                 for point in self.candidate.apart(grid, squares, LEADERS):
                     if point not in leaders:
                         fit = self.judge(values[point], response.pick(point))
@@ -162,25 +163,28 @@ class _Search:
         order = sorted(leaders, key=lambda point: -leaders[point])
         return [grid[point] for point in order]
 
-    def coarse_white(self) -> list[FloatArray]:
-        """Return the best points of the first grid, looked at before, under white noise."""
-        grid = self.candidate.grid()
-        return [grid[point] for point in self.candidate.apart(grid, self.white, STARTS)]
+    def blurred(self) -> list[tuple[Under, FloatArray]]:
+        """Return the best points of the first grid under noises that blur sharp peaks."""
+        grid, found = self.candidate.grid(), []
+        for ar, squares in self.misfits:
+            found += [(ar, grid[k]) for k in self.candidate.apart(grid, squares, STARTS)]
+        return found
 
-    def refine(self, centre: FloatArray, size: float, white: bool = False) -> None:
+    def refine(self, centre: FloatArray, size: float, under: Under | None = None) -> None:
         """Search smaller and smaller grids around a point.
 
         Args:
             centre: coordinates of the search, shape (axes,).
             size: of the first one, in steps of the first grid.
-            white: whether the points of a grid are compared under white noise.
+            under: noise under which the points of a grid are compared; None for that of the
+                best one so far.
         """
         if not self.candidate.axes:
             self._try(self.candidate.grid())
             return
-        best = self._try(np.array([centre]), white=white)
+        best = self._try(np.array([centre]), under=under)
         for _ in range(ROUNDS):
-            best = self._around(best, size, white)
+            best = self._around(best, size, under)
             size *= SHRINK
 
     def polish(self) -> None:
@@ -196,7 +200,7 @@ class _Search:
             best = better
 
     def _around(
-        self, best: tuple[FloatArray, CandidateFit], size: float, white: bool = False
+        self, best: tuple[FloatArray, CandidateFit], size: float, under: Under | None = None
     ) -> tuple[FloatArray, CandidateFit]:
         """Return the best of a grid around a point and that point, with its coordinates."""
         axes = self.candidate.axes
@@ -204,8 +208,8 @@ class _Search:
         whole = np.array([axis.whole for axis in axes])
         offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDE for a in axes])))
         span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
-        found = self._try(best[0] + offsets * span, best[1], white)
-        return found if white or found[1].delta_bic >= best[1].delta_bic else best
+        found = self._try(best[0] + offsets * span, best[1], under)
+        return found if under is not None or found[1].delta_bic >= best[1].delta_bic else best
 
     def scatter(self) -> None:
         """Search scattered points in ever smaller boxes around the best point.
@@ -256,14 +260,13 @@ class _Search:
         return self.judge(values[best], response.pick(best))
 
     def _try(
-        self, coordinates: FloatArray, like: CandidateFit | None = None, white: bool = False
+        self, coordinates: FloatArray, like: CandidateFit | None = None, under: Under | None = None
     ) -> tuple[FloatArray, CandidateFit]:
-        """Judge the point of a grid that is best under the noise of another fit."""
+        """Judge the point of a grid that is best under the noise of another fit, or a given one."""
         ar = {i: noise.ar for i, noise in enumerate(self.base.noise)}
         if like is not None:
             ar |= {i: noise.ar for i, noise in like.noise.items()}
-        if white:
-            ar = dict.fromkeys(ar, np.zeros(0))
+        ar |= under or {}
         coordinates = settled(self.base, self.gap, self.candidate, coordinates, ar)
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)

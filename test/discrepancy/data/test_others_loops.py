@@ -132,3 +132,18 @@ def test_a_walk_is_named_where_there_is_one(seed: int, effect: tuple[str, str]) 
     answer = answered(seed)
     assert names(answer) == [effect]
     assert answer.effects[0].verdict is GapVerdict.NAMED
+
+
+@pytest.mark.parametrize(
+    ("seed", "effect"),
+    [
+        (115, ("load:V1", "step")),  # a larger noise hides it but for its first samples
+        (132, ("load:V1", "square")),  # no noise is declared
+    ],
+)
+def test_what_stands_out_under_noise_of_the_equation_is_found(
+    seed: int, effect: tuple[str, str]
+) -> None:
+    answer = answered(seed)
+    assert names(answer) == [effect]
+    assert answer.effects[0].closed > 0.9
