@@ -29,6 +29,7 @@ LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
 LEAST_LAG = 5.0  # times the shortest lag that is searched, a fifth of a sample
 LEAST_TRAVEL = 0.1  # of the span of OP
+LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two samples
 _NEGLIGIBLE = 1e-9
 
 
@@ -117,6 +118,9 @@ class StictionCandidate(ValveCandidate):
 
     def count(self, point: FloatArray) -> int:
         return 2
+
+    def leaps(self, point: FloatArray) -> bool:
+        return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])
 
     def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
         """Return points around one in the sum of the frictions and their difference, the jump.

@@ -147,3 +147,11 @@ def test_what_stands_out_under_noise_of_the_equation_is_found(
     answer = answered(seed)
     assert names(answer) == [effect]
     assert answer.effects[0].closed > 0.9
+
+
+def test_a_jump_that_is_next_to_nothing_leaves_backlash_in_doubt() -> None:
+    (found,) = answered(172).effects
+    assert {found.effect, *(effect for _, effect in found.alternatives)} == {
+        "stiction",
+        "backlash",
+    }

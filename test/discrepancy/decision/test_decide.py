@@ -113,6 +113,19 @@ def test_a_doubtful_jump_names_the_family() -> None:
     assert answer.alternatives == (("valve:V1", "backlash"),)
 
 
+def test_a_jump_that_is_next_to_nothing_names_the_family() -> None:
+    class Creeping(Named):
+        def leaps(self, point: FloatArray) -> bool:
+            return False
+
+    plain = fit("valve:V1", "backlash", 80.0)
+    candidate = Creeping(place="valve:V1", effect="stiction", axes=plain.candidate.axes)
+    jumping = dataclasses.replace(plain, candidate=candidate, delta_bic=120.0)
+    answer = said(jumping, plain)
+    assert answer.chosen is jumping
+    assert answer.alternatives == (("valve:V1", "backlash"),)
+
+
 def test_weak_friction_names_the_family() -> None:
     answer = said(fit("valve:V1", "backlash", 20.0), fit("valve:V1", "stiction", 14.0))
     assert answer.alternatives == (("valve:V1", "stiction"),)
