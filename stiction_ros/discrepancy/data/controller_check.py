@@ -15,7 +15,9 @@ from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 
 LONGEST_SHIFT = 30
-EXACT = 0.02  # of the moves of OP: what rounding of the signals may leave
+EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
+ROUNDED = 1.2  # times what rounding of the signals leaves
+COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem smaller
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
@@ -71,7 +73,8 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         runs: the records.
         check: of the controller.
     """
-    asked = check.status is not ControllerStatus.NOT_ASKED and check.left > EXACT
+    given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER)
+    asked = not given and check.left > EXACT
     found = []
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
@@ -119,7 +122,7 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
         known = laws[0].left < EXACT
         return ControllerCheck(ControllerStatus.SAME, None, own, known)
     law = laws[best]
-    if law.left > EXACT:
+    if law.left > max(EXACT, ROUNDED * min(_rounding(runs, law), COARSEST)):
         return ControllerCheck(ControllerStatus.UNEXPLAINED, None, law.left, False)
     if recorded is None and best == 0:
         return ControllerCheck(ControllerStatus.SAME, None, law.left, True)
@@ -135,10 +138,20 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
 
 @dataclasses.dataclass(frozen=True)
 class _Law:
+    """A PI law as the moves of OP show it.
+
+    Attributes:
+        gain, integral_time: of the controller.
+        left: share of the moves that it leaves.
+        samples: how many moves there are.
+        usual: their root mean square, %.
+    """
+
     gain: float
     integral_time: float
     left: float
     samples: int
+    usual: float = 0.0
 
 
 def _alike(recorded: PiTuning, law: _Law) -> bool:
@@ -184,7 +197,16 @@ def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:
     left = moves - columns @ np.array([gain, integral])
     share = float(np.linalg.norm(left) / np.linalg.norm(moves))
     time = gain / integral if integral != 0.0 and gain / integral > 0.0 else 1e9
-    return _Law(gain, min(time, 1e9), share, len(moves))
+    usual = float(np.sqrt(np.mean(moves**2)))
+    return _Law(gain, min(time, 1e9), share, len(moves), usual)
+
+
+def _rounding(runs: Runs, law: _Law) -> float:
+    """Return what rounded values of PV and OP leave of the moves of OP under a law that is true."""
+    pv, op = runs.lattices[0], quantum_of(runs.op[:, 0])
+    now = law.gain * (1.0 + runs.sample_time / law.integral_time)
+    variance = ((now**2 + law.gain**2) * pv**2 + 2.0 * op**2) / 12.0
+    return math.sqrt(variance) / law.usual if law.usual > 0.0 else 0.0
 
 
 def _left(model: LoopModel, runs: Runs, tuning: PiTuning, shift: int) -> float:

@@ -11,7 +11,7 @@ from gap_loops import loop, record, without_controller, without_set_points
 from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
-from stiction_ros.discrepancy.data.gate import Gate, look_at_data, quantum_of
+from stiction_ros.discrepancy.data.gate import Gate, look_at_data, open_gate, quantum_of
 from stiction_ros.discrepancy.simulation.free_run import join_records
 from stiction_ros.effects import Behaviour, Clip, Freeze, Quantisation, TimeShift, Tuning
 from stiction_ros.loop import PiTuning
@@ -113,6 +113,17 @@ def test_another_tuning_is_named_with_its_figures() -> None:
     assert check.finding is not None
     assert isinstance(check.finding.behaviour, Tuning)
     assert check.finding.behaviour.gain == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize(("step", "told"), [(0.05, True), (0.8, False)])
+def test_rounding_leaves_what_rounding_leaves(step: float, told: bool) -> None:
+    model = loop()
+    recorded = record(dataclasses.replace(model, controller=PiTuning(1.1, 9.0)))
+    pv = step * np.round(recorded.pv / step)
+    runs, _ = open_gate(model, [dataclasses.replace(recorded, pv=pv)])
+    check = check_controller(model, runs)
+    assert (check.finding is not None) is told
+    assert check.left > 0.02
 
 
 @pytest.mark.parametrize("known", [True, False])

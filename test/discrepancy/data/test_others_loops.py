@@ -155,3 +155,10 @@ def test_a_jump_that_is_next_to_nothing_leaves_backlash_in_doubt() -> None:
         "stiction",
         "backlash",
     }
+
+
+def test_a_tuning_is_told_from_rounded_values() -> None:
+    (found,) = (each for each in answered(189).effects if each.place == "data")
+    tuning = hidden_loop(189).hidden[0].figures
+    assert found.parameters["gain"] == pytest.approx(tuning["gain"], rel=0.02)
+    assert found.parameters["integral_time"] == pytest.approx(tuning["integral_time"], rel=0.02)
