@@ -69,7 +69,7 @@ class ChangedProcess:
 
 
 def changed_process(
-    bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]
+    bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect], declared: bool = True
 ) -> ChangedProcess | None:
     """Return the model with gain, time constants and dead time at their best behind effects.
 
@@ -82,6 +82,8 @@ def changed_process(
         bare: the model without effects.
         runs: the records.
         effects: that stand beside it, with their figures.
+        declared: whether the noise is the declared one, where there is one, or the larger one
+            that explains most as long as nothing is changed.
 
     Returns:
         None where nothing is surely another, or the process is no ARX process.
@@ -90,7 +92,7 @@ def changed_process(
         return None
     model, changes, beside = bare, [], tuple(effects)
     for output, name in enumerate(bare.outputs):
-        search = _Search(model, runs, beside, output)
+        search = _Search(model, runs, beside, output, declared)
         if not search.run():
             continue
         model, beside = search.changed(search.values), search.effects
@@ -112,9 +114,15 @@ class _Search:
     """The figures of one output, stepped from the model's own."""
 
     def __init__(
-        self, model: LoopModel, runs: Runs, effects: tuple[AddedEffect, ...], output: int
+        self,
+        model: LoopModel,
+        runs: Runs,
+        effects: tuple[AddedEffect, ...],
+        output: int,
+        declared: bool,
     ) -> None:
         self.model, self.runs, self.effects, self.output = model, runs, effects, output
+        self.declared = declared
         self.curves = [k for k, each in enumerate(effects) if each.fit.candidate.curved]
         self.equation = Changeable(equations_of(model)[output])
         self.figures = self.equation.figures
@@ -149,7 +157,8 @@ class _Search:
             run = self._run(self.values)
             base = Baseline.of(run, columns=open_columns(run, self.effects))
             noise, train = base.noise[output], base.blocks[output].train
-            ar = base.declared[output][0] if base.declared[output] else noise.ar
+            given = self.declared and base.declared[output]
+            ar = base.declared[output][0] if given else noise.ar
             gap = run.gap[:, output]
             basis = base.basis(output, ar)
             target = left_by(basis, whiten(gap, ar)[train])

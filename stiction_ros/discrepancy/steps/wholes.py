@@ -202,16 +202,27 @@ def with_process(
 ) -> Mended | None:
     """Return the explanation by some effects behind a process that is changed for them.
 
+    It is changed under the declared noise and under the larger one that is found: what is there
+    besides may be steps or a walk, and the one or the other shows the process.
+
     Args:
         bare: the model without any effect, its process as it was given.
         runs: the records.
         part: the effects.
         margin: that the changes together have to gain.
     """
-    changed = changed_process(bare, runs, part)
-    if changed is None:
-        return None
-    effects = refit_together(changed.model, runs, changed.effects) if part else ()
+    grounds = (True, False) if any(declared_noise(bare)) else (False,)
+    found = [
+        _behind(changed, runs, margin)
+        for declared in grounds
+        if (changed := changed_process(bare, runs, part, declared)) is not None
+    ]
+    return min(found, key=lambda each: each.worth, default=None)
+
+
+def _behind(changed: ChangedProcess, runs: Runs, margin: float) -> Mended:
+    """Return the explanation by effects that are fitted again behind a changed process."""
+    effects = refit_together(changed.model, runs, changed.effects) if changed.effects else ()
     own = whole(changed.model, runs, effects)
     rows = max(fit.rows for fit in own.base.noise)
     return Mended(changed, own, own.worth(margin) + price_of(changed.changes, rows, margin))

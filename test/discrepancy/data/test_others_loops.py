@@ -162,3 +162,13 @@ def test_a_tuning_is_told_from_rounded_values() -> None:
     tuning = hidden_loop(189).hidden[0].figures
     assert found.parameters["gain"] == pytest.approx(tuning["gain"], rel=0.02)
     assert found.parameters["integral_time"] == pytest.approx(tuning["integral_time"], rel=0.02)
+
+
+@pytest.mark.parametrize(("seed", "what"), [(319, "delay"), (356, "delay")])
+def test_a_model_that_is_off_is_mended_under_the_walk_that_is_there(seed: int, what: str) -> None:
+    answer = answered(seed, given="off")
+    assert names(answer) == [("load:V1", "random_walk")]
+    change = next(each for each in answer.process_changes if each.what == what)
+    loop = hidden_loop(seed, given="off")
+    low, high = change.interval
+    assert low <= loop.base.plant.dead_time - loop.known.dead_time <= high
