@@ -126,17 +126,24 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
     )
 
 
-def own_closed(without: Baseline, base: Baseline) -> float:
+def own_closed(without: Baseline, base: Baseline, dated: bool) -> float:
     """Return the share of the excess that is gone with an effect and not without it.
 
     Where an answer leaves the noise that the model declares, both free runs are whitened by that
-    noise: noise of the equation wanders farther than most effects move PV.
+    noise: noise of the equation wanders farther than most effects move PV. What comes at one moment
+    shows there alone in whitened rows, which may be fitted ones.
+
+    Args:
+        without: the model with all other effects.
+        base: with the effect, too.
+        dated: whether it comes at one moment.
     """
     weights = [
         fit.ar if forms and not fit.enlarged else NO_MEMORY
         for fit, forms in zip(base.noise, base.declared, strict=True)
     ]
-    return closed_share(measure_gap(without, weights), measure_gap(base, weights))
+    gaps = [measure_gap(each, weights, dated) for each in (without, base)]
+    return closed_share(gaps[0], gaps[1])
 
 
 def moved_by(without: Baseline, base: Baseline) -> FloatArray:

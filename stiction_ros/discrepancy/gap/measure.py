@@ -41,7 +41,7 @@ class OutputGap:
 
 
 def measure_gap(
-    base: Baseline, weights: Sequence[FloatArray] | None = None
+    base: Baseline, weights: Sequence[FloatArray] | None = None, every: bool = False
 ) -> tuple[OutputGap, ...]:
     """Return the gap of every output on rows that no figure was fitted to.
 
@@ -49,19 +49,21 @@ def measure_gap(
         base: the model.
         weights: per output φ by which its free run is whitened, none of them for no output;
             None whitens none.
+        every: whether the rows that figures were fitted to count as well, where it is whitened.
     """
     found = []
     for i, name in enumerate(base.run.model.outputs):
-        noise, held = base.noise[i], base.blocks[i].held
-        residual, floor = noise.residual, noise.stationary_std
+        noise, blocks = base.noise[i], base.blocks[i]
+        residual, floor, held = noise.residual, noise.stationary_std, blocks.held
         if weights is not None and len(weights[i]):
             residual, floor = whiten(residual, weights[i]), np.inf
+            held = held | blocks.train if every else held
         found.append(
             OutputGap(
                 name,
                 _rms(residual[held]),
                 _rms(noise.innovations[held]),
-                min(floor, _rms(residual[base.blocks[i].train])),
+                min(floor, _rms(residual[blocks.train])),
                 noise.innovation_std,
             )
         )

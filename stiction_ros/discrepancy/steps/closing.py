@@ -145,7 +145,7 @@ def _effect(task: Task, state: State, k: int, effect: AddedEffect) -> FoundEffec
         units_of(effect.behaviour, effect.place),
         _intervals(task, state, k, effect, without),
         state.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
-        own_closed(without, state.base),
+        own_closed(without, state.base, effect.fit.candidate.dated),
         GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
         effect.alternatives,
         reason_for(effect, state.looks),

@@ -172,3 +172,9 @@ def test_a_model_that_is_off_is_mended_under_the_walk_that_is_there(seed: int, w
     loop = hidden_loop(seed, given="off")
     low, high = change.interval
     assert low <= loop.base.plant.dead_time - loop.known.dead_time <= high
+
+
+def test_a_step_closes_what_it_closes_at_its_moment() -> None:
+    (found,) = answered(378, given="off").effects  # noise of the equation, a fitted block
+    assert (found.place, found.effect) == ("disturbance:PV1", "step")
+    assert found.closed > 0.9
