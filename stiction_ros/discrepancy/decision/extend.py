@@ -132,11 +132,22 @@ def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> B
     return Baseline.of(run, columns=open_columns(run, others))
 
 
-def left_open(base: Baseline, added: Sequence[AddedEffect]) -> Baseline:
-    """Return the baseline of added effects, their linear figures left open where there are any."""
-    if not any(effect.fit.candidate.factors for effect in added):
+def left_open(
+    base: Baseline, added: Sequence[AddedEffect], slopes: Sequence[FloatArray] = ()
+) -> Baseline:
+    """Return the baseline of added effects with all linear figures left open.
+
+    Args:
+        base: of the model with the effects.
+        added: the effects.
+        slopes: per output further columns, of a process that was changed, shape (N, q).
+    """
+    if not slopes and not any(effect.fit.candidate.factors for effect in added):
         return base
-    return Baseline.of(base.run, columns=open_columns(base.run, added))
+    columns = open_columns(base.run, added)
+    if slopes:
+        columns = [np.hstack(pair) for pair in zip(columns, slopes, strict=True)]
+    return Baseline.of(base.run, columns=columns)
 
 
 def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]:

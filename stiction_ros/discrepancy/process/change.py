@@ -61,11 +61,13 @@ class ChangedProcess:
         model: without effects.
         changes: figures that were changed.
         effects: that stand beside it, the curves of valves at their best behind it.
+        slopes: per output what a unit of each figure that was changed moves, shape (N, figures).
     """
 
     model: LoopModel
     changes: tuple[ProcessChange, ...]
     effects: tuple[AddedEffect, ...]
+    slopes: tuple[FloatArray, ...]
 
 
 def changed_process(
@@ -91,13 +93,16 @@ def changed_process(
     if not isinstance(bare.process, ArxProcess):
         return None
     model, changes, beside = bare, [], tuple(effects)
+    slopes: list[FloatArray] = []
     for output, name in enumerate(bare.outputs):
         search = _Search(model, runs, beside, output, declared)
         if not search.run():
+            slopes.append(np.zeros((len(runs), 0)))
             continue
         model, beside = search.changed(search.values), search.effects
         changes += search.changes(name)
-    return ChangedProcess(model, tuple(changes), beside) if changes else None
+        slopes.append(search.slopes())
+    return ChangedProcess(model, tuple(changes), beside, tuple(slopes)) if changes else None
 
 
 def _bent(effect: AddedEffect, run: FreeRun, more: float) -> AddedEffect:
@@ -180,13 +185,21 @@ class _Search:
             if settled and all(abs(more) < TINY_STEP * BEND for more in bends):
                 break
 
-    def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:
-        """Return what a unit of every free figure and of every curve moves, shape (N, figures)."""
+    def slopes(self) -> FloatArray:
+        """Return what a unit of every free figure moves, shape (N, figures)."""
+        return self._of_figures(self._run(self.values).gap[:, self.output])
+
+    def _of_figures(self, gap: FloatArray) -> FloatArray:
         moved = [
             (self._run(self.values + self.probes * each).gap[:, self.output] - gap) / self.probes[k]
             for k, each in enumerate(np.eye(len(self.free)))
             if self.free[k]
         ]
+        return np.column_stack(moved)
+
+    def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:
+        """Return what a unit of every free figure and of every curve moves, shape (N, figures)."""
+        moved = [self._of_figures(gap)]
         model = run.model if not self.curves else self.changed(self.values)
         for k in self.curves:
             bent = run_with(model, self.runs, self._with_bent(run, k, BEND))

@@ -24,7 +24,7 @@ from stiction_ros.discrepancy.fit.uncertainty import chance_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.steps.friction import rests_left
-from stiction_ros.discrepancy.steps.mending import changed_again, process_first
+from stiction_ros.discrepancy.steps.mending import changed_again, made_room, process_first
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 
@@ -47,10 +47,6 @@ class _Scored:
     scores: Scores
     models: Mapping[tuple[str, str], LoopModel]
 
-    def bare(self, key: tuple[str, str]) -> LoopModel:
-        """Return the model without effects that goes with a candidate."""
-        return self.models.get(key, self.state.bare)
-
 
 def look_on(task: Task, state: State) -> State:
     """Look until nothing more is found; what takes the free run away from PV is taken back."""
@@ -72,10 +68,10 @@ def look(task: Task, state: State, k: int) -> State:
     if mended is not None:
         return look(task, mended, k)
     decision = _decided(task, state, scored)
-    step = _extended(task, state, scored, decision)
+    room, step = _extended(task, state, scored, decision)
     kept, reason = (step.kept, step.reason) if step else (False, decision.reason)
     seen = dataclasses.replace(
-        state,
+        room if kept else state,
         testable=testable_effects(scores.base, list(scored.candidates), task.options.margin),
         looks=(*state.looks, Look(scores, decision, locate(scores.base), kept, reason)),
     )
@@ -106,7 +102,9 @@ def _scored(task: Task, state: State, k: int) -> _Scored:
         task.report((k + SCORED * done) * share)
 
     if not free:
-        return _Scored(state, candidates, score_candidates(base, candidates, report), {})
+        beside = left_open(state.base, state.added, state.slopes) if state.slopes else None
+        scores = score_candidates(base, candidates, report, beside=beside)
+        return _Scored(state, candidates, scores, {})
     found = score_with_free_process(base, candidates, task.longest, report)
     state = dataclasses.replace(state, base=found.scores.base)
     if not state.added:
@@ -131,16 +129,21 @@ def _decided(task: Task, state: State, scored: _Scored) -> Decision:
     return told_by_stem(base.run, decision, allowed)
 
 
-def _extended(task: Task, state: State, scored: _Scored, decision: Decision) -> Extension | None:
-    """Return the model with the chosen effect; None where none may be added."""
+def _extended(
+    task: Task, state: State, scored: _Scored, decision: Decision
+) -> tuple[State, Extension | None]:
+    """Return the state behind which the chosen effect stands, and the model with it.
+
+    None where none may be added.
+    """
     chosen = decision.chosen
     if chosen is None or not decision.inseparable:
-        return None
+        return state, None
     behaviour = chosen.behaviour(state.base.run)
     assert behaviour is not None
-    new = AddedEffect(chosen, behaviour, decision.alternatives)
-    bare = scored.bare(chosen.candidate.key)
-    return extend(bare, task.runs, state.added, new, state.base)
+    room, new = made_room(task, state, AddedEffect(chosen, behaviour, decision.alternatives))
+    bare = scored.models.get(chosen.candidate.key, room.bare)
+    return room, extend(bare, task.runs, room.added, new, state.base)
 
 
 def _grown(state: State, scored: _Scored, decision: Decision, step: Extension) -> State:
@@ -150,7 +153,7 @@ def _grown(state: State, scored: _Scored, decision: Decision, step: Extension) -
     gained = {key: decision.chosen.delta_bic} if scored.models else {}
     return dataclasses.replace(
         state,
-        bare=scored.bare(key),
+        bare=scored.models.get(key, state.bare),
         base=step.base,
         added=step.added,
         earlier=(*state.earlier, state.bare),

@@ -44,6 +44,7 @@ def mended(task: Task, state: State) -> State | None:
         state,
         bare=found.changed.model,
         changes=found.changed.changes,
+        slopes=found.changed.slopes,
         earlier=(),
         opened=len(state.looks),
     )
@@ -86,6 +87,28 @@ def changed_again(task: Task, state: State) -> State:
     return state
 
 
+def made_room(task: Task, state: State, new: AddedEffect) -> tuple[State, AddedEffect]:
+    """Return the state with the changes of its process fitted beside one effect more.
+
+    Args:
+        task: what the run was given.
+        state: what is believed without the effect.
+        new: the effect.
+
+    Returns:
+        The state without the effect, and the effect behind its process.
+    """
+    if not state.changes:
+        return state, new
+    effects, margin = (*state.added, new), task.options.margin
+    now = whole(state.bare, task.runs, effects)
+    found = with_process(state.given, task.runs, effects, margin)
+    if found is None or found.worth >= now.worth(margin) + _price(task, state, now):
+        return state, new
+    *others, last = found.whole.effects
+    return dataclasses.replace(behind(state, found), added=tuple(others), base=state.base), last
+
+
 def singles(state: State) -> list[AddedEffect]:
     """Return the effects that explain most alone, the process as it is now."""
     look = state.looks[min(state.opened, len(state.looks) - 1)]
@@ -103,6 +126,7 @@ def behind(state: State, found: Mended) -> State:
         state,
         bare=found.changed.model,
         changes=found.changed.changes,
+        slopes=found.changed.slopes,
         added=found.whole.effects,
         base=found.whole.base,
         earlier=(),

@@ -17,6 +17,7 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.options import GapOptions
 from stiction_ros.discrepancy.process.change import ProcessChange
 from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 
 
@@ -55,6 +56,7 @@ class State:
         given: the model without any effect that was added, its process as it was given.
         bare: the same, its process as it is taken now.
         changes: what of the process is another than given.
+        slopes: per output what a unit of each figure that was changed moves, shape (N, q).
         before, base: free runs without and with what was added.
         added: effects that are in the model, in the order in which they were found.
         earlier: ``bare`` before each of them came, as long as they may be taken back.
@@ -69,6 +71,7 @@ class State:
     before: Baseline
     base: Baseline
     changes: tuple[ProcessChange, ...] = ()
+    slopes: tuple[FloatArray, ...] = ()
     added: tuple[AddedEffect, ...] = ()
     earlier: tuple[LoopModel, ...] = ()
     gains: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)

@@ -178,3 +178,7 @@ def test_a_step_closes_what_it_closes_at_its_moment() -> None:
     (found,) = answered(378, given="off").effects  # noise of the equation, a fitted block
     assert (found.place, found.effect) == ("disturbance:PV1", "step")
     assert found.closed > 0.9
+
+
+def test_a_curve_is_judged_with_the_changed_process_left_open() -> None:
+    assert names(answered(340, given="off")) == [("valve:V1", "characteristic")]
