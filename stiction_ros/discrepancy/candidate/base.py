@@ -218,6 +218,11 @@ class Candidate(ABC):
         """Whether it bends what OP does to PV by one figure that is searched."""
         return self.about.bends and len(self.axes) == 1 and not self.factors
 
+    @property
+    def smooth(self) -> bool:
+        """Whether the free run is smooth in its first figure, so that it can be followed."""
+        return self.curved
+
     def at_bound(self, point: FloatArray) -> bool:
         """Tell whether a figure lies on the bound of its range: then it is no figure."""
         return any(axis.bounds(v) for axis, v in zip(self.axes, point.tolist(), strict=True))

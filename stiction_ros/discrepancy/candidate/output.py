@@ -61,6 +61,10 @@ class FilterCandidate(OutputCandidate):
         place = f"process:{run.model.outputs[output]}"
         return cls(place=place, effect=kind.effect, axes=axes, output=output, kind=kind)
 
+    @property
+    def smooth(self) -> bool:
+        return True
+
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         parts = []
         for rows in run.runs.slices:

@@ -69,6 +69,10 @@ class ValveCandidate(Candidate):
     def signal(self, run: FreeRun) -> FloatArray:
         return run.stems[:, self.valve]
 
+    @property
+    def smooth(self) -> bool:
+        return self.curved or self.kind in (Slew, Lag)
+
     def rows(self, points: FloatArray) -> FloatArray:
         """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
         return points

@@ -23,7 +23,7 @@ TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
 NORMAL = 1.96
 NOTHING = 1e-9  # of what is left, that a unit of a figure moves: nothing is known of it
-BEND, LARGEST_BEND = 0.02, 0.5  # of a valve's curvature: probe of its derivative, longest step
+PROBE, LARGEST_STEP = 0.02, 0.5  # of an effect's figure: probe of its derivative, longest step
 NEAR = 0.99  # of the largest change, from which on a figure lies on its bound
 
 
@@ -60,7 +60,7 @@ class ChangedProcess:
     Attributes:
         model: without effects.
         changes: figures that were changed.
-        effects: that stand beside it, the curves of valves at their best behind it.
+        effects: that stand beside it, those that are smooth at their best behind it.
         slopes: per output what a unit of each figure that was changed moves, shape (N, figures).
     """
 
@@ -76,9 +76,9 @@ def changed_process(
     """Return the model with gain, time constants and dead time at their best behind effects.
 
     The gain of an output, each of its time constants and its dead time are stepped by
-    Gauss-Newton on the likelihood, together with what stands in for them: the curves of valves
-    and the linear figures of effects. One figure after the other that is not surely another than
-    the model's goes back to it.
+    Gauss-Newton on the likelihood, together with what stands in for them: the figures of effects
+    that are smooth, as the curve of a valve, and linear ones. One figure after the other that is
+    not surely another than the model's goes back to it.
 
     Args:
         bare: the model without effects.
@@ -105,10 +105,18 @@ def changed_process(
     return ChangedProcess(model, tuple(changes), beside, tuple(slopes)) if changes else None
 
 
-def _bent(effect: AddedEffect, run: FreeRun, more: float) -> AddedEffect:
-    """Return the curve of a valve with another curvature, inside of what is searched."""
-    (axis,) = effect.fit.candidate.axes
-    point = np.clip(effect.fit.point + more, axis.low, axis.high)
+def _stepped(effect: AddedEffect, run: FreeRun, more: float) -> AddedEffect:
+    """Return an effect with another first figure, inside of what is searched.
+
+    Args:
+        effect: smooth in that figure.
+        run: of the model behind which it stands.
+        more: in coordinates of its search.
+    """
+    candidate, point = effect.fit.candidate, effect.fit.point.copy()
+    axis = candidate.axes[0]
+    moved = axis.outer(np.array([axis.inner(float(point[0])) + more]))
+    point[0] = np.clip(moved[0], axis.low, axis.high)
     fit = dataclasses.replace(effect.fit, point=point)
     behaviour = fit.behaviour(run)
     assert behaviour is not None
@@ -128,7 +136,7 @@ class _Search:
     ) -> None:
         self.model, self.runs, self.effects, self.output = model, runs, effects, output
         self.declared = declared
-        self.curves = [k for k, each in enumerate(effects) if each.fit.candidate.curved]
+        self.smooth = [k for k, each in enumerate(effects) if each.fit.candidate.smooth]
         self.equation = Changeable(equations_of(model)[output])
         self.figures = self.equation.figures
         self.most = np.array([each.most for each in self.figures])
@@ -178,11 +186,11 @@ class _Search:
             moved = np.zeros(len(free))
             moved[free] = np.clip(step[:count], -0.5 * self.most[free], 0.5 * self.most[free])
             self.values = np.clip(self.values + moved, -self.most, self.most)
-            bends = np.clip(step[count:], -LARGEST_BEND, LARGEST_BEND).tolist()
-            for k, more in zip(self.curves, bends, strict=True):
-                self.effects = self._with_bent(run, k, more)
+            more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()
+            for k, each in zip(self.smooth, more, strict=True):
+                self.effects = self._with_stepped(run, k, each)
             settled = np.all(np.abs(moved) < TINY_STEP * self.probes)
-            if settled and all(abs(more) < TINY_STEP * BEND for more in bends):
+            if settled and all(abs(each) < TINY_STEP * PROBE for each in more):
                 break
 
     def slopes(self) -> FloatArray:
@@ -198,17 +206,17 @@ class _Search:
         return np.column_stack(moved)
 
     def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:
-        """Return what a unit of every free figure and of every curve moves, shape (N, figures)."""
+        """Return what a unit of every free figure and smooth effect moves, shape (N, figures)."""
         moved = [self._of_figures(gap)]
-        model = run.model if not self.curves else self.changed(self.values)
-        for k in self.curves:
-            bent = run_with(model, self.runs, self._with_bent(run, k, BEND))
-            moved.append((bent.gap[:, self.output] - gap) / BEND)
+        model = run.model if not self.smooth else self.changed(self.values)
+        for k in self.smooth:
+            other = run_with(model, self.runs, self._with_stepped(run, k, PROBE))
+            moved.append((other.gap[:, self.output] - gap) / PROBE)
         return np.column_stack(moved)
 
-    def _with_bent(self, run: FreeRun, k: int, more: float) -> tuple[AddedEffect, ...]:
-        bent = _bent(self.effects[k], run, more)
-        return (*self.effects[:k], bent, *self.effects[k + 1 :])
+    def _with_stepped(self, run: FreeRun, k: int, more: float) -> tuple[AddedEffect, ...]:
+        other = _stepped(self.effects[k], run, more)
+        return (*self.effects[:k], other, *self.effects[k + 1 :])
 
     def _run(self, values: FloatArray) -> FreeRun:
         return run_with(self.changed(values), self.runs, self.effects)

@@ -182,3 +182,9 @@ def test_a_step_closes_what_it_closes_at_its_moment() -> None:
 
 def test_a_curve_is_judged_with_the_changed_process_left_open() -> None:
     assert names(answered(340, given="off")) == [("valve:V1", "characteristic")]
+
+
+def test_a_lag_is_stepped_with_the_process_that_stands_in_for_it() -> None:
+    (found,) = answered(352, given="off").effects
+    assert ("sensor:PV1", "lag") in {(found.place, found.effect), *found.alternatives}
+    assert found.closed > 0.9
