@@ -188,3 +188,7 @@ def test_a_lag_is_stepped_with_the_process_that_stands_in_for_it() -> None:
     (found,) = answered(352, given="off").effects
     assert ("sensor:PV1", "lag") in {(found.place, found.effect), *found.alternatives}
     assert found.closed > 0.9
+
+
+def test_a_dead_time_far_beyond_an_error_of_the_model_is_an_effect() -> None:
+    assert names(answered(320, given="off")) == [("process:PV1", "delay")]
