@@ -20,13 +20,16 @@ def overall(
     """Return the verdict of all looks and what stays possible beside the effects.
 
     With several effects it is that of the largest, which is found first; each effect has a
-    verdict of its own.
+    verdict of its own. What is left in doubt and leaves a larger noise than declared explains
+    nothing.
     """
     last = looks[-1].decision
     alternatives = [name for effect in effects for name in effect.alternatives]
     open_set = last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable
     if not effects:
         if open_set and last.chosen is not None:
+            if any(noise.enlarged for noise in last.chosen.noise.values()):
+                return GapVerdict.UNKNOWN, ()
             names = [*last.chosen.candidate.keys, *last.alternatives]
             return GapVerdict.AMBIGUOUS, tuple(dict.fromkeys(names))
         if last.verdict is GapVerdict.UNKNOWN:

@@ -192,3 +192,9 @@ def test_a_lag_is_stepped_with_the_process_that_stands_in_for_it() -> None:
 
 def test_a_dead_time_far_beyond_an_error_of_the_model_is_an_effect() -> None:
     assert names(answered(320, given="off")) == [("process:PV1", "delay")]
+
+
+def test_a_set_in_doubt_that_leaves_a_larger_noise_is_no_answer() -> None:
+    answer = answered(162)  # healthy; a controller that scans twice in a sample, OP rounded
+    assert answer.verdict is GapVerdict.UNKNOWN
+    assert answer.alternatives == ()
