@@ -148,17 +148,16 @@ class Ramped:
 def slow_triangle(valve: Valve) -> Ramped:
     """Move the command up and down so slowly that neither stem nor actuator lags behind.
 
-    The command makes :data:`RAMP_STEPS` steps a leg. The band is read over the middle half of
-    the legs, where the stem has long been taken along.
+    The valve is moved as it is: behind a positioner a slip ends where the actuator's pressure has
+    fallen, so its lag decides how far it goes. The command makes :data:`RAMP_STEPS` steps a leg.
+    The band is read over the middle half of the legs, where the stem has long been taken along.
     """
     if valve.static == 0.0:
         return Ramped(0.0, 0.0)
-    stem = valve.stem
-    valve = dataclasses.replace(valve, stem=dataclasses.replace(stem, lag=stem.natural))
     height = REACH * 2.0 * valve.static
     leg = np.linspace(-0.5, 0.5, RAMP_STEPS + 1)[1:] * height
     commands = 50.0 + np.concatenate([leg * (-1.0) ** k for k in range(LEGS)])
-    path = valve.follow(commands, SETTLES * stem.natural)
+    path = valve.follow(commands, SETTLES * valve.stem.natural)
     inside = slice(RAMP_STEPS // 4, 3 * RAMP_STEPS // 4)
     behind = (commands - path).reshape(LEGS, RAMP_STEPS)[1:, inside].mean(axis=1)
     signs = np.array([-1.0, 1.0] * (LEGS // 2))

@@ -41,6 +41,20 @@ def test_band_and_jump_of_a_stem_belong_together(
     assert shown.band == pytest.approx(2.0 * 3.0 - shown.jump, rel=creeping)
 
 
+@pytest.mark.parametrize("law", [Law.KARNOPP, Law.LUGRE])
+def test_the_lag_of_an_actuator_counts_behind_a_positioner_alone(law: Law) -> None:
+    """A stem that slips takes back the positioner's push no faster than the pressure falls."""
+
+    def shown(positioner: float, lag: float) -> tuple[float, float]:
+        ramped = slow_triangle(Valve(law, 3.0, 2.0, Stem(0.05, 1.5, lag, positioner, 100.0, 0.06)))
+        return ramped.band, ramped.jump
+
+    assert shown(0.0, 0.5) == pytest.approx(shown(0.0, 0.05), rel=0.05)
+    (late, far), (quick, near) = shown(3.0, 0.5), shown(3.0, 0.05)
+    assert far > 1.3 * near
+    assert late < 0.9 * quick
+
+
 def test_a_stem_that_is_barely_damped_slips_farther() -> None:
     light, heavy = (
         slow_triangle(Valve(Law.KARNOPP, 3.0, 2.0, Stem(0.05, damping))) for damping in (0.3, 3.0)
