@@ -26,6 +26,8 @@ law to the letter, and what the law misses weighs as much as what it explains gr
 HARMLESS = 0.08  # of the range of OP: a valve is healthy when all larger bands are rejected
 OTHERS = 6  # frictions that are not rejected, looked at one by one
 STEPS = (0.3, 0.1, 0.03, 0.01, 0.003)  # of f_S + f_D: grids round the best
+OUTWARDS = 0.01 * np.arange(1.0, 13.0)
+"""Shares of f_S + f_D past the ends of what is accepted: as far as to the next node of a grid."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,7 +74,11 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
     """
     gain = found.without[valve].loss - found.best.loss
     slack = _slack(gain, confidence)
-    rows, lost = _looked_at(problem, found, valve)
+    judge = Judge.of(problem, found.best, valve, found.best.fits, held=True)
+    tried, lost = _looked_at(judge, found)
+    beyond = _beyond(tried[lost <= lost.min() + slack])
+    rows = np.vstack([tried, beyond])[:, :2]
+    lost = np.concatenate([lost, judge.losses(beyond)])
     material = float(lost[rows.sum(axis=1) > HARMLESS].min(initial=np.inf))
     lost = lost - lost.min()
     inside = lost <= slack
@@ -109,12 +115,11 @@ def _slack(gain: float, confidence: float) -> float:
     return chi2_quantile(confidence, FREEDOM) + MISFIT * max(gain, 0.0)
 
 
-def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, FloatArray]:
-    """Return frictions, shape (G, 2), and their losses, those of exact fits first."""
-    best = found.best
+def _looked_at(judge: Judge, found: Found) -> tuple[FloatArray, FloatArray]:
+    """Return rows (f_S, f_D, start), shape (G, 3), and their losses, those of exact fits first."""
+    best, valve = found.best, judge.valve
     met = [one for one in found.met if one.friction[valve, 0] > 0.0] or [best]
-    rows = [np.array([one.friction[valve] for one in met])]
-    lost = [np.array([one.loss for one in met])]
+    exact = np.array([[*one.friction[valve], one.starts[valve]] for one in met])
     centre = best.friction[valve]
     grids = [coarse_grid(LIMIT)]
     if centre[0] > 0.0:
@@ -123,11 +128,26 @@ def _looked_at(problem: Problem, found: Found, valve: int) -> tuple[FloatArray, 
     grid = np.vstack(grids)
     deadbands = np.repeat(np.unique(grid[:, :1]), 2).reshape(-1, 2)
     grid = np.vstack([grid, deadbands])
-    start = np.full(len(grid), best.starts[valve])
-    rows.append(grid)
-    judge = Judge.of(problem, best, valve, best.fits, held=True)
-    lost.append(judge.losses(np.column_stack([grid, start])))
-    return np.vstack(rows), np.concatenate(lost)
+    rows = np.column_stack([grid, np.full(len(grid), best.starts[valve])])
+    lost = [np.array([one.loss for one in met]), judge.losses(rows)]
+    return np.vstack([exact, rows]), np.concatenate(lost)
+
+
+def _beyond(inside: FloatArray) -> FloatArray:
+    """Return rows (f_S, f_D, start) past both ends of the band of those that are accepted.
+
+    A grid ends the interval at its last accepted node; where the loss reaches the limit lies
+    between this and the next.
+    """
+    band = inside[:, :2].sum(axis=1)
+    out = []
+    for end, way in ((inside[band.argmin()], -1.0), (inside[band.argmax()], 1.0)):
+        moved = way * OUTWARDS[:, None]
+        alike = end[:2] * (1.0 + moved)
+        same_jump = np.maximum(end[:2] + 0.5 * moved * end[:2].sum(), 0.0)
+        grid = np.vstack([alike, same_jump])
+        out.append(np.column_stack([grid, np.full(len(grid), end[2])]))
+    return np.vstack(out)
 
 
 def _profile(static: FloatArray, lost: FloatArray) -> tuple[tuple[float, float], ...]:
