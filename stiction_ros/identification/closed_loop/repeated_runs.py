@@ -349,10 +349,16 @@ def without_lines(values: FloatArray, period: float) -> FloatArray:
 
 
 def tried_frictions(valve: ValveEstimate) -> FloatArray:
-    """Return (f_S, f_D) of the estimate and at both ends of its intervals, shape (3, 2), %."""
+    """Return (f_S, f_D) of the estimate and at both ends of its intervals, shape (3, 2), %.
+
+    Where both figures at an end are no band that is possible, f_D is as near as makes it one.
+    """
     f_s, f_d = valve.static_friction, valve.dynamic_friction
     low_s, high_s = valve.static_interval
     low_d, high_d = valve.dynamic_interval
+    if valve.band_interval is not None:
+        least, most = valve.band_interval
+        low_d, high_d = max(low_d, least - low_s), max(min(high_d, most - high_s), low_d)
     if low_s <= 0.0:
         low_s, low_d = DOUBTED * f_s, DOUBTED * f_d
     return np.array(

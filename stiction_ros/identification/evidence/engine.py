@@ -19,8 +19,8 @@ from stiction_ros.identification.closed_loop.explanation import (
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
-from stiction_ros.identification.evidence.fit.output_fit import OutputFit, noise_of
-from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER, Problem
+from stiction_ros.identification.evidence.fit.output_fit import OutputFit
+from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
@@ -31,6 +31,7 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
+from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import (
     half_gains,
@@ -70,9 +71,6 @@ REJECTING = 2  # rates that do
 SURELY = 10.0  # what they must lose where one rate alone rejects them
 NOTHING = 8.0
 """What they may gain at any rate with news: as much as the best of many frictions does on noise."""
-BETWEEN = 3.0
-"""Standard deviations of OP's innovations by which the band may be larger than the record shows: a
-valve feels what OP does between two samples, and slips at its peaks."""
 
 
 def identify(
@@ -219,6 +217,7 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
         verdict=VerdictKind.UNDECIDED,
         static_interval=(0.0, valve.static_interval[1]),
         dynamic_interval=(0.0, valve.dynamic_interval[1]),
+        band_interval=(0.0, valve.sum_interval[1]),
     )
 
 
@@ -236,10 +235,11 @@ def _judged(
             figures[f"wave_{look.problem.rate}"] = look.wave_gain
         figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
     verdict = _verdict(figures, agreed, seen, valve, options)
-    believed = verdict.has_friction
-    low = (held.static[0], held.dynamic[0]) if believed else (0.0, 0.0)
     healthy = verdict is VerdictKind.HEALTHY
-    high = 0.0 if healthy else 0.5 * BETWEEN * span * _innovation(problem.op[valve])
+    unseen = Unseen(0.0, 0.0) if healthy else Unseen.of(span * problem.op[valve])
+    ends = [unseen.static(held.static), unseen.dynamic(held.dynamic), unseen.band(held.band)]
+    if not verdict.has_friction:
+        ends = [(0.0, high) for _, high in ends]
     chosen = found.without[valve] if healthy else found.best
     static, dynamic = (span * float(value) for value in chosen.friction[valve])
     deadband = is_deadband(held.deadband_loss, held.static, held.dynamic)
@@ -248,9 +248,10 @@ def _judged(
         verdict=verdict,
         law=options.law,
         static_friction=static,
-        static_interval=(low[0], max(held.static[1], static) + high),
+        static_interval=ends[0],
         dynamic_friction=dynamic,
-        dynamic_interval=(low[1], max(held.dynamic[1], dynamic) + high),
+        dynamic_interval=ends[1],
+        band_interval=ends[2],
         jump=0.0 if deadband else static - dynamic,
         stem_start=float(record.op[0, valve]) + span * float(chosen.starts[valve]),
         moves=int(np.count_nonzero(np.diff(chosen.stems[valve]))),
@@ -310,11 +311,6 @@ def _half_gains(look: Look, valve: int) -> tuple[float, float]:
         (_innovations(look.problem, one), _innovations(look.problem, other))
         for one, other in zip(best.fits, without.fits, strict=True)
     )
-
-
-def _innovation(op: FloatArray) -> float:
-    """Return the standard deviation of what the past of OP does not tell."""
-    return float(whitened(noise_of(op), op, float(op[0]))[NOISE_ORDER:].std())
 
 
 def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:

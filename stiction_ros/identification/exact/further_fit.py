@@ -105,13 +105,17 @@ def widened(valve: ValveEstimate, further: dict[str, float], rows: FloatArray) -
         for k, (key, value) in enumerate(further.items())
         if high[2 + k] > low[2 + k]
     }
-    static, dynamic = valve.static_interval, valve.dynamic_interval
+    static, dynamic, band = valve.static_interval, valve.dynamic_interval, valve.band_interval
+    if band is not None:
+        sums = rows[:, :2].sum(axis=1)
+        band = (min(band[0], float(sums.min())), max(band[1], float(sums.max())))
     return dataclasses.replace(
         valve,
         further=further,
         further_intervals=ends,
         static_interval=(min(static[0], low[0]), max(static[1], high[0])),
         dynamic_interval=(min(dynamic[0], low[1]), max(dynamic[1], high[1])),
+        band_interval=band,
     )
 
 

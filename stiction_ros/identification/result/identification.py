@@ -75,6 +75,8 @@ class ValveEstimate:
         further: the law's parameters behind the first two, by their keys in YAML; empty where
             it has no others or the valve no friction.
         further_intervals: values of each that the record does not reject.
+        band_interval: values of f_S + f_D that the record does not reject, %; None where a method
+            does not look at the sum: see :attr:`sum_interval`.
     """
 
     name: str
@@ -94,6 +96,15 @@ class ValveEstimate:
     experiment: str = ""
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     further_intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    band_interval: tuple[float, float] | None = None
+
+    @property
+    def sum_interval(self) -> tuple[float, float]:
+        """Values of f_S + f_D that are possible, %."""
+        if self.band_interval is not None:
+            return self.band_interval
+        static, dynamic = self.static_interval, self.dynamic_interval
+        return static[0] + dynamic[0], static[1] + dynamic[1]
 
     def behaviour(self) -> Behaviour | None:
         """Return the friction as an effect of a loop model; None for a valve without any."""
@@ -123,6 +134,7 @@ class ValveEstimate:
             "f_s_interval": list(self.static_interval),
             "f_d": self.dynamic_friction,
             "f_d_interval": list(self.dynamic_interval),
+            "band_interval": list(self.sum_interval),
             **self.further,
             **{f"{key}_interval": list(ends) for key, ends in self.further_intervals.items()},
             "jump": self.jump,

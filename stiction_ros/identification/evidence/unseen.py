@@ -1,0 +1,61 @@
+"""What samples do not show of the OP that a valve feels, and what that leaves open of its friction.
+
+A law is judged on OP as it was sampled, and two things are in no sample. The stem feels what OP
+does between them, too, and slips at peaks there: OP turned farther than the record shows. And it
+may answer up to a sample later than OP moves: what OP has moved on by then is no friction.
+
+The band f_S + f_D is what OP passes from one slip to the next in the other direction, and has two
+such ends. The jump f_S − f_D is what it passes from one slip to the next in the same direction, and
+has one: of a slip that the samples give no reason for a smaller jump makes the best.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.evidence.accepted import Interval
+from stiction_ros.identification.evidence.fit.output_fit import noise_of
+from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER
+from stiction_ros.identification.kernels.lags import whitened
+
+BETWEEN = 1.5  # standard deviations of OP's innovations by which an end may lie farther out
+LATE = 1.0  # samples by which a stem answers late, at most
+
+
+@dataclasses.dataclass(frozen=True)
+class Unseen:
+    """By how much one end may lie elsewhere than the samples show; unit of OP, 0 or more.
+
+    Attributes:
+        less: what OP moves before the stem answers.
+        more: by how much OP goes farther between samples.
+    """
+
+    less: float
+    more: float
+
+    @classmethod
+    def of(cls, op: FloatArray) -> Unseen:
+        """Return what samples of OP leave open, shape (N,), N at least 20."""
+        return cls(LATE * float(np.abs(np.diff(op)).mean()), BETWEEN * innovation(op))
+
+    def band(self, held: Interval) -> Interval:
+        """Return the f_S + f_D that are possible where the samples accept ``held``."""
+        return max(held[0] - 2.0 * self.less, 0.0), held[1] + 2.0 * self.more
+
+    def static(self, held: Interval) -> Interval:
+        """Return the f_S, half of band and jump, that are possible."""
+        return max(held[0] - self.less, 0.0), held[1] + 1.5 * self.more
+
+    def dynamic(self, held: Interval) -> Interval:
+        """Return the f_D, half of what the band has more than the jump, that are possible."""
+        return max(held[0] - self.less - 0.5 * self.more, 0.0), held[1] + self.more
+
+
+def innovation(op: FloatArray) -> float:
+    """Return the standard deviation of what the past of OP does not tell."""
+    op = op - op.mean()
+    return float(whitened(noise_of(op), op, float(op[0]))[NOISE_ORDER:].std())
