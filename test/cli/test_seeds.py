@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import os
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +13,12 @@ from stiction_ros.cli.runs import seeds
 from stiction_ros.cli.runs.seeds import run_each
 
 COUNT = 60
+
+TWO_RANGES = """
+from stiction_ros.cli.runs.seeds import run_each, seed_range
+if __name__ == "__main__":
+    print(run_each(seed_range, ["1:2", "3"], 2, "two"))
+"""
 
 
 def traces(folder: Path) -> list[list[str]]:
@@ -45,3 +52,19 @@ def test_an_interrupt_leaves_what_has_not_begun(
     with pytest.raises(KeyboardInterrupt):
         run_each(subprocess.call, traces(tmp_path), jobs, "sixty")
     assert len(list(tmp_path.iterdir())) < COUNT / 2
+
+
+def test_workers_take_no_folder_of_the_name_of_the_package_for_it(tmp_path: Path) -> None:
+    (tmp_path / "stiction_ros").mkdir()
+    script = tmp_path / "elsewhere" / "two_ranges.py"
+    script.parent.mkdir()
+    script.write_text(TWO_RANGES)
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.stdout.strip() == "[(1, 2), (3, 3)]", done.stderr[-2000:]

@@ -100,7 +100,7 @@ class DaskEngine:
                 yield Done(task, answer)
             else:
                 reason = future.exception() if future.status == "error" else future.status
-                yield lost(task, f"the cluster gave it up: {reason}")
+                yield lost(task, f"the cluster gave it up: {reason}", again=True)
             future.release()
             hand_in()
 

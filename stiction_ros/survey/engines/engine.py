@@ -25,10 +25,11 @@ class Task:
 
 @dataclasses.dataclass(frozen=True)
 class Done:
-    """One loop that was judged."""
+    """One loop that was judged; ``again`` where a survey that goes on should try it anew."""
 
     task: Task
     assessed: Assessed
+    again: bool = False
 
 
 class Engine(Protocol):
@@ -50,8 +51,14 @@ class Engine(Protocol):
         ...
 
 
-def lost(task: Task, reason: str) -> Done:
-    """Return a loop that could not be judged."""
+def lost(task: Task, reason: str, *, again: bool = False) -> Done:
+    """Return a loop that could not be judged.
+
+    Args:
+        task: that was lost.
+        reason: one sentence without a full stop.
+        again: whether that says nothing of the loop, as its worker died.
+    """
     loop = task.loop
     entry = Entry(
         loop.name,
@@ -60,4 +67,4 @@ def lost(task: Task, reason: str) -> Done:
         reason,
         notes=tuple(loop.notes),
     )
-    return Done(task, Assessed(entry, log=(f"failed: {reason}",)))
+    return Done(task, Assessed(entry, log=(f"failed: {reason}",)), again)

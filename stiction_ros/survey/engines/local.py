@@ -2,27 +2,28 @@
 
 Workers are forked from one process that has imported what they need. One that is killed is replaced
 and its loop tried once more. One loop is with each worker at a time and one more is drawn when it
-comes back, so memory does not grow with the plant. A worker first loads or compiles its machine
-code and says that it is ready; only then is it sent its loop, and the loop's time begins: what a
-busy machine takes to start is no loop's fault.
+comes back, so memory does not grow with the plant. One worker is started first and the others when
+it is ready, so that where none can start this is said once. A worker first loads or compiles its
+machine code and says that it is ready; only then is it sent its loop, and the loop's time begins:
+what a busy machine takes to start is no loop's fault.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import multiprocessing
 import signal
 import time
 from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.process import BaseProcess
 
+from stiction_ros.errors import InputError
 from stiction_ros.identification.warm_up import compile_loops
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed, assess
 from stiction_ros.survey.engines.engine import ATTEMPTS, Done, Task, lost
+from stiction_ros.survey.engines.start import context_of, started
 from stiction_ros.survey.options import SurveyOptions
 
 LONGEST = 600.0
@@ -30,6 +31,9 @@ LONGEST = 600.0
 
 READY = "ready"
 """What a worker says once, before its first loop."""
+
+SIGNAL = "signal"
+"""Begins how a worker ended that was killed: by chance, or as memory ran out."""
 
 ENDS_WITHIN = 2.0
 """Seconds that a worker is given to end by itself."""
@@ -68,6 +72,7 @@ class LocalEngine:
         """
         self._jobs, self._longest = max(jobs, 1), longest
         self._workers: list[_Worker] = []
+        self._proven = False
 
     @property
     def workers(self) -> int:
@@ -80,12 +85,17 @@ class LocalEngine:
         return tuple(worker.process.pid or 0 for worker in self._workers)
 
     def run(self, tasks: Iterable[Task], options: SurveyOptions) -> Iterator[Done]:
-        """Yield what is said of each loop as it comes."""
+        """Yield what is said of each loop as it comes.
+
+        Raises:
+            InputError: the first worker ends before it is ready, as no other would get further.
+        """
         waiting = iter(tasks)
         exhausted = False
         try:
             while True:
-                while not exhausted and len(self._busy) < self._jobs:
+                most = self._jobs if self._proven else 1
+                while not exhausted and len(self._busy) < most:
                     task = next(waiting, None)
                     if task is None:
                         exhausted = True
@@ -106,10 +116,9 @@ class LocalEngine:
             if worker.process.is_alive():
                 return worker
             self._drop(worker)  # killed while it had nothing to do: no loop's fault
-        context = _context()
+        context = context_of(__name__)
         here, there = context.Pipe()
-        process = context.Process(target=_work, args=(there, options), daemon=True)
-        process.start()
+        process = started(context, _work, there, options)
         there.close()
         worker = _Worker(process, here)
         self._workers.append(worker)
@@ -132,7 +141,7 @@ class LocalEngine:
             if worker.pipe in speaking:
                 answer = _answer(worker.pipe)
                 if answer == READY:
-                    worker.ready = True
+                    worker.ready = self._proven = True
                     worker.send()
                     continue
                 if isinstance(answer, Assessed):
@@ -140,12 +149,17 @@ class LocalEngine:
                     yield Done(task, answer)
                     continue
                 code = self._drop(worker)
+                if not self._proven and not code.startswith(SIGNAL):
+                    raise InputError(
+                        f"no worker process can start, the first ended with {code}",
+                        where="survey",
+                        fix="what it said of it stands above",
+                    )
                 if worker.attempt < ATTEMPTS:
                     self._give(self._free(options), task, worker.attempt + 1)
                 else:
-                    yield lost(
-                        task, f"its worker ended {ATTEMPTS} times, the last time with {code}"
-                    )
+                    said = f"its worker ended {ATTEMPTS} times, the last time with {code}"
+                    yield lost(task, said, again=True)
             elif time.monotonic() >= worker.since + self._longest:
                 self._drop(worker)
                 yield lost(task, f"it took more than {self._longest:g} s and was given up")
@@ -156,7 +170,7 @@ class LocalEngine:
         worker.process.join(timeout=0.2)
         code = worker.process.exitcode
         _end(worker)
-        return "no answer" if code is None else f"signal {-code}" if code < 0 else f"code {code}"
+        return "no answer" if code is None else f"{SIGNAL} {-code}" if code < 0 else f"code {code}"
 
     def close(self) -> None:
         """End all workers."""
@@ -167,15 +181,6 @@ class LocalEngine:
                 worker.process.join(timeout=ENDS_WITHIN)
             _end(worker)
         self._workers.clear()
-
-
-def _context() -> ForkServerContext | SpawnContext:
-    """Return how processes are started here; there is no such server on every system."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__])
-    return context
 
 
 def _end(worker: _Worker) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from made import unreadable
 
+from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.engines.engine import Task
 from stiction_ros.survey.engines.local import LocalEngine
@@ -92,10 +93,20 @@ def test_the_time_of_a_loop_begins_when_its_worker_is_ready() -> None:
     assert len(done) == 3
 
 
-def test_a_worker_that_never_gets_ready_loses_its_loop_and_no_more_time() -> None:
+def test_where_no_worker_can_start_that_is_said_once() -> None:
     broken = dataclasses.replace(OPTIONS, read_by=_Then(os._exit, 3))
-    (done,) = LocalEngine(1).run(_tasks(1), broken)
-    assert "worker ended 3 times, the last time with code 3" in done.assessed.entry.reason
+    engine = LocalEngine(4)
+    with pytest.raises(
+        InputError, match="no worker process can start, the first ended with code 3"
+    ):
+        list(engine.run(_tasks(9), broken))
+    assert engine.processes == ()
+
+
+def test_a_loop_whose_worker_died_may_be_tried_again_and_one_that_was_judged_not() -> None:
+    tasks = [*_tasks(1), _bad(_Then(os._exit, 9))]
+    again = {done.task.key: done.again for done in LocalEngine(1).run(tasks, OPTIONS)}
+    assert again == {"0": False, "bad": True}
 
 
 def test_workers_end_when_the_survey_is_broken_off() -> None:

@@ -1,0 +1,68 @@
+"""How worker processes of this machine are started: they import what the one that starts them does.
+
+A new interpreter looks for modules in the folder that one stands in first, and a folder there may
+bear the name of this package, as that of a clone does. It would be taken for the package.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Iterator
+from multiprocessing.context import ForkServerContext, SpawnContext
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+
+def context_of(module: str) -> ForkServerContext | SpawnContext:
+    """Return how processes are started here; there is no fork server on every system.
+
+    Args:
+        module: that the server imports once for all of its workers.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([module])
+    return context
+
+
+def started(
+    context: ForkServerContext | SpawnContext, work: Callable[..., None], *arguments: Any
+) -> BaseProcess:
+    """Return a process that does ``work`` and ends with this one.
+
+    Args:
+        context: see :func:`context_of`.
+        work: a function of a module.
+        arguments: of it.
+    """
+    process = context.Process(target=work, args=arguments, daemon=True)
+    with same_imports():
+        process.start()
+    return process
+
+
+@contextlib.contextmanager
+def same_imports() -> Iterator[None]:
+    """Let interpreters that are started inside look for modules where this one does, nowhere else.
+
+    ``multiprocessing`` tells that to a worker, but not to the server that workers are forked from.
+    """
+    here = os.getcwd()
+    told = {
+        "PYTHONPATH": os.pathsep.join(path or here for path in sys.path),
+        "PYTHONSAFEPATH": "1",
+    }
+    before = {name: os.environ.get(name) for name in told}
+    os.environ.update(told)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
