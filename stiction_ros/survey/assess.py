@@ -16,6 +16,7 @@ from stiction_ros.identification import Identification, identify
 from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.identification.closed_loop.recovered_controller import LoopSignals, recover
 from stiction_ros.intake.loop import Loop
+from stiction_ros.records.csv.names import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
@@ -24,6 +25,7 @@ from stiction_ros.survey.beats import beats
 from stiction_ros.survey.entry import Cycling, Entry, Status
 from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.pages.loop_page import loop_page
+from stiction_ros.survey.pages.words import cause_words
 from stiction_ros.survey.ranking import confidence
 
 FEWEST = 100
@@ -92,14 +94,15 @@ def _assessed(loop: Loop, entry: Entry, options: SurveyOptions) -> Assessed:
     entry = _described(entry, loop.parts)
     if entry.auto_share == 0.0:
         return _ended(entry, Status.SKIPPED, "it was in manual all the time")
-    record = longest_part(loop.parts)
+    record = _named(longest_part(loop.parts), entry.name)
     entry = dataclasses.replace(entry, saturated_share=saturated(record))
     if len(record) < FEWEST:
         reason = f"its longest good part in automatic has {len(record)} of {FEWEST} samples"
         return _ended(entry, Status.SKIPPED, reason)
     found = identify(record, options.identification)
     entry, chosen = _judged(entry, record, found)
-    log = [*entry.notes, f"verdict: {entry.verdict}, cause: {entry.cause}"]
+    cycles = f", cycles by: {cause_words(entry.cause)}" if entry.cause else ""
+    log = [*entry.notes, f"verdict: {entry.verdict}{cycles}"]
     gain, doubt = None, ""
     if options.gain and entry.found:
         try:
@@ -117,6 +120,13 @@ def _assessed(loop: Loop, entry: Entry, options: SurveyOptions) -> Assessed:
     log.append(f"took {time.perf_counter() - begun:.1f} s")
     page = loop_page(entry, record, found, gain, options.unit(entry.name)) if options.pages else ""
     return Assessed(entry, page, tuple(log))
+
+
+def _named(record: Record, name: str) -> Record:
+    """Return a record whose signals bear the loop's name where its file gives them none."""
+    if (record.valves, record.outputs) != ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,)):
+        return record
+    return dataclasses.replace(record, valves=(name,), outputs=(name,))
 
 
 def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from pathlib import Path
 from types import TracebackType
@@ -25,10 +26,11 @@ class Journal:
         Args:
             folder: of the survey; it is there.
             mark: of the options.
-            resume: whether what is there counts; else it is begun anew.
+            resume: whether what is there counts; else no loop may be there.
 
         Raises:
-            InputError: it was written with other options, or by something else.
+            InputError: it was written with other options, or by something else; or it holds loops
+                that are not to be gone on with.
         """
         self.path = folder / FILE
         self.known: dict[str, Entry] = {}
@@ -38,6 +40,7 @@ class Journal:
             self._file.seek(whole)
             self._file.truncate()
         else:
+            _refuse_loops(self.path)
             self._file = self.path.open("wb")
         if not self._file.tell():
             self._write({"survey": 1, "options": mark})
@@ -57,7 +60,7 @@ class Journal:
                     raise InputError(
                         f"line {number + 1} is no result of a survey",
                         where=where,
-                        fix="leave out --resume, or remove the file",
+                        fix="remove the file, or choose another --out",
                     ) from None
                 if not number:
                     _check(line, mark, where)
@@ -94,6 +97,19 @@ def key_of(loop: Loop) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]
 
 
+def _refuse_loops(path: Path) -> None:
+    """Raise where loops are kept: what they cost is not thrown away unasked."""
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        if sum(1 for _ in itertools.islice(file, 2)) == 2:
+            raise InputError(
+                "holds a survey",
+                where=str(path.parent),
+                fix="--resume goes on with it, or choose another --out",
+            )
+
+
 def _check(line: Any, mark: str, where: str) -> None:
     if not isinstance(line, dict) or line.get("survey") != 1:
         raise InputError("was not written by a survey", where=where, fix="name another folder")
@@ -101,5 +117,5 @@ def _check(line: Any, mark: str, where: str) -> None:
         raise InputError(
             "was written with other options",
             where=where,
-            fix="use the same ones, or leave out --resume to begin anew",
+            fix="use the same ones, or choose another --out",
         )

@@ -13,17 +13,35 @@ from typing import IO, Any
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.engines.engine import Engine, Task
-from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group, grouped
 from stiction_ros.survey.journal import Journal, key_of
 from stiction_ros.survey.options import SurveyOptions
+from stiction_ros.survey.pages.unit import with_unit
 from stiction_ros.survey.ranking import ranked
-
-Progress = Callable[[int, int, Entry], None]
-"""Loops that are done, loops known of so far, and the last one."""
 
 PAGES = "loops"
 LOG = "survey.log"
+
+
+@dataclasses.dataclass(frozen=True)
+class Reached:
+    """How far a survey is.
+
+    Attributes:
+        done: loops that have their row.
+        before: of these, those that were taken from the survey that it goes on with.
+        drawn: loops that were read.
+        entry: the last row.
+    """
+
+    done: int
+    before: int
+    drawn: int
+    entry: Entry
+
+
+Progress = Callable[[Reached], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,6 +53,7 @@ class Survey:
         entries: by rank.
         groups: of loops that cycle together.
         date: when it was done, ISO.
+        before: loops that were taken from the survey that it went on with.
     """
 
     engine: str
@@ -43,6 +62,12 @@ class Survey:
     entries: tuple[Entry, ...]
     groups: tuple[Group, ...]
     date: str = ""
+    before: int = 0
+
+    @property
+    def judged(self) -> int:
+        """How many loops were judged, in this run or before."""
+        return sum(entry.status is Status.OK for entry in self.entries)
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``survey --json``."""
@@ -51,8 +76,9 @@ class Survey:
             "engine": self.engine,
             "workers": self.workers,
             "seconds": self.seconds,
-            "loops_per_minute": len(self.entries) / minutes,
+            "loops_per_minute": (len(self.entries) - self.before) / minutes,
             "date": self.date,
+            "before": self.before,
             "groups": [dataclasses.asdict(group) for group in self.groups],
             "loops": [entry.to_json() for entry in self.entries],
         }
@@ -87,7 +113,7 @@ def survey(
         progress: called after each loop.
 
     Raises:
-        InputError: a folder that cannot be written, or a journal of another survey.
+        InputError: a folder that cannot be written or holds another survey.
     """
     if plan.out is None:
         if plan.resume:
@@ -115,7 +141,7 @@ class _Run:
     ) -> None:
         self.plan, self.engine, self.journal, self.log = plan, engine, journal, log
         self.entries: dict[str, Entry] = {}
-        self.drawn = 0
+        self.drawn = self.before = 0
         self._pages: set[str] = set()
 
     def done(self, loops: Iterable[Loop], progress: Progress | None) -> Survey:
@@ -125,17 +151,22 @@ class _Run:
             for done in self.engine.run(tasks, self.plan.options):
                 entry = self._kept(done.assessed.entry, done.assessed.page)
                 self.entries[done.task.key] = entry
-                if self.journal is not None:
+                if self.journal is not None and not done.again:
                     self.journal.add(done.task.key, entry)
                 self._tell(entry.name, done.assessed.log)
-                if progress is not None:
-                    progress(len(self.entries), self.drawn, entry)
+                self._show(progress, entry)
         finally:
             self.engine.close()
         rows, groups = grouped(sorted(self.entries.values(), key=lambda entry: entry.name))
         order = ranked(rows, self.plan.costs)
         seconds = time.perf_counter() - begun
-        return Survey(self.engine.name, workers, seconds, tuple(order), tuple(groups))
+        return Survey(
+            self.engine.name, workers, seconds, tuple(order), tuple(groups), before=self.before
+        )
+
+    def _show(self, progress: Progress | None, entry: Entry) -> None:
+        if progress is not None:
+            progress(Reached(len(self.entries), self.before, self.drawn, entry))
 
     def _tasks(self, loops: Iterable[Loop], progress: Progress | None) -> Iterator[Task]:
         """Yield the loops that are not known yet; those that are, are taken as they are."""
@@ -152,11 +183,12 @@ class _Run:
                 yield Task(key, loop)
                 continue
             self.entries[key] = known
+            self.before += 1
             if known.report is not None:
                 self._pages.add(Path(known.report).name)
+                self._name_unit(known)
             self._tell(known.name, ("taken from the survey before",))
-            if progress is not None:
-                progress(len(self.entries), self.drawn, known)
+            self._show(progress, known)
 
     def _kept(self, entry: Entry, page: str) -> Entry:
         """Write the page of a loop and return the entry that names it."""
@@ -165,6 +197,16 @@ class _Run:
         name = self._page_name(entry.name)
         (self.plan.out / PAGES / name).write_text(page, encoding="utf-8")
         return dataclasses.replace(entry, report=f"{PAGES}/{name}")
+
+    def _name_unit(self, entry: Entry) -> None:
+        """Put the unit that is given now into a page that was written before."""
+        unit = self.plan.options.unit(entry.name)
+        if not unit or self.plan.out is None or entry.report is None:
+            return
+        file = self.plan.out / entry.report
+        if file.exists():
+            told = with_unit(file.read_text(encoding="utf-8"), unit)
+            file.write_text(told, encoding="utf-8")
 
     def _page_name(self, loop: str) -> str:
         base = re.sub(r"[^\w.-]+", "_", loop).strip("._")[:80] or "loop"

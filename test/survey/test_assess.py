@@ -70,7 +70,13 @@ def test_a_valve_that_sticks_is_found(assessed: Assessed) -> None:
     assert entry.travel_per_hour > 0.0
     assert "2 values were held" in entry.notes
     assert "FIC1: The valve sticks" in assessed.page
-    assert any("verdict: sticky" in line for line in assessed.log)
+    assert any("verdict: sticky, cycles by: " in line for line in assessed.log)
+
+
+def test_signals_of_a_file_of_one_loop_bear_its_name(record: Record, assessed: Assessed) -> None:
+    assert record.valves == ("V1",)
+    assert "the stem of FIC1 rests" in assessed.page
+    assert "V1" not in assessed.page
 
 
 def test_a_loop_in_manual_is_skipped(record: Record) -> None:

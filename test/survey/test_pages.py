@@ -11,12 +11,22 @@ from made import GAIN, entry, identification, record
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
+from stiction_ros.survey.listing.columns import HINTS
 from stiction_ros.survey.listing.page import list_page
-from stiction_ros.survey.pages.loop_page import loop_page, with_trend
+from stiction_ros.survey.listing.saved import in_words
+from stiction_ros.survey.pages.loop_page import loop_page
 from stiction_ros.survey.pages.plot import MOST, Curve, over_time
+from stiction_ros.survey.pages.trend import Earlier, trend_of, with_trend
+from stiction_ros.survey.pages.unit import with_unit
+from stiction_ros.survey.pages.words import in_op_unit, period
 from stiction_ros.survey.survey import Survey
 
 needs_browser = pytest.mark.skipif(chromium() is None, reason="no Chromium is installed")
+
+EARLIER = (
+    Earlier("2023-11-02 03:04+00:00", {"FIC-101.A": 1.0, "OLD1": None}),
+    Earlier("2023-12-02 03:04+00:00", {"FIC-101.A": 2.0, "LIC7": 0.5, "OLD2": 2.0}),
+)
 
 COLUMNS = {"now": GAIN["now"], **{option["what"]: option for option in GAIN["options"]}}
 
@@ -37,7 +47,7 @@ def _survey() -> Survey:
 @pytest.fixture
 def list_file(tmp_path: Path) -> Path:
     page = tmp_path / "survey.html"
-    page.write_text(list_page(_survey(), {"FIC-101.A": [1.0, 2.0]}), encoding="utf-8")
+    page.write_text(list_page(_survey(), EARLIER), encoding="utf-8")
     return page
 
 
@@ -158,12 +168,103 @@ def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
 
 def test_a_trend_is_put_into_the_page_once(loop_file: Path) -> None:
     page = loop_file.read_text(encoding="utf-8")
-    once = with_trend(page, [1.0, 2.0])
-    assert "Band f_S + f_D: 1, 2" in once
-    twice = with_trend(once, [1.0, 2.0, 3.5])
-    assert "Band f_S + f_D: 1, 2, 3.5" in twice
-    assert twice.count("Earlier surveys") == 1
-    assert twice.endswith(page[-2000:])
+    for earlier, told in ((EARLIER[1:], "2 → 3 %"), (EARLIER, "1 → 3 %")):
+        trend = trend_of(entry("FIC-101.A"), earlier)
+        assert trend is not None
+        shown = with_trend(page, trend, 3.0)
+        assert f"Band f_S + f_D: {told}" in shown
+        assert "2023-12-02: 2, now: 3" in shown
+        assert with_trend(shown, trend, 3.0) == shown
+        assert shown.endswith(page[-2000:])
+
+
+def test_trends_have_figures_and_one_scale(list_file: Path) -> None:
+    source = list_file.read_text(encoding="utf-8")
+    assert "1 → 3 %" in source
+    assert 'title="2023-11-02: 1, 2023-12-02: 2, now: 3"' in source
+    heights = [part.split('"')[0].split(",")[-1] for part in source.split('<polyline points="')[1:]]
+    assert heights == ["2.0", "2.0"]  # both are as wide as the widest
+    assert "Gone since the survey of 2023-12-02: OLD2." in source
+    assert "New since the survey of 2023-12-02: &lt;b&gt;TIC&lt;/b&gt;, A_VERY" in source
+
+
+def test_the_list_says_what_is_saved_or_why_nothing_is(tmp_path: Path) -> None:
+    def gain(iae: float | None, note: str) -> dict[str, Any]:
+        return {"now": {"iae_per_hour": 2.0}, "service": {"iae_per_hour": iae, "note": note}}
+
+    disagree = "Simulated. The drawn loops do not agree on what it would bring."
+    repeat = "Not simulated: no more than 3 of 20 drawn loops repeat the record."
+    rest = {
+        "now": {"iae_per_hour": 2.0},
+        "retune": {"iae_per_hour": 2.0, "note": "No other tuning"},
+    }
+    rows = [
+        (gain(0.5, ""), "service", "−75 %"),
+        (gain(2.06, ""), "service", "+3 %"),
+        (gain(None, disagree), "service", "draws disagree"),
+        (gain(None, repeat), "service", "does not repeat"),
+        (None, "service", "not simulated"),
+        (rest, "retune", "none helps"),
+    ]
+    for given, what, said in rows:
+        assert in_words(entry("A", gain=given), what) == said
+    assert in_words(entry("A", "healthy"), "service") == ""
+    page = list_page(Survey("local", 1, 1.0, (entry("A", gain=rows[2][0]),), ()))
+    assert f'title="{disagree}">draws disagree' in page
+    assert "simulated: −75 % leaves a quarter" in page
+
+
+def test_every_heading_says_what_it_means(list_file: Path) -> None:
+    source = list_file.read_text(encoding="utf-8")
+    assert '<button type="button">' not in source.partition("</thead>")[0]
+    assert len(HINTS) == source.count('<button type="button" title="')
+
+
+def test_causes_have_one_wording(list_file: Path) -> None:
+    source = list_file.read_text(encoding="utf-8")
+    assert '<option value="disturbance">a wave from outside</option>' in source
+    assert ">a wave from outside</td>" in source
+    assert ">disturbance<" not in source
+
+
+def test_a_survey_in_which_nothing_was_judged_says_so() -> None:
+    failed = [Entry(name, (), Status.FAILED, "no") for name in "ABC"]
+    assert "<h1>3 of 3 could not be judged" in list_page(Survey("l", 1, 1.0, tuple(failed), ()))
+    some = Survey("l", 1, 1.0, (*failed, entry("D", "healthy")), ())
+    assert "<h1>No valve found among 4 loops; 3 could not be judged" in list_page(some)
+
+
+def test_an_op_in_its_own_unit_is_no_percent() -> None:
+    row = entry("A", op_unit="its own unit")
+    assert ">2 units</span>" in list_page(Survey("l", 1, 1.0, (row,), ()))
+    of = record()
+    page = loop_page(row, of, identification(of), None)
+    assert "has gone back by 3 units" in page
+    assert "takes 50 % of OP" in page
+    assert "OP, OP&#x27;s own unit" in page
+    assert (
+        in_op_unit("by 2 %, which is 5 % of OP's range", "%")
+        == "by 2 %, which is 5 % of OP's range"
+    )
+
+
+def test_the_page_of_a_loop_says_why_and_what_next(loop_file: Path) -> None:
+    source = loop_file.read_text(encoding="utf-8")
+    assert "rests until OP has gone back by 3 %, and then jumps by 1 % or more." in source
+    assert "Next: Have V1 serviced" in source
+
+
+def test_the_unit_of_pv_is_put_into_a_page(loop_file: Path) -> None:
+    of = record()
+    without = loop_page(entry("FIC-101.A"), of, identification(of), GAIN)
+    told = loop_page(entry("FIC-101.A"), of, identification(of), GAIN, "m³/h")
+    assert "PV units" in without
+    assert with_unit(without, "m³/h") == told
+
+
+def test_times_are_told_as_people_say_them() -> None:
+    said = [period(seconds) for seconds in (61.0, 600.0, 9000.0, 1_478_251.0)]
+    assert said == ["61 s", "10 min", "2.5 h", "17.1 d"]
 
 
 def test_an_empty_survey_says_so() -> None:

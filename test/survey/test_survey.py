@@ -12,8 +12,9 @@ from made import entry, identification, record, unreadable
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
-from stiction_ros.survey.engines.engine import Done, Task
-from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.engines.engine import Done, Task, lost
+from stiction_ros.survey.entry import Entry, Status
+from stiction_ros.survey.listing.headline import worked
 from stiction_ros.survey.listing.tables import HEAD, write_csv, write_xlsx
 from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.survey import Plan, survey
@@ -24,6 +25,9 @@ KEYS = {
     *("f_d_interval", "band_share", "travel_per_hour", "reversals_per_hour", "gain", "rank"),
     *("confidence", "group", "report"),
 }
+
+
+GAIN_IN_LIST = {"now": {"iae_per_hour": 2.0}, "service": {"iae_per_hour": 0.5, "note": ""}}
 
 
 class Counting:
@@ -84,6 +88,44 @@ def test_a_survey_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> No
     assert again.entries == found.entries
 
 
+class Losing(Counting):
+    """An engine whose worker dies with one loop."""
+
+    def run(self, tasks: Iterator[Task], options: SurveyOptions) -> Iterator[Done]:
+        for done in super().run(tasks, options):
+            ended = done.task.loop.name == "FIC001"
+            yield lost(done.task, "its worker ended", again=True) if ended else done
+
+
+def test_a_loop_whose_worker_died_is_tried_again(tmp_path: Path) -> None:
+    plan = Plan(SurveyOptions(), tmp_path)
+    first = survey(_loops(4), plan, Losing())
+    assert [e.name for e in first.entries if e.status is Status.FAILED] == ["FIC001"]
+    engine = Counting()
+    again = survey(_loops(4), dataclasses.replace(plan, resume=True), engine)
+    assert engine.given == ["FIC001"]
+    assert {e.status for e in again.entries} == {Status.OK}
+
+
+def test_a_folder_that_holds_a_survey_is_not_written_over(tmp_path: Path) -> None:
+    survey(_loops(2), Plan(SurveyOptions(), tmp_path), Counting())
+    before = (tmp_path / "loops.jsonl").read_bytes()
+    with pytest.raises(InputError, match="holds a survey; --resume goes on"):
+        survey(_loops(2), Plan(SurveyOptions(), tmp_path), Counting())
+    assert (tmp_path / "loops.jsonl").read_bytes() == before
+
+
+def test_units_that_are_given_later_come_onto_the_pages(tmp_path: Path) -> None:
+    survey(_loops(1), Plan(SurveyOptions(), tmp_path), Counting())
+    page = tmp_path / "loops" / "FIC000.html"
+    page.write_text('<b>2 <span class="unit">PV units</span></b>')
+    named = SurveyOptions(units=(("FIC000", "m³/h"),))
+    found = survey(_loops(1), Plan(named, tmp_path, resume=True), Counting())
+    assert page.read_text() == '<b>2 <span class="unit">m³/h</span></b>'
+    assert (found.before, found.to_json()["before"]) == (1, 1)
+    assert worked(found).startswith("1 loop, 0 of them in this run in ")
+
+
 def test_other_options_do_not_go_on_with_it(tmp_path: Path) -> None:
     survey(_loops(1), Plan(SurveyOptions(), tmp_path), Counting())
     other = Plan(SurveyOptions(gain=False), tmp_path, resume=True)
@@ -117,7 +159,7 @@ def test_an_entry_survives_json() -> None:
 def test_the_tables_hold_the_list(tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     rows = [
-        entry('FIC "1", ü', rank=1, gain={"now": {"iae_per_hour": 2.0}}),
+        entry('FIC "1", ü', rank=1, gain=GAIN_IN_LIST),
         dataclasses.replace(entry("B<&>"), verdict=None, reason="=1+1", f_s_interval=None, rank=2),
     ]
     write_csv(tmp_path / "l.csv", rows)
@@ -126,7 +168,9 @@ def test_the_tables_hold_the_list(tmp_path: Path) -> None:
         read = list(csv.reader(file))
     assert tuple(read[0]) == HEAD
     assert read[1][HEAD.index("loop")] == 'FIC "1", ü'
-    assert float(read[1][HEAD.index("IAE now")]) == 2.0
+    assert float(read[1][HEAD.index("|PV−SP| now")]) == 2.0
+    assert float(read[1][HEAD.index("|PV−SP| serviced %")]) == -75.0
+    assert read[1][HEAD.index("cycles by")] == "its valve"
     sheet = openpyxl.load_workbook(tmp_path / "l.xlsx")["loops"]
     values = list(sheet.values)
     assert tuple(values[0]) == HEAD

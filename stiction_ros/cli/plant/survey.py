@@ -9,22 +9,19 @@ import datetime
 import json
 import os
 import sys
-import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from stiction_ros.cli.loop.identify import delay_range
 from stiction_ros.cli.options.intake import add_columns, add_intake, intake_options, show_loops
 from stiction_ros.cli.output.as_json import write_json
-from stiction_ros.cli.output.progress import Bar, bar
+from stiction_ros.cli.plant.survey_list import print_list
+from stiction_ros.cli.plant.survey_progress import progress
 from stiction_ros.errors import InputError, storing
 
-SHOWN = 30
-"""Rows of the list that are printed."""
+LOCAL = "local"
+"""The engine of this machine."""
 
 NAMED = 8
 """Names that a remark lists."""
@@ -57,7 +54,7 @@ def add(commands: Any) -> None:
         "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (all cores)"
     )
     parser.add_argument(
-        "--engine", default="local", metavar="E", help="local, or dask://HOST:PORT (local)"
+        "--engine", default=LOCAL, metavar="E", help="local, or dask://HOST:PORT (local)"
     )
     parser.add_argument("--resume", action="store_true", help="go on with the survey in --out")
     parser.set_defaults(run=run)
@@ -95,28 +92,42 @@ def run(options: argparse.Namespace) -> int:
         options.resume,
         costs,
     )
-    trends = _trends(options.previous)
+    earlier = _earlier(options.previous)
     engine = _engine(options)
-    with bar("survey") as show:
-        found = survey(loops(paths, intake), plan, engine, _Forecast(show, paths))
+    again = loops(paths, intake) if options.engine == LOCAL else None
+    try:
+        with progress(again) as show:
+            found = survey(loops(paths, intake), plan, engine, show)
+    except KeyboardInterrupt:
+        if plan.out is not None:
+            print("survey: interrupted; --resume goes on", file=sys.stderr)
+        raise
     found = dataclasses.replace(
         found, date=datetime.datetime.now(datetime.UTC).isoformat(" ", "minutes")
     )
     for file, names in ((options.cost, costs), (options.units, units)):
         _tell_strangers(file, names, {entry.name for entry in found.entries})
     if plan.out is not None:
-        _write(found, plan.out, trends)
+        _write(found, plan.out, earlier)
     if options.json is not None:
         write_json(options.json, found.to_json())
     if options.json != "-":
-        _print(found)
-        if plan.out is not None:
-            print(f"list: {plan.out / PAGE}", file=sys.stderr)
-    return 0
+        print_list(found, earlier)
+    list_at = "no list and no page was written; --out DIR writes them"
+    if plan.out is not None:
+        list_at = f"list: {plan.out / PAGE}"
+    print(list_at, file=sys.stderr)
+    return _code(found)
+
+
+def _code(found: Any) -> int:
+    """Return the exit code: 1 where every loop failed."""
+    failed = sum(entry.status.value == "failed" for entry in found.entries)
+    return 1 if failed and failed == len(found.entries) else 0
 
 
 def _engine(options: argparse.Namespace) -> Any:
-    if options.engine == "local":
+    if options.engine == LOCAL:
         from stiction_ros.survey.engines.local import LocalEngine
 
         if options.jobs < 1:
@@ -133,50 +144,24 @@ def _engine(options: argparse.Namespace) -> Any:
     return DaskEngine(options.engine)
 
 
-class _Forecast:
-    """Shows how far a survey is, and how long the rest takes: by the bytes that are done."""
-
-    def __init__(self, show: Bar, paths: Sequence[Path]) -> None:
-        self._show, self._begun = show, time.monotonic()
-        self._total = sum(_size(path) for path in paths)
-        self._files: set[str] = set()
-        self._done = 0
-
-    def __call__(self, done: int, known: int, entry: Any) -> None:
-        for file in set(entry.files) - self._files:
-            self._files.add(file)
-            self._done += _size(Path(file))
-        share = min(self._done / max(self._total, 1), 1.0)
-        passed = time.monotonic() - self._begun
-        left = passed * (1.0 - share) / max(share, 1e-6)
-        self._show(share, f"{done} loops, about {_minutes(left)} left: {entry.name}")
-
-
-def _size(path: Path) -> int:
-    if path.is_dir():
-        return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-    return path.stat().st_size if path.exists() else 0
-
-
-def _minutes(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
-
-
-def _write(found: Any, out: Path, trends: Any) -> None:
+def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
+    from stiction_ros.survey.listing.columns import Columns
     from stiction_ros.survey.listing.page import list_page
     from stiction_ros.survey.listing.tables import write_csv, write_xlsx
-    from stiction_ros.survey.pages.loop_page import with_trend
+    from stiction_ros.survey.pages.trend import with_trend
 
     with storing(out):
-        (out / PAGE).write_text(list_page(found, trends), encoding="utf-8")
+        (out / PAGE).write_text(list_page(found, earlier), encoding="utf-8")
         write_csv(out / CSV, found.entries)
         write_xlsx(out / XLSX, found.entries)
+        columns = Columns.of(found.entries, earlier)
         for entry in found.entries:
-            past = trends.get(entry.name)
-            if entry.report is not None and past:
-                now = [] if entry.f_s is None else [entry.f_s + entry.f_d]
+            trend = columns.trends.get(entry.name)
+            if entry.report is not None and trend is not None:
                 page = out / entry.report
-                told = with_trend(page.read_text(encoding="utf-8"), [*past, *now])
+                told = with_trend(
+                    page.read_text(encoding="utf-8"), trend, columns.widest[entry.op_unit]
+                )
                 page.write_text(told, encoding="utf-8")
 
 
@@ -214,46 +199,24 @@ def _number(text: str, file: str | None) -> float:
     return value
 
 
-def _trends(files: Sequence[str]) -> dict[str, list[float]]:
-    """Return the bands of earlier surveys by loop, in the order of the files."""
-    found: dict[str, list[float]] = {}
+def _earlier(files: Sequence[str]) -> list[Any]:
+    """Return earlier surveys, in the order of the files."""
+    from stiction_ros.survey.pages.trend import Earlier
+
+    found = []
     for file in files:
         try:
             document = json.loads(Path(file).read_text(encoding="utf-8"))
-            for row in document["loops"]:
-                if row["f_s"] is not None and row["f_d"] is not None:
-                    found.setdefault(row["name"], []).append(row["f_s"] + row["f_d"])
+            bands = {row["name"]: _band(row) for row in document["loops"]}
+            found.append(Earlier(str(document.get("date", "")), bands))
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"cannot be read ({error})", where=file) from None
-        except (json.JSONDecodeError, KeyError, TypeError):
+        except (json.JSONDecodeError, KeyError, TypeError, AttributeError):
             raise InputError(
                 "is no result of a survey", where=file, fix="give what --json wrote"
             ) from None
     return found
 
 
-def _print(found: Any) -> None:
-    table = Table()
-    for name in ("rank", "loop", "verdict", "cause", "band", "f_S %", "confidence", "reason"):
-        table.add_column(name)
-    for entry in found.entries[:SHOWN]:
-        table.add_row(
-            str(entry.rank),
-            entry.name,
-            entry.verdict or entry.status.value,
-            entry.cause or "",
-            f"{100 * entry.band_share:.0f} %" if entry.found else "",
-            f"{entry.f_s:.3g}" if entry.found else "",
-            "" if entry.confidence is None else f"{entry.confidence:.2f}",
-            entry.reason,
-        )
-    console = Console()
-    console.print(table)
-    if len(found.entries) > SHOWN:
-        console.print(f"and {len(found.entries) - SHOWN} more")
-    for group in found.groups:
-        console.print(
-            f"group {group.number}, period {group.period:.3g} s: {', '.join(group.names)}"
-        )
-    rate = 60.0 * len(found.entries) / max(found.seconds, 1e-9)
-    console.print(f"{len(found.entries)} loops in {found.seconds:.0f} s, {rate:.0f} a minute")
+def _band(row: dict[str, Any]) -> float | None:
+    return None if row["f_s"] is None or row["f_d"] is None else float(row["f_s"] + row["f_d"])

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from stiction_ros import __version__
-from stiction_ros.survey.entry import Entry, Status
+from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.listing.columns import Columns
+from stiction_ros.survey.listing.headline import changed, headline, kind_of, worked
 from stiction_ros.survey.pages.frame import card, framed, text
-from stiction_ros.survey.pages.plot import spark
-from stiction_ros.survey.pages.words import CAUSES, figure, interval, percent, period
+from stiction_ros.survey.pages.trend import Earlier
+from stiction_ros.survey.pages.words import cause_words, period
 from stiction_ros.survey.survey import Survey
 
 SCRIPT = """
@@ -46,29 +48,26 @@ heads.forEach((head, column) => head.querySelector("button").addEventListener("c
 }));
 """
 
-Trends = Mapping[str, Sequence[float]]
-"""Band, f_S + f_D in %, of earlier surveys by loop, the oldest first."""
 
-
-def list_page(survey: Survey, trends: Trends | None = None) -> str:
+def list_page(survey: Survey, earlier: Sequence[Earlier] = ()) -> str:
     """Return the page.
 
     Args:
         survey: what was found.
-        trends: of earlier surveys; None where none are given.
+        earlier: surveys before it, the oldest first.
     """
-    entries, trends = survey.entries, trends or {}
-    found = [entry for entry in entries if entry.found]
-    first = f"{len(found)} valve{'s' * (len(found) != 1)} to look at" if found else "No valve found"
-    costs = any(entry.cost_per_hour is not None for entry in entries)
+    entries = survey.entries
+    first = headline(survey)
+    columns = Columns.of(entries, earlier)
     parts = [
-        f"<h1>{text(first)} among {len(entries)} loops</h1>",
+        f"<h1>{text(first)}</h1>",
         f'<p class="soft">{text(_how(survey))}</p>',
+        *[f'<p class="note">{text(line)}</p>' for line in changed(entries, earlier)],
         f'<div class="cards">{_counts(entries)}</div>',
         _tools(entries),
-        _table(entries, costs, trends),
+        _table(entries, columns),
         _groups(survey),
-        _legend(costs),
+        _legend(columns),
     ]
     return framed(f"Survey: {first}", parts, f"stiction_ros {__version__}", SCRIPT)
 
@@ -76,23 +75,19 @@ def list_page(survey: Survey, trends: Trends | None = None) -> str:
 def _how(survey: Survey) -> str:
     date = f"{survey.date}. " if survey.date else ""
     return (
-        f"{date}{len(survey.entries)} loops in {period(survey.seconds)} by {survey.workers} "
-        f"worker{'s' * (survey.workers != 1)} ({survey.engine})."
+        f"{date}{worked(survey)} by {survey.workers} worker{'s' * (survey.workers != 1)} "
+        f"({survey.engine})."
     )
-
-
-def _kind(entry: Entry) -> str:
-    return (entry.verdict or "") if entry.status is Status.OK else entry.status.value
 
 
 def _counts(entries: Sequence[Entry]) -> str:
     kinds = ("sticky", "backlash", "undecided", "healthy", "skipped", "failed")
-    counts = {kind: sum(_kind(entry) == kind for entry in entries) for kind in kinds}
+    counts = {kind: sum(kind_of(entry) == kind for entry in entries) for kind in kinds}
     return "".join(card(kind, str(count)) for kind, count in counts.items() if count)
 
 
 def _tools(entries: Sequence[Entry]) -> str:
-    kinds = list(dict.fromkeys(_kind(entry) for entry in entries))
+    kinds = list(dict.fromkeys(kind_of(entry) for entry in entries))
     causes = sorted({entry.cause for entry in entries if entry.cause})
     return (
         '<div class="tools"><input id="search" type="search" placeholder="Search tags, reasons" '
@@ -100,32 +95,31 @@ def _tools(entries: Sequence[Entry]) -> str:
         f'<select id="kind" aria-label="Verdict"><option value="">all verdicts</option>'
         f"{''.join(f'<option>{text(kind)}</option>' for kind in kinds)}</select>"
         f'<select id="cause" aria-label="Cause"><option value="">all causes</option>'
-        f"{''.join(f'<option>{text(cause)}</option>' for cause in causes)}</select>"
+        f"{''.join(_cause(cause) for cause in causes)}</select>"
         f'<span id="shown" class="soft" role="status">{len(entries)} loops</span></div>'
     )
 
 
-Column = tuple[str, str, str, object]
-"""Class, label, HTML and what it is sorted by."""
+def _cause(cause: str) -> str:
+    return f'<option value="{text(cause)}">{text(cause_words(cause))}</option>'
 
 
-def _table(entries: Sequence[Entry], costs: bool, trends: Trends) -> str:
+def _table(entries: Sequence[Entry], columns: Columns) -> str:
+    head = [
+        f'<th class="{kind}"><button type="button" title="{text(columns.hint(label))}">'
+        f"{text(label)}</button></th>"
+        for kind, label in columns.heads
+    ]
     rows = []
-    head: list[str] = []
     for entry in entries:
-        columns = _columns(entry, costs, trends)
-        if not head:
-            head = [
-                f'<th class="{kind}"><button type="button">{text(label)}</button></th>'
-                for kind, label, _, _ in columns
-            ]
         cells = "".join(
-            f'<td class="{kind}" data-label="{text(label)}" data-value="{text(_value(value))}">'
-            f"{shown}</td>"
-            for kind, label, shown, value in columns
+            f'<td class="{kind}" data-label="{text(label)}" data-value="{text(value)}">{shown}</td>'
+            for (kind, label), (shown, value) in zip(
+                columns.heads, columns.cells(entry), strict=True
+            )
         )
         rows.append(
-            f'<tr data-kind="{text(_kind(entry))}" data-cause="{text(entry.cause or "")}">'
+            f'<tr data-kind="{text(kind_of(entry))}" data-cause="{text(entry.cause or "")}">'
             f"{cells}</tr>"
         )
     if not rows:
@@ -134,69 +128,6 @@ def _table(entries: Sequence[Entry], costs: bool, trends: Trends) -> str:
         f'<table class="list"><thead><tr>{"".join(head)}</tr></thead>'
         f"<tbody>{''.join(rows)}</tbody></table>"
     )
-
-
-def _value(value: object) -> object:
-    return "" if value is None else f"{value:.9g}" if isinstance(value, float) else value
-
-
-def _columns(entry: Entry, costs: bool, trends: Trends) -> list[Column]:
-    cycle, gain = entry.oscillation, entry.gain or {}
-    name = text(entry.name)
-    if entry.report:
-        name = f'<a href="{text(entry.report)}">{name}</a>'
-    kind = _kind(entry)
-    found = entry.found
-    why = CAUSES.get(entry.cause or "none", "")
-    amplitude = None if cycle is None else cycle.amplitude
-    beat = None if cycle is None else cycle.period
-    columns: list[Column] = [
-        ("rank", "rank", text(entry.rank or ""), entry.rank),
-        ("t name", "loop", name, entry.name),
-        ("t s", "verdict", f'<span class="{kind}">{text(kind)}</span>', kind),
-        ("t", "cycles by", text(why), why),
-        ("", "band of OP", percent(entry.band_share) if found else "", entry.band_share),
-        ("", "f_S %", _friction(entry), entry.f_s if found else None),
-        ("", "confidence", percent(entry.confidence), entry.confidence),
-        ("s", "period", period(beat), beat),
-        ("", "amplitude", figure(amplitude), amplitude),
-        ("", "after service", *_share(gain, "service")),
-        ("", "embedding", *_share(gain, "embedding")),
-        ("", "retuned", *_share(gain, "retune")),
-    ]
-    if costs:
-        columns.append(("", "cost/h", figure(entry.cost_per_hour), entry.cost_per_hour))
-    if trends:
-        columns.append(("", "band before", *_trend(entry, trends)))
-    columns.append(("", "group", text(entry.group or ""), entry.group))
-    columns.append(("t wordy", "reason", text(entry.reason), entry.reason))
-    return columns
-
-
-def _friction(entry: Entry) -> str:
-    if not entry.found:
-        return ""
-    return f'<span title="{text(interval(entry.f_s_interval))}">{figure(entry.f_s)}</span>'
-
-
-def _share(gain: Mapping[str, object], what: str) -> tuple[str, float | None]:
-    """Return IAE under an option over that of now."""
-    now, option = gain.get("now"), gain.get(what)
-    if not isinstance(now, Mapping) or not isinstance(option, Mapping):
-        return "", None
-    before, after = now.get("iae_per_hour"), option.get("iae_per_hour")
-    if not before or after is None:
-        return "", None
-    return percent(after / before), float(after / before)
-
-
-def _trend(entry: Entry, trends: Trends) -> tuple[str, float | None]:
-    past = trends.get(entry.name)
-    if not past:
-        return "", None
-    now = [] if entry.f_s is None or entry.f_d is None else [entry.f_s + entry.f_d]
-    values = [*past, *now]
-    return spark(values), values[-1] - values[0]
 
 
 def _groups(survey: Survey) -> str:
@@ -222,13 +153,19 @@ def _groups(survey: Survey) -> str:
     )
 
 
-def _legend(costs: bool) -> str:
-    money = " Where a cost was given it weighs in." if costs else ""
+def _legend(columns: Columns) -> str:
+    money = " Where a cost was given it weighs in." if columns.costs else ""
+    gain = (
+        " <i>|PV−SP| serviced</i>, <i>embedding</i> and <i>retuned</i> say what a service, a "
+        "controller that knows the friction or another tuning changes of the mean |PV − SP|, "
+        "simulated: −75 % leaves a quarter of it. Where a word stands the record does not tell, "
+        "or nothing is gained; the page of the loop says more."
+        if columns.gains
+        else ""
+    )
     return (
         "<h2>How to read it</h2><p>Valves that stick or have backlash and make their loop cycle "
         "come first, those that are surest and lose most of OP's movement in their band at the "
         "top. Undecided ones follow in the order of what speaks for their friction."
-        f"{money} <i>After service</i>, <i>embedding</i> and <i>retuned</i> are what of the "
-        "IAE of now is left, simulated; where nothing stands the record does not tell, and the "
-        "page of the loop says why. There are all figures with their intervals.</p>"
+        f"{money}{gain} The page of a loop has all figures with their intervals.</p>"
     )

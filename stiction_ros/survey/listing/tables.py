@@ -10,6 +10,8 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.listing.saved import HEADS, change
+from stiction_ros.survey.pages.words import cause_words
 
 Cell = str | float | int | None
 
@@ -18,21 +20,20 @@ HEAD = (
     "loop",
     "status",
     "verdict",
-    "cause",
+    "cycles by",
     "confidence",
     "f_S",
     "f_S low",
     "f_S high",
     "f_D",
+    "unit of OP",
     "band share of OP",
     "period s",
     "amplitude",
-    "travel %/h",
+    "travel/h",
     "reversals/h",
-    "IAE now",
-    "IAE after service",
-    "IAE with embedding",
-    "IAE retuned",
+    "|PV−SP| now",
+    *(f"{head} %" for head in HEADS.values()),
     "cost per hour",
     "group",
     "reason",
@@ -85,31 +86,27 @@ def cells(entry: Entry) -> list[Cell]:
     cycle, gain = entry.oscillation, entry.gain or {}
     low, high = entry.f_s_interval or (None, None)
 
-    def iae(what: str) -> Cell:
-        measures = gain.get(what) or {}
-        value = measures.get("iae_per_hour")
-        return None if value is None else float(value)
-
+    now = (gain.get("now") or {}).get("iae_per_hour")
+    changes = [change(entry, what) for what in HEADS]
     return [
         entry.rank,
         entry.name,
         entry.status.value,
         entry.verdict,
-        entry.cause,
+        cause_words(entry.cause) or None,
         entry.confidence,
         entry.f_s,
         low,
         high,
         entry.f_d,
+        None if entry.f_s is None else entry.op_unit,
         entry.band_share,
         None if cycle is None else cycle.period,
         None if cycle is None else cycle.amplitude,
         entry.travel_per_hour,
         entry.reversals_per_hour,
-        iae("now"),
-        iae("service"),
-        iae("embedding"),
-        iae("retune"),
+        None if now is None else float(now),
+        *(None if one is None else 100.0 * one for one in changes),
         entry.cost_per_hour,
         entry.group,
         entry.reason or None,

@@ -19,7 +19,7 @@ body { margin: 0; background: var(--paper); color: var(--ink);
 main { max-width: 1600px; margin: 0 auto; padding: 28px 20px 60px; }
 h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 4px; }
 h2 { font-size: 1.15rem; margin: 34px 0 8px; }
-p { margin: 8px 0; max-width: 80ch; }
+p { margin: 8px 0; max-width: 80ch; overflow-wrap: anywhere; }
 a { color: var(--pv); }
 .soft, footer { color: var(--soft); font-size: .9rem; }
 footer { margin-top: 44px; }
@@ -45,7 +45,7 @@ td.t, th.t { text-align: left; }
 td.name, td.wordy { overflow-wrap: anywhere; } td.wordy { min-width: 20ch; }
 table.list { font-size: .84rem; }
 td.name { min-width: 14ch; font-weight: 600; }
-td.s { white-space: nowrap; }
+td.s, td.trend { white-space: nowrap; }
 .sticky, .backlash, .failed { color: var(--bad); font-weight: 600; }
 .healthy { color: var(--good); } .undecided, .skipped { color: var(--open); }
 .note { border-left: 4px solid var(--open); background: var(--panel); padding: 8px 12px;
@@ -84,7 +84,7 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   table.list td:not(.name):not(:empty)::before { content: attr(data-label) " ";
     color: var(--soft); font-weight: 400; }
   table.list td:empty { display: none; }
-  table.list td.name, table.list td.wordy { grid-column: 1 / -1; }
+  table.list td.name, table.list td.wordy, table.list td.trend { grid-column: 1 / -1; }
   table.list td.wordy::before { content: none; }
   .plot[data-low] text { font-size: 24px; }
   table.list td.rank { order: 1; } table.list td { order: 2; } table.list td.name { order: 0; }
@@ -131,4 +131,9 @@ def text(value: object) -> str:
 
 def card(what: str, big: str) -> str:
     """Return a box with one figure."""
-    return f'<div class="card"><b>{text(big)}</b>{text(what)}</div>'
+    return marked_card(what, text(big))
+
+
+def marked_card(what: str, big: str) -> str:
+    """Return a box with one figure that is HTML."""
+    return f'<div class="card"><b>{big}</b>{text(what)}</div>'

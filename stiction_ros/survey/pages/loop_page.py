@@ -10,11 +10,22 @@ import numpy as np
 from stiction_ros import __version__
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification
+from stiction_ros.identification.answer.words import materiality, next_step, why
 from stiction_ros.records.record import Record
 from stiction_ros.survey.entry import Entry
-from stiction_ros.survey.pages.frame import card, framed, text
-from stiction_ros.survey.pages.plot import SCRIPT, Curve, against, over_time, spark
-from stiction_ros.survey.pages.words import CAUSES, figure, interval, percent, period
+from stiction_ros.survey.pages.frame import card, framed, marked_card, text
+from stiction_ros.survey.pages.plot import SCRIPT, Curve, against, over_time
+from stiction_ros.survey.pages.trend import PLACE
+from stiction_ros.survey.pages.unit import unit_mark
+from stiction_ros.survey.pages.words import (
+    PERCENT,
+    cause_words,
+    figure,
+    in_op_unit,
+    interval,
+    percent,
+    period,
+)
 
 HEADLINES = {
     "sticky": "The valve sticks",
@@ -31,8 +42,6 @@ OPTIONS = {
 }
 
 LIST = "../survey.html"
-TREND = "<!-- trend --><!-- /trend -->"
-"""Where it stands how the loop did in earlier surveys, which no worker knows."""
 
 
 def loop_page(
@@ -52,8 +61,7 @@ def loop_page(
         unit: of PV; empty where none was given.
     """
     headline = HEADLINES.get(entry.verdict or "", "Not judged")
-    pv_unit = f" {unit}" if unit else ""
-    op_unit = "% of travel" if entry.op_unit == "%" else entry.op_unit
+    op_unit = "% of travel" if entry.op_unit == PERCENT else "OP's own unit"
     cycle = entry.oscillation
     cards = [
         card(f"friction f_S, {op_unit}", figure(entry.f_s) or "–"),
@@ -61,11 +69,11 @@ def loop_page(
         card(f"sliding friction f_D, {op_unit}", figure(entry.f_d) or "–"),
         card("of what OP moves is lost in the band", percent(entry.band_share) or "–"),
         card("confidence", percent(entry.confidence) or "–"),
-        card("why it cycles", CAUSES.get(entry.cause or "none") or "no cycle"),
+        card("why it cycles", cause_words(entry.cause or "none")),
     ]
     if cycle is not None and cycle.period is not None:
         cards.append(card("period of the cycle", period(cycle.period)))
-        cards.append(card("its amplitude", f"{figure(cycle.amplitude)}{pv_unit}"))
+        cards.append(marked_card("its amplitude", f"{figure(cycle.amplitude)} {unit_mark(unit)}"))
     sentence = next((o.cause.sentence for o in found.outputs if o.cause is not None), "")
     reason = found.reason
     parts = [
@@ -74,40 +82,30 @@ def loop_page(
         f'<p class="soft">{text(_span(record))}</p>',
         f'<p class="note warn">The fit is not to be trusted: {text(reason)}</p>' if reason else "",
         f"<p>{text(sentence)}</p>" if sentence else "",
-        *[f"<p>{text(valve.experiment)}</p>" for valve in found.valves if valve.experiment],
+        *[f"<p>{text(said)}</p>" for said in _answers(found, entry.op_unit)],
         f'<div class="cards">{"".join(cards)}</div>',
-        TREND,
-        gain_table(gain, unit),
+        PLACE,
+        gain_table(gain, unit, op_unit),
         *_figures(record, found, unit, op_unit),
         _notes(entry),
     ]
     return framed(f"{entry.name}: {headline}", parts, f"stiction_ros {__version__}", SCRIPT)
 
 
-def with_trend(page: str, bands: Sequence[float]) -> str:
-    """Return a page with the band of earlier surveys and of this one, the oldest first, in it.
-
-    Args:
-        page: HTML of a loop, with a trend or without.
-        bands: f_S + f_D, in the unit of OP.
-    """
-    begin, end = TREND.split("><")
-    begin, end = f"{begin}>", f"<{end}"
-    before, found, rest = page.partition(begin)
-    if not found:
-        return page
-    told = ", ".join(figure(band) for band in bands)
-    shown = f"<h2>Earlier surveys</h2><p>Band f_S + f_D: {told} {spark(bands)}</p>"
-    return f"{before}{begin}{shown}{end}{rest.partition(end)[2]}"
+def _answers(found: Identification, op_unit: str) -> list[str]:
+    """Return what ``identify`` says of each valve: why, how much it matters, what to do next."""
+    told = []
+    for j, valve in enumerate(found.valves):
+        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
+        told.append(in_op_unit(" ".join(filter(None, said)), op_unit))
+    return told
 
 
-def gain_table(gain: Mapping[str, Any] | None, unit: str) -> str:
+def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
     """Return what would help as a table; nothing where it was not simulated."""
     if gain is None:
         return ""
-    of_pv = f", {unit}" if unit else ""
-    work = ("travel %/h", "moves/h", "reversals/h")
-    head = ("", f"amplitude{of_pv}", f"IAE per hour{of_pv}", *work, "")
+    head = ("", "amplitude", "mean |PV−SP|", "travel/h", "moves/h", "reversals/h", "")
     keys = (
         "amplitude",
         "iae_per_hour",
@@ -118,12 +116,13 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str) -> str:
     rows = [_gain_row("now", gain["now"], head, keys, "")]
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")
-        between = f" IAE {interval((ends[0], ends[1]))}." if ends else ""
+        between = f" Mean |PV−SP| {interval((ends[0], ends[1]))}." if ends else ""
         name = OPTIONS[option["what"]]
         rows.append(_gain_row(name, option, head, keys, option["note"] + between))
     titles = "".join(f"<th>{text(title)}</th>" for title in head)
     return (
-        "<h2>What would help, simulated</h2><table class='list'><thead><tr>"
+        f"<h2>What would help, simulated</h2><p class='soft'>Amplitude and mean |PV−SP| in "
+        f"{unit_mark(unit)}, travel in {text(op_unit)}.</p><table class='list'><thead><tr>"
         f"{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
@@ -155,20 +154,20 @@ def _figures(record: Record, found: Identification, unit: str, op_unit: str) -> 
         curves = [Curve(f"{name}, measured", "pv", record.pv[:, i])]
         if record.sp is not None:
             curves.append(Curve("set-point", "sp", record.sp[:, i]))
-        axis = f"{name} ({unit or 'PV units'})"
+        axis = f"{text(name)} ({unit_mark(unit)})"
         drawn.append(over_time(f"{name} and its set-point.", time, word, curves, axis))
     known = found.stem.shape == record.op.shape
     for j, name in enumerate(record.valves):
         curves = [Curve(f"{name}, controller output", "op", record.op[:, j])]
         if known:
             curves.append(Curve("stem, estimated", "stem", found.stem[:, j], steps=True))
-        drawn.append(over_time(f"{name} and its stem.", time, word, curves, op_unit))
+        drawn.append(over_time(f"{name} and its stem.", time, word, curves, text(op_unit)))
         if known:
             title = (
                 f"Stem of {name} against OP: a valve that sticks rests on level lines and then "
                 "jumps, a healthy one stays on the diagonal."
             )
-            drawn.append(against(title, record.op[:, j], found.stem[:, j]))
+            drawn.append(against(title, record.op[:, j], found.stem[:, j], op_unit))
     return ["<h2>Signals</h2>", *drawn]
 
 

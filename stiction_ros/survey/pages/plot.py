@@ -92,7 +92,7 @@ def over_time(title: str, time: FloatArray, unit: str, curves: Sequence[Curve], 
         time: shape (N,), increasing.
         unit: of time.
         curves: values that are not finite leave a gap.
-        axis: name and unit of what goes up.
+        axis: name and unit of what goes up, HTML.
     """
     low, high = _range([curve.values for curve in curves])
     wide, tall = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
@@ -122,7 +122,7 @@ def over_time(title: str, time: FloatArray, unit: str, curves: Sequence[Curve], 
     )
     return (
         f'<figure class="plot" data-low="{begin:.9g}" data-high="{end:.9g}" data-left="{LEFT}" '
-        f'data-wide="{wide}"><div class="key">{keys}<span class="soft">{text(axis)}</span></div>'
+        f'data-wide="{wide}"><div class="key">{keys}<span class="soft">{axis}</span></div>'
         f'<button type="button" hidden>whole record</button>'
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{text(title)}">'
         f'{"".join(grid)}<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{tall}" '
@@ -134,8 +134,8 @@ def over_time(title: str, time: FloatArray, unit: str, curves: Sequence[Curve], 
     )
 
 
-def against(title: str, op: FloatArray, stem: FloatArray) -> str:
-    """Return the figure of the stem against OP, shape (N,) each, %."""
+def against(title: str, op: FloatArray, stem: FloatArray, unit: str = "%") -> str:
+    """Return the figure of the stem against OP, shape (N,) each, in ``unit``."""
     low, high = _range([op, stem])
     side = 300
     scale = (side - 52) / (high - low)
@@ -159,17 +159,17 @@ def against(title: str, op: FloatArray, stem: FloatArray) -> str:
         f'aria-label="{text(title)}"><rect class="frame" x="46" y="6" width="{inside}" '
         f'height="{inside}"/><polyline class="diagonal" points="{place(ends, ends)}"/>'
         f'<polyline class="stem" points="{place(op[kept], stem[kept])}"/>{labels}'
-        f'<text x="{side / 2 + 20}" y="{side - 8}" text-anchor="middle">OP %</text></svg>'
+        f'<text x="{side / 2 + 20}" y="{side - 8}" text-anchor="middle">OP, {text(unit)}</text>'
+        "</svg>"
         f"<figcaption>{text(title)}</figcaption></figure>"
     )
 
 
-def spark(values: Sequence[float]) -> str:
-    """Return a small line without axes."""
+def spark(values: Sequence[float], most: float) -> str:
+    """Return a small line without axes, from 0 to ``most``: lines of one scale compare."""
     numbers = np.asarray(values, dtype=float)
-    low, high = float(numbers.min()), float(numbers.max())
     x = np.linspace(2.0, 90.0, len(numbers))
-    y = 20.0 - 18.0 * (numbers - low) / max(high - low, 1e-12) if high > low else 11.0 + 0.0 * x
+    y = 20.0 - 18.0 * np.clip(numbers / max(most, 1e-12), 0.0, 1.0)
     said = ", ".join(f"{value:.3g}" for value in numbers)
     return (
         f'<svg class="spark" viewBox="0 0 92 22" role="img" aria-label="{said}">'

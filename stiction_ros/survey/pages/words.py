@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 
 CAUSES = {
     "valve": "its valve",
     "tuning": "its tuning",
     "disturbance": "a wave from outside",
     "set_point": "its set-point",
-    "none": "",
+    "none": "no cycle",
     "unknown": "not explained",
 }
+"""Cause of a cycle as people read it, wherever they do."""
+
+PERCENT = "%"
+"""Unit of an OP that is known; another one is the loop's own and has no name."""
 
 
 def figure(value: float | None, digits: int = 3) -> str:
@@ -28,11 +33,43 @@ def percent(share: float | None) -> str:
     return "" if share is None or not math.isfinite(share) else f"{100.0 * share:.0f} %"
 
 
+def signed_percent(change: float) -> str:
+    """Return a change as whole percent with its sign."""
+    whole = round(100.0 * change)
+    return f"{whole:+d} %".replace("-", "−") if whole else "0 %"
+
+
+def op_figure(value: float | None, op_unit: str) -> str:
+    """Return a figure with the unit of OP behind it; nothing where there is none.
+
+    Args:
+        value: in the unit of OP.
+        op_unit: %, or the loop's own.
+    """
+    shown = figure(value)
+    return shown and f"{shown} {'%' if op_unit == PERCENT else 'units'}"
+
+
+def in_op_unit(sentence: str, op_unit: str) -> str:
+    """Return a sentence whose % of OP are units where OP has its own; shares ``% of`` stay.
+
+    Args:
+        sentence: as identification says it.
+        op_unit: %, or the loop's own.
+    """
+    return sentence if op_unit == PERCENT else re.sub(r"(\d) %(?! of\b)", r"\1 units", sentence)
+
+
+def cause_words(cause: str | None) -> str:
+    """Return what a loop cycles by; nothing where that is not known."""
+    return "" if cause is None else CAUSES.get(cause, cause)
+
+
 def period(seconds: float | None) -> str:
     """Return a time as people say it; nothing where there is none."""
     if seconds is None or not math.isfinite(seconds):
         return ""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
+    for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.3g} {unit}"
     return f"{seconds:.3g} s"

@@ -6,7 +6,11 @@ from pathlib import Path
 import pytest
 
 from stiction_ros.cli.main import main
+from stiction_ros.cli.plant.survey_progress import Counted, Forecast, Lines
+from stiction_ros.survey import survey as surveying
 from stiction_ros.survey.engines import dask as dask_engine
+from stiction_ros.survey.entry import Entry, Status
+from stiction_ros.survey.survey import Reached
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +77,64 @@ def test_what_cannot_be_done_is_said_in_one_line(
     error = capsys.readouterr().err.strip()
     assert said in error
     assert len(error.splitlines()) == 1
+
+
+def test_nothing_judged_is_a_failure_and_nothing_written_is_told(
+    exports: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _code(["survey", str(exports / "FIC2.csv"), "--jobs", "1"]) == 1
+    told = capsys.readouterr()
+    assert "1 of 1 could not be judged" in told.out
+    assert "no list and no page was written" in told.err
+
+
+def test_an_interrupt_says_how_to_go_on(
+    exports: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(surveying, "survey", interrupted)
+    assert _code(["survey", str(exports), "--out", str(tmp_path)]) == 130
+    assert "interrupted; --resume goes on" in capsys.readouterr().err
+
+
+def test_a_forecast_goes_by_the_loops_of_this_run() -> None:
+    now, told = [0.0], []
+    entry = Entry("FIC1", (), Status.OK)
+    forecast = Forecast(
+        lambda share, words: told.append((share, words)), lambda: 60, lambda: now[0]
+    )
+    forecast(Reached(50, 50, 50, entry))
+    now[0] = 20.0
+    forecast(Reached(52, 50, 54, entry))
+    forecast(Reached(60, 50, 60, entry))
+    assert told[0] == (50 / 60, "50 of 60 loops: FIC1")
+    assert told[1] == (52 / 60, "52 of 60 loops, about 80 s left: FIC1")
+    assert told[2] == (1.0, "60 of 60 loops: FIC1")
+
+
+def test_a_file_gets_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    now = [0.0]
+    lines = Lines(lambda: now[0])
+    for done in range(1, 101):
+        lines(done / 200, f"{done}")
+    now[0] = 31.0
+    lines(0.501, "later")
+    assert capsys.readouterr().err.split("\n") == [
+        *(f"survey: {done}" for done in (20, 40, 60, 80, 100)),
+        "survey: later",
+        "",
+    ]
+
+
+def test_loops_are_counted_beside_the_work() -> None:
+    counted = Counted(range(7))
+    counted.end()
+    assert counted.total in (7, None)
 
 
 def test_a_path_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,163 @@
+"""The columns of the list: heading, what it means, and the cells of a loop."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.listing.headline import kind_of
+from stiction_ros.survey.listing.saved import HEADS, change, in_words, note_of
+from stiction_ros.survey.pages.frame import text
+from stiction_ros.survey.pages.trend import Earlier, Trend, trend_of, widest
+from stiction_ros.survey.pages.words import (
+    cause_words,
+    figure,
+    interval,
+    op_figure,
+    percent,
+    period,
+)
+
+TREND = "band before"
+
+HINTS = {
+    "rank": "what to service first",
+    "loop": "its tag, or the name of its file",
+    "verdict": "what was found of the valve, or how far the loop came",
+    "cycles by": "what makes the loop cycle",
+    "band of OP": "share of OP's movement that is lost in the band f_S + f_D",
+    "f_S": "static friction, in % of travel, or in units of an OP that has its own",
+    "confidence": "how sure the verdict is",
+    "period": "of the cycle of PV − SP",
+    "amplitude": "of the cycle of PV − SP, in units of PV",
+    HEADS["service"]: "change of the mean |PV − SP| by a service of the valve, simulated",
+    HEADS["embedding"]: "change of the mean |PV − SP| by a controller that knows the friction, "
+    "simulated",
+    HEADS["retune"]: "change of the mean |PV − SP| by another tuning, simulated",
+    "cost/h": "what the cycle costs an hour",
+    TREND: "band f_S + f_D in the first survey and now; lines are drawn from 0 to the widest band",
+    "group": "loops of one number cycle together",
+    "reason": "why a loop was not judged",
+}
+"""What stands under a heading."""
+
+Cell = tuple[str, object]
+"""HTML, and what it is sorted by; None stands last."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Columns:
+    """Which columns a list has.
+
+    Attributes:
+        costs, gains: whether a loop has one.
+        trends: of the loops that an earlier survey has, by name.
+        earlier: whether there was an earlier survey.
+        widest: end of the scale of the trends by unit of OP.
+    """
+
+    costs: bool
+    gains: bool
+    trends: Mapping[str, Trend]
+    earlier: bool
+    widest: Mapping[str, float]
+
+    @classmethod
+    def of(cls, entries: Sequence[Entry], earlier: Sequence[Earlier]) -> Columns:
+        """Return the columns of a list.
+
+        Args:
+            entries: its rows.
+            earlier: surveys before it, the oldest first.
+        """
+        found = {entry.name: trend_of(entry, earlier) for entry in entries}
+        trends = {name: trend for name, trend in found.items() if trend is not None}
+        units = {entry.op_unit for entry in entries}
+        return cls(
+            any(entry.cost_per_hour is not None for entry in entries),
+            any(entry.gain for entry in entries),
+            trends,
+            bool(earlier),
+            {unit: widest(trends.values(), unit) for unit in units},
+        )
+
+    @property
+    def heads(self) -> list[tuple[str, str]]:
+        """Class and heading of each column."""
+        return [
+            ("rank", "rank"),
+            ("t name", "loop"),
+            ("t s", "verdict"),
+            ("t", "cycles by"),
+            ("", "band of OP"),
+            ("s", "f_S"),
+            ("", "confidence"),
+            ("s", "period"),
+            ("", "amplitude"),
+            *(("", head) for head in HEADS.values() if self.gains),
+            *([("", "cost/h")] if self.costs else []),
+            *([("trend", TREND)] if self.earlier else []),
+            ("", "group"),
+            ("t wordy", "reason"),
+        ]
+
+    @staticmethod
+    def hint(label: str) -> str:
+        """Return what stands under a heading."""
+        return HINTS[label]
+
+    def cells(self, entry: Entry) -> list[tuple[str, str]]:
+        """Return what each column shows of a loop, and what it is sorted by."""
+        cycle, why = entry.oscillation, cause_words(entry.cause)
+        found: list[Cell] = [
+            (text(entry.rank or ""), entry.rank),
+            (_name(entry), entry.name),
+            (f'<span class="{kind_of(entry)}">{text(kind_of(entry))}</span>', kind_of(entry)),
+            (text(why), why),
+            (percent(entry.band_share) if entry.found else "", entry.band_share),
+            (_friction(entry), entry.f_s if entry.found else None),
+            (percent(entry.confidence), entry.confidence),
+            _figure(None if cycle is None else cycle.period, period),
+            _figure(None if cycle is None else cycle.amplitude, figure),
+            *(_saved(entry, what) for what in HEADS if self.gains),
+            *([_figure(entry.cost_per_hour, figure)] if self.costs else []),
+            *([self._trend(entry)] if self.earlier else []),
+            (text(entry.group or ""), entry.group),
+            (text(entry.reason), entry.reason),
+        ]
+        return [(shown, _value(value)) for shown, value in found]
+
+    def _trend(self, entry: Entry) -> Cell:
+        trend = self.trends.get(entry.name)
+        if trend is None:
+            return "", None
+        line = trend.line(self.widest[entry.op_unit])
+        return f'<span title="{text(trend.told)}">{text(trend.words)} {line}</span>', trend.change
+
+
+def _figure(value: float | None, words: Callable[[float | None], str]) -> Cell:
+    return words(value), value
+
+
+def _name(entry: Entry) -> str:
+    name = text(entry.name)
+    return f'<a href="{text(entry.report)}">{name}</a>' if entry.report else name
+
+
+def _friction(entry: Entry) -> str:
+    if not entry.found:
+        return ""
+    between, shown = interval(entry.f_s_interval), op_figure(entry.f_s, entry.op_unit)
+    return f'<span title="{text(between)}">{text(shown)}</span>'
+
+
+def _saved(entry: Entry, what: str) -> Cell:
+    shown, note = in_words(entry, what), note_of(entry, what)
+    if not shown:
+        return "", None
+    return f'<span title="{text(note)}">{text(shown)}</span>', change(entry, what)
+
+
+def _value(value: object) -> str:
+    return "" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,116 @@
+"""How the bands of loops went over earlier surveys."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+
+from stiction_ros.survey.entry import Entry
+from stiction_ros.survey.pages.frame import text
+from stiction_ros.survey.pages.plot import spark
+from stiction_ros.survey.pages.words import figure, op_figure
+
+PLACE = "<!-- trend --><!-- /trend -->"
+"""Where a page says how its loop did in earlier surveys, which no worker knows."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Earlier:
+    """An earlier survey.
+
+    Attributes:
+        date: when it was done, ISO; empty when it does not say.
+        bands: f_S + f_D of its loops in the unit of OP; None where it has none.
+    """
+
+    date: str
+    bands: Mapping[str, float | None]
+
+    @property
+    def day(self) -> str:
+        """Return its date without the time of day, or that it is earlier."""
+        return self.date[:10] or "earlier"
+
+
+@dataclasses.dataclass(frozen=True)
+class Trend:
+    """The band of one loop, the oldest first: when, and how wide."""
+
+    entry: Entry
+    steps: tuple[tuple[str, float], ...]
+
+    @property
+    def change(self) -> float:
+        """Return by how much the band grew, in the unit of OP."""
+        return self.steps[-1][1] - self.steps[0][1]
+
+    @property
+    def words(self) -> str:
+        """Return the first and the last band."""
+        first, last = figure(self.steps[0][1]), op_figure(self.steps[-1][1], self.entry.op_unit)
+        return last if len(self.steps) == 1 else f"{first} → {last}"
+
+    @property
+    def told(self) -> str:
+        """Return every band with its date."""
+        return ", ".join(f"{day}: {figure(band)}" for day, band in self.steps)
+
+    def line(self, most: float) -> str:
+        """Return the small line of the bands as HTML, from 0 to ``most``."""
+        return spark([band for _, band in self.steps], most)
+
+
+def trend_of(entry: Entry, earlier: Sequence[Earlier]) -> Trend | None:
+    """Return the trend of a loop; None where no earlier survey has its band.
+
+    Args:
+        entry: row of the loop now.
+        earlier: surveys, the oldest first.
+    """
+    steps = [(one.day, band) for one in earlier if (band := one.bands.get(entry.name)) is not None]
+    if not steps:
+        return None
+    if entry.f_s is not None and entry.f_d is not None:
+        steps.append(("now", entry.f_s + entry.f_d))
+    return Trend(entry, tuple(steps))
+
+
+def widest(trends: Iterable[Trend | None], op_unit: str) -> float:
+    """Return the widest band of all trends in one unit of OP: the end of their common scale."""
+    kept = [trend for trend in trends if trend is not None and trend.entry.op_unit == op_unit]
+    return max((band for trend in kept for _, band in trend.steps), default=0.0)
+
+
+def new_and_gone(
+    entries: Iterable[Entry], earlier: Sequence[Earlier]
+) -> tuple[list[str], list[str]]:
+    """Return the loops that the last survey did not have, and those that are no longer there.
+
+    Args:
+        entries: rows of now.
+        earlier: surveys, the oldest first.
+    """
+    if not earlier:
+        return [], []
+    now, before = {entry.name for entry in entries}, set(earlier[-1].bands)
+    return sorted(now - before), sorted(before - now)
+
+
+def with_trend(page: str, trend: Trend, most: float) -> str:
+    """Return a page with a trend in it, whether there was one or not.
+
+    Args:
+        page: HTML of a loop.
+        trend: of it.
+        most: end of the scale.
+    """
+    begin, end = PLACE.split("><")
+    begin, end = f"{begin}>", f"<{end}"
+    before, found, rest = page.partition(begin)
+    if not found:
+        return page
+    shown = (
+        f"<h2>Earlier surveys</h2><p>Band f_S + f_D: {text(trend.words)} {trend.line(most)} "
+        f'<span class="soft">{text(trend.told)}</span></p>'
+    )
+    return f"{before}{begin}{shown}{end}{rest.partition(end)[2]}"
