@@ -24,6 +24,7 @@ from stiction_ros.intake.repairs import (
     without_outliers,
 )
 from stiction_ros.intake.reported import is_reported, on_grid
+from stiction_ros.intake.shown import columns_of, modes_of, spreads_of
 from stiction_ros.intake.tables.block import Block, joined
 from stiction_ros.records.record import Record
 from stiction_ros.records.whole import Source, Whole
@@ -72,22 +73,45 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     block = without_outliers(block, rules)
     unit = "its own unit"
     if not options.as_given:
-        block, unit, note = in_percent(block, options.op_unit or found.op_unit)
+        block, unit, note = in_percent(block, options.op_unit or found.op_unit, named=found.named)
         rules.told.extend([note] if note else [])
         if not found.named:
             refuse_swapped(block)
     parts: list[Record] = []
     for run in in_order(block, rules):
-        parts += _records(manual_marked(run, rules, options.automatic), found, options, rules)
+        run = manual_marked(run, rules, options.automatic, told=not options.as_given)
+        parts += _records(run, found, options, rules)
     notes = list(dict.fromkeys((*notes, *rules.told)))
     whole = tuple(dataclasses.replace(part, notes=(*notes, *part.notes)) for part in parts)
     every = tuple(dict.fromkeys(note for part in whole for note in part.notes))
-    columns = {
-        f"{key.signal.upper()} {key.tag}".strip(): column.name
-        for one in found.blocks
-        for key, column in one.columns.items()
-    }
-    return Loop(found.name, found.files, whole, every, None, columns, unit)
+    return Loop(
+        found.name,
+        found.files,
+        whole,
+        every,
+        columns=columns_of(found.blocks),
+        op_unit=unit,
+        spreads=spreads_of(found.blocks),
+        modes=modes_of(found.blocks, rules.modes),
+    )
+
+
+def unread(found: Found, problem: str) -> Loop:
+    """Return a loop that cannot be made into records, with what stands in its columns.
+
+    Args:
+        found: as read.
+        problem: why, and what helps.
+    """
+    return Loop(
+        found.name,
+        found.files,
+        (),
+        problem=problem,
+        columns=columns_of(found.blocks),
+        spreads=spreads_of(found.blocks),
+        modes=modes_of(found.blocks, {}),
+    )
 
 
 def _refuse_incomplete(found: Found) -> None:

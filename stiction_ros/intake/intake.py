@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.assembly import Found, loop_of
+from stiction_ros.intake.assembly import Found, loop_of, unread
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.options import IntakeOptions
 from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
 from stiction_ros.intake.sheets.typed import open_sheets
+from stiction_ros.intake.shown import spreads_of_records
 from stiction_ros.intake.tables.block import Block
 from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
@@ -147,7 +148,7 @@ def _bags(path: Path, options: IntakeOptions) -> Iterator[Loop]:
             yield Loop(name, (path,), (), problem=str(read))
             continue
         notes = tuple(dict.fromkeys(note for part in read for note in part.notes))
-        yield Loop(name, (path,), read, notes)
+        yield Loop(name, (path,), read, notes, spreads=spreads_of_records(read))
 
 
 def _with_names_of_their_own(found: Iterator[Loop]) -> Iterator[Loop]:
@@ -213,4 +214,4 @@ def _read(group: Sequence[_Table], options: IntakeOptions, tags: TagList | None)
         try:
             yield loop_of(found, options)
         except InputError as error:
-            yield Loop(name, found.files, (), problem=str(error))
+            yield unread(found, str(error))

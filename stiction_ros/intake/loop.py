@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 
+from stiction_ros.intake.shown import Spread
 from stiction_ros.records.parts import span
 from stiction_ros.records.record import Record
 
@@ -24,6 +25,9 @@ class Loop:
         problem: why it cannot be read and what helps, one sentence; None when it can be.
         columns: signal to the column or tag that it was read from.
         op_unit: what OP is in; OP of a share or a current has been brought to %.
+        spreads: signal to the least, median and largest number of its column, in the column's own
+            unit; of bags OP in %.
+        modes: words of the mode, each with its count and what it is taken for.
     """
 
     name: str
@@ -33,6 +37,8 @@ class Loop:
     problem: str | None = None
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
     op_unit: str = "%"
+    spreads: Mapping[str, Spread] = dataclasses.field(default_factory=dict)
+    modes: tuple[str, ...] = ()
 
     @property
     def summary(self) -> str:

@@ -38,7 +38,9 @@ def mode_column(block: Block) -> tuple[Key, Column] | None:
     return next(((k, c) for k, c in block.columns.items() if k.signal == "mode"), None)
 
 
-def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None) -> Block:
+def manual_marked(
+    block: Block, rules: Rules, automatic: tuple[str, ...] | None, *, told: bool = True
+) -> Block:
     """Return the block with samples in manual or tracking marked so, and without its mode.
 
     An empty mode goes on as before. Numbers are told apart by OP, which stands still in manual.
@@ -47,6 +49,7 @@ def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None)
         block: one row a sample or a stamp.
         rules: what is cut is noted there.
         automatic: what is shown in automatic; None knows the usual words.
+        told: whether a word that is not known is noted.
 
     Raises:
         InputError: modes of which it cannot be told which is automatic.
@@ -61,6 +64,14 @@ def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None)
     if not shown:
         return block
     off = _not_automatic(block, column.name, codes, shown, automatic)
+    rules.modes.update(
+        {word: "not automatic" if word in off else "automatic" for word in shown.values()}
+    )
+    if told and automatic is None and (alone := _alone(shown)) is not None:
+        rules.told.append(
+            f"{column.name} shows {alone} alone, which is not known: taken as automatic; if it is "
+            "not say --auto WORD, with the word that stands for automatic"
+        )
     marked = np.isin(codes, [code for code, word in shown.items() if word in off])
     if not marked.any():
         return block
@@ -107,6 +118,14 @@ def _not_automatic(
         where=str(block.path),
         fix=f"say which with --auto, such as --auto {shlex.quote(sorted(unknown)[-1])}",
     )
+
+
+def _alone(shown: dict[int, str]) -> str | None:
+    """Return the one word of a mode that says nothing of what it means; None for any other."""
+    words = set(shown.values())
+    (word,) = words if len(words) == 1 else ("a",)
+    known = AUTOMATIC.fullmatch(_bare(word)) or MANUAL.fullmatch(_bare(word))
+    return None if known else word
 
 
 def _bare(word: str) -> str:

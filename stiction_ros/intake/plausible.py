@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 
 import numpy as np
 
@@ -14,6 +15,12 @@ from stiction_ros.intake.tables.block import Block
 PERCENT = (-10.0, 110.0)
 """What an OP in % stays within."""
 
+OFTEN = 0.1
+"""Share of the samples outside of that from which it is told."""
+
+CURRENT = (3.8, 20.5)
+"""What an OP in mA stays within."""
+
 FOLLOWS = 0.9
 """Share of the moves of a controller's output that its law explains, at least."""
 
@@ -24,19 +31,33 @@ With both, 1 in 160 loops of the field is called swapped as it is, and a third o
 rounding, compression and strong proportional action hide the rest.
 """
 
+WORDS = {OpUnit.PERCENT: "%", OpUnit.SHARE: "0 to 1", OpUnit.CURRENT: "4 to 20 mA"}
+"""Units of an OP as notes name them."""
+
 EXAMINED = 20_000
 """Samples that are looked at."""
 
+FEWEST = 50
+"""Samples from which anything is told of a swap."""
 
-def in_percent(block: Block, given: OpUnit | None) -> tuple[Block, str, str]:
+CLOSER, OFFSET, TRACKED = 0.1, 0.3, 0.7
+"""How much nearer to the set-point than the other the measurement is, as a share; its lasting
+offset as a share of its error's standard deviation; its error as a share of the set-point's."""
+
+
+def in_percent(
+    block: Block, given: OpUnit | None, *, named: bool = False
+) -> tuple[Block, str, str]:
     """Return the block with OP and stem in %, the unit, and a note on what was done.
 
     Args:
         block: as read.
         given: unit that a user or a tag list says; None takes the export's word.
+        named: whether a user said which column is what.
 
     Raises:
-        InputError: OP lies between 0 and 1 and nothing says what it is.
+        InputError: OP lies between 0 and 1 and nothing says what it is, or far outside of the unit
+            that it is said to have.
     """
     units = [
         known_op_unit(column.unit)
@@ -60,46 +81,157 @@ def in_percent(block: Block, given: OpUnit | None) -> tuple[Block, str, str]:
                 f"OP lies between {low:.3g} and {high:.3g}, perhaps without its mean: frictions "
                 "are in its own unit; if it is a share say --op-unit share"
             )
+        if CURRENT[0] <= low < high <= CURRENT[1]:
+            note = (
+                f"OP lies between {low:.3g} and {high:.3g} and bears no unit: taken as %; if it is "
+                "a current say --op-unit ma"
+            )
         usual = PERCENT[0] <= low and high <= PERCENT[1]
+        pv = _only(block, "pv")
+        if not usual and not named and pv is not None and _like_percent(pv[1]):
+            note = (
+                f"OP lies between {low:.4g} and {high:.4g} and bears no unit, {pv[0]} lies as an "
+                "OP in % would: look whether they are swapped"
+            )
         return block, "%" if usual else "its own unit", note
     factor, offset = TO_PERCENT[unit]
     if unit is OpUnit.OTHER:
         return block, "its own unit", ""
+    by = "OP is said to be in" if given else "the export says"
+    note = _fits(block, unit, by, named=named)
     if (factor, offset) == (1.0, 0.0):
-        return block, "%", ""
+        return block, "%", note
     columns = {
         key: dataclasses.replace(column, values=factor * column.values + offset)
         if key.signal in ("op", "stem")
         else column
         for key, column in block.columns.items()
     }
-    word = "0 to 1" if unit is OpUnit.SHARE else "4 to 20 mA"
-    return dataclasses.replace(block, columns=columns), "%", f"OP of {word} brought to %"
+    notes = (f"OP of {WORDS[unit]} brought to %", note)
+    return dataclasses.replace(block, columns=columns), "%", "; ".join(filter(None, notes))
+
+
+def _fits(block: Block, unit: OpUnit, by: str, *, named: bool) -> str:
+    """Return a note where OP often lies below its unit, as one without its mean does.
+
+    Args:
+        block: as read.
+        unit: of its OP.
+        by: who says so, in words.
+        named: whether a user said which column is OP.
+
+    Raises:
+        InputError: the median, or many samples, lie outside of the unit.
+    """
+    factor, offset = TO_PERCENT[unit]
+    note = ""
+    for key, column in block.columns.items():
+        values = column.values[np.isfinite(column.values)]
+        if key.signal != "op" or not len(values):
+            continue
+        percent, shown = factor * values + offset, f"{values.min():.4g} to {values.max():.4g}"
+        middle, word = float(np.median(percent)), WORDS[unit]
+        above = float(np.mean(percent > PERCENT[1]))
+        if not PERCENT[0] <= middle <= PERCENT[1] or above >= OFTEN:
+            said = (
+                f"{column.name} holds {shown}, median {np.median(values):.4g}, though {by} {word}"
+            )
+            if not named:
+                _refuse_by_values(block, said)
+            fix = "leave --op-unit out or say another one; --op-unit other takes OP as it is"
+            raise InputError(said, where=str(block.path), fix=fix)
+        if float(np.mean(percent < PERCENT[0])) >= OFTEN:
+            note = (
+                f"{column.name} holds {shown}, though {by} {word}: perhaps without its mean, or no "
+                "OP; --op-unit other takes it as it is"
+            )
+    return note
+
+
+def _refuse_by_values(block: Block, said: str) -> None:
+    """Raise where OP is outside of its unit and PV would be a usual OP in %.
+
+    Args:
+        block: as read.
+        said: what is wrong with OP.
+
+    Raises:
+        InputError: OP and PV look swapped.
+    """
+    op, pv = _only(block, "op"), _only(block, "pv")
+    if op is None or pv is None:
+        return
+    if _like_percent(pv[1]):
+        least, most = np.nanmin(pv[1]), np.nanmax(pv[1])
+        reason = f"{said}, and {pv[0]} holds {least:.4g} to {most:.4g}"
+        raise _swapped(block, reason, "--op-unit other")
+
+
+def _like_percent(values: FloatArray) -> bool:
+    there = values[np.isfinite(values)]
+    return bool(len(there)) and PERCENT[0] <= there.min() and bool(there.max() <= PERCENT[1])
 
 
 def refuse_swapped(block: Block) -> None:
     """Raise when PV and OP look swapped.
 
+    Where a set-point is recorded, the measurement is what stays near it. Else:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
     measurement and its Δ at the same sample, and not the other way round. Rounding and
-    compression leave some of that. Of records with a set-point, and of exact controllers,
+    compression leave some of that. Of exact controllers
     :mod:`stiction_ros.identification.problem.input_checks` knows more.
 
     Raises:
         InputError: OP and PV look swapped.
     """
     op, pv = _only(block, "op"), _only(block, "pv")
-    if op is None or pv is None or any(key.signal == "sp" for key in block.columns):
+    if op is None or pv is None:
+        return
+    if any(key.signal == "sp" for key in block.columns):
+        sp = _only(block, "sp")
+        if sp is not None and _stays_near(sp[1], op[1], pv[1]):
+            raise _swapped(block, f"{op[0]} stays near the set-point {sp[0]}, {pv[0]} does not")
         return
     right, wrong = _explained(op[1], pv[1]), _explained(pv[1], op[1])
     if wrong > FOLLOWS and 1.0 - right > LEADS * (1.0 - wrong):
-        tags = {key.signal: key.tag for key in block.columns}
-        raise InputError(
-            f"OP and PV look swapped: {pv[0]} moves as a controller's output would, by {op[0]}",
-            where=str(block.path),
-            fix=f"name them, --op {tags['op']}={pv[0]} --pv {tags['pv']}={op[0]}, or as they are, "
-            f"--op {tags['op']}={op[0]} --pv {tags['pv']}={pv[0]}",
+        raise _swapped(block, f"{pv[0]} moves as a controller's output would, by {op[0]}")
+
+
+def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
+    """Return whether ``one`` is :data:`CLOSER` to the set-point, and without a lasting offset."""
+    there = np.isfinite(sp) & np.isfinite(one) & np.isfinite(other)
+    if np.count_nonzero(there) < FEWEST:
+        return False
+    near, far = one[there] - sp[there], other[there] - sp[there]
+    size = float(np.sqrt(np.mean(near**2)))
+    if size > CLOSER * float(np.sqrt(np.mean(far**2))) or not np.ptp(other[there]) > 0.0:
+        return False
+    centred = abs(float(near.mean())) <= OFFSET * float(near.std())
+    return centred or size <= TRACKED * float(sp[there].std())
+
+
+def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
+    """Return the error of a block whose one OP and one PV look swapped.
+
+    Args:
+        block: as read.
+        reason: why.
+        otherwise: what to say if they are not; empty names the columns as they are.
+    """
+    op, pv = (
+        next(
+            (key.tag, column.name) for key, column in block.columns.items() if key.signal == signal
         )
+        for signal in ("op", "pv")
+    )
+    exchanged = shlex.join(["--op", f"{op[0]}={pv[1]}", "--pv", f"{pv[0]}={op[1]}"])
+    as_they_are = otherwise or shlex.join(["--op", f"{op[0]}={op[1]}", "--pv", f"{pv[0]}={pv[1]}"])
+    return InputError(
+        f"OP and PV look swapped: {reason}",
+        where=str(block.path),
+        fix=f"name them, {exchanged}, or as they are, {as_they_are}; of one file among many in a "
+        "row of --tags F with its column file",
+    )
 
 
 def _only(block: Block, signal: str) -> tuple[str, FloatArray] | None:
@@ -112,7 +244,7 @@ def _explained(output: FloatArray, measured: FloatArray) -> float:
     """Return which share of the moves of ``output`` a PI law on ``measured`` explains."""
     there = np.isfinite(output) & np.isfinite(measured)
     u, y = output[there], measured[there]
-    if len(u) < 50:
+    if len(u) < FEWEST:
         return 0.0
     moves = np.diff(u)
     rows = np.column_stack([np.diff(y), y[1:], np.ones(len(moves))])

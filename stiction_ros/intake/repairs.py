@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -58,10 +59,12 @@ class Rules:
     Attributes:
         strict: whether anything wrong is an error.
         told: sentences on what was done, in their order.
+        modes: word of a mode to what it is taken for.
     """
 
     strict: bool
     told: list[str] = dataclasses.field(default_factory=list)
+    modes: dict[str, str] = dataclasses.field(default_factory=dict)
 
     def tell(self, note: str, where: Block, said: str, fix: str = FIX) -> None:
         """Note what is repaired, or raise when nothing may be.
@@ -138,17 +141,26 @@ def checked(block: Block, rules: Rules) -> Block:
             continue
         row = int(np.argmax(missing))
         said = column.said if column.said and column.row == row else "is bad"
-        listed = ", ".join(
-            f"{count} {word!r}" if word else f"{count} empty"
-            for word, count in column.words.most_common(4)
-        )
         rules.tell(
             f"{column.name}: {plural(int(missing.sum()), 'value')} of {len(missing)} "
-            f"missing{f' ({listed})' if listed else ''}",
+            f"missing{_listed(column, missing)}",
             block,
             f"column {column.name} {said} in {block.place(row)}",
         )
     return block
+
+
+def _listed(column: Column, missing: FlagArray) -> str:
+    """Return what stands in the place of missing values, without counts where they are not known.
+
+    Words are counted over all rows of the file, of which those without a time are left out.
+    """
+    words = Counter({word: count for word, count in column.words.items() if word and count})
+    empty = int(np.count_nonzero(missing & column.blank))
+    counted = words.total() + empty <= np.count_nonzero(missing)
+    told = [f"{count} {word!r}" if counted else repr(word) for word, count in words.most_common(4)]
+    told += [f"{empty} empty"] if empty else []
+    return f" ({', '.join(told)})" if told else ""
 
 
 def in_order(block: Block, rules: Rules) -> list[Block]:
@@ -274,22 +286,22 @@ def without_outliers(block: Block, rules: Rules) -> Block:
     for key, column in block.columns.items():
         if key.signal == "mode":
             continue
-        outside = _outside(column.values)
-        if not outside.any():
+        far = outside(column.values)
+        if not far.any():
             continue
-        row = int(np.argmax(outside))
+        row = int(np.argmax(far))
         worst = f"{column.values[row]:g}"
         rules.tell(
-            f"{column.name}: {plural(int(outside.sum()), 'value')} such as {worst} far outside "
+            f"{column.name}: {plural(int(far.sum()), 'value')} such as {worst} far outside "
             "all others taken as missing",
             block,
             f"column {column.name} is {worst} in {block.place(row)}, far outside all others",
         )
-        columns[key] = dataclasses.replace(column, values=np.where(outside, np.nan, column.values))
+        columns[key] = dataclasses.replace(column, values=np.where(far, np.nan, column.values))
     return dataclasses.replace(block, columns=columns)
 
 
-def _outside(values: FloatArray) -> FlagArray:
+def outside(values: FloatArray) -> FlagArray:
     """Return which values are sentinels or stray far from all others, shape (N,)."""
     there = np.isfinite(values)
     found = np.zeros(len(values), dtype=np.bool_)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -145,12 +145,20 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
         files = ", ".join(file.name for file in loop.files)
         said = loop.summary if loop.problem is None else f"not read: {loop.problem}"
         print(f"{loop.name} ({files}): {said}")
-        for signal, column in loop.columns.items():
-            print(f"  {signal} from {column}")
+        for line in _signals(loop):
+            print(f"  {line}")
         for note in loop.notes:
             print(f"  note: {note}")
     print(f"{known} loops, {readable} can be read" if known else "no file of a loop")
     return 0 if readable else 1
+
+
+def _signals(loop: Loop) -> Iterator[str]:
+    """Yield where each signal comes from and what stands there."""
+    for signal in dict.fromkeys((*loop.columns, *loop.spreads)):
+        origin = f" from {loop.columns[signal]}" if signal in loop.columns else ""
+        spread = loop.spreads.get(signal, ", ".join(loop.modes) if signal == "MODE" else "")
+        yield f"{signal}{origin}{f': {spread}' if spread else ''}"
 
 
 def tell(loop: Loop) -> None:

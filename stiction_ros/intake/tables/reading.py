@@ -229,7 +229,9 @@ def _long(
                 row = int(np.argmax(~np.isfinite(column.values)))
                 column.row, column.said = row, f"is {shown[codes[rows[row]]]!r}, not a number"
             if bad is not None and bad[rows].any():
-                column.words["of bad quality"] += int(np.count_nonzero(bad[rows]))
+                column.words["of bad quality"] += int(
+                    np.count_nonzero(bad[rows] & np.isfinite(column.values))
+                )
                 column.values = np.where(bad[rows], np.nan, column.values)
         column.unit = units.get(name, "").strip()
         found.setdefault(tag.loop, []).append(

@@ -1,0 +1,97 @@
+"""What stands in the columns of a loop, for people who check whether they are the right ones."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.intake.repairs import outside
+from stiction_ros.intake.tables.block import Block, Column, Key
+from stiction_ros.records.record import Record
+
+
+class Spread(NamedTuple):
+    """Least, median and largest value of a signal, in the unit of its column."""
+
+    least: float
+    median: float
+    largest: float
+
+    def __str__(self) -> str:
+        return f"{self.least:.4g} to {self.largest:.4g}, median {self.median:.4g}"
+
+
+def named(key: Key) -> str:
+    """Return a signal as it is called for people: ``OP FIC101``."""
+    return f"{key.signal.upper()} {key.tag}".strip()
+
+
+def columns_of(blocks: Sequence[Block]) -> dict[str, str]:
+    """Return signal to the column that it stands in."""
+    return {named(key): column.name for one in blocks for key, column in one.columns.items()}
+
+
+def spreads_of(blocks: Sequence[Block]) -> dict[str, Spread]:
+    """Return what numbers each signal of a loop has, without those far outside all others.
+
+    Args:
+        blocks: as read; signals that hold no number are left out.
+    """
+    found: dict[Key, list[FloatArray]] = {}
+    for block in blocks:
+        for key, column in block.columns.items():
+            if key.signal != "mode":
+                found.setdefault(key, []).append(column.values)
+    return _spreads({named(key): np.concatenate(pieces) for key, pieces in found.items()})
+
+
+def spreads_of_records(parts: Sequence[Record]) -> dict[str, Spread]:
+    """Return the same of records, whose OP is in %."""
+    found: dict[str, list[FloatArray]] = {}
+    for part in parts:
+        for signal, tags, values in (
+            ("OP", part.valves, part.op),
+            ("PV", part.outputs, part.pv),
+            ("SP", part.outputs, part.sp),
+        ):
+            for tag, column in zip(tags, () if values is None else values.T, strict=False):
+                found.setdefault(f"{signal} {tag}", []).append(column)
+    return _spreads({name: np.concatenate(pieces) for name, pieces in found.items()})
+
+
+def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ...]:
+    """Return words of the mode with count and what each is taken for, the most frequent first.
+
+    Args:
+        blocks: as read.
+        taken: word to what it is taken for; words that are not there are not told apart.
+    """
+    counts: Counter[str] = Counter()
+    for block in blocks:
+        for key, column in block.columns.items():
+            if key.signal == "mode":
+                counts.update(_words(column))
+    return tuple(
+        f"{count} {word or 'empty'}{f' ({taken[word]})' if word in taken else ''}"
+        for word, count in counts.most_common()
+    )
+
+
+def _words(column: Column) -> dict[str, int]:
+    codes = column.values[np.isfinite(column.values)].astype(np.intp)
+    shown, counts = np.unique(codes, return_counts=True)
+    pairs = zip(shown.tolist(), counts.tolist(), strict=True)
+    return dict(Counter({column.known[code].strip(): count for code, count in pairs}))
+
+
+def _spreads(signals: Mapping[str, FloatArray]) -> dict[str, Spread]:
+    found = {}
+    for name, values in signals.items():
+        usual = values[np.isfinite(values) & ~outside(values)]
+        if len(usual):
+            found[name] = Spread(float(usual.min()), float(np.median(usual)), float(usual.max()))
+    return found
