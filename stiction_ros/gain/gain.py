@@ -48,6 +48,9 @@ and is fed back tells as much of the controller as of the process."""
 
 KEYS = tuple(field.name for field in dataclasses.fields(Measures))
 
+WORDS = {"iae_per_hour": "IAE", "amplitude": "amplitude"}
+"""Measures on which the drawn loops must agree, in words."""
+
 
 class What(enum.StrEnum):
     """What may be done about a loop."""
@@ -97,14 +100,32 @@ class Option:
         return dataclasses.replace(self, measures=Measures(**measures), interval=interval)
 
     def where_agreed(self, now: Measures) -> Option:
-        """Return the option, without figures where they would not hold in each drawn loop."""
-        for key in ("iae_per_hour", "amplitude"):
-            if key in self.interval and self.measures is not None:
-                said, small = getattr(self.measures, key), AGREED_NOW * getattr(now, key)
-                if any(abs(said - came) > max(AGREED * came, small) for came in self.interval[key]):
-                    note = f"{self.note} The drawn loops do not agree on what it would bring."
-                    return dataclasses.replace(self, measures=None, note=note)
-        return self
+        """Return the option, without figures where they would not hold in each drawn loop.
+
+        The note says on which measure the loops do not agree, and on which they do.
+
+        Args:
+            now: of the record.
+        """
+        if self.measures is None or not (apart := self._apart(now)):
+            return self
+        said = " and ".join(
+            f"{WORDS[key]} ({low:.3g} to {high:.3g}, now {getattr(now, key):.3g})"
+            for key, (low, high) in apart.items()
+        )
+        note = f"{self.note} The drawn loops do not agree on its {said}."
+        for key in WORDS.keys() & self.interval.keys() - apart.keys():
+            note += f" On its {WORDS[key]} they do, which alone holds too seldom to be promised."
+        return dataclasses.replace(self, measures=None, note=note)
+
+    def _apart(self, now: Measures) -> dict[str, tuple[float, float]]:
+        """Return the interval of each measure whose figure would not hold in each drawn loop."""
+        found = {}
+        for key in WORDS.keys() & self.interval.keys():
+            said, small = getattr(self.measures, key), AGREED_NOW * getattr(now, key)
+            if any(abs(said - came) > max(AGREED * came, small) for came in self.interval[key]):
+                found[key] = self.interval[key]
+        return dict(sorted(found.items(), reverse=True))
 
     def to_json(self) -> dict[str, Any]:
         """Return an entry of ``options`` of ``gain --json``."""

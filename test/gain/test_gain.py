@@ -301,3 +301,14 @@ def test_stems_follow_the_law() -> None:
     op = np.array([[0.0, 3.0, 5.0, 4.0, 1.0]])
     stems = stems_of(op, np.array([[4.0, 1.0]]), np.zeros(1))
     assert stems.tolist() == [[0.0, 0.0, 4.0, 4.0, 4.0]]
+
+
+def test_a_note_says_on_which_measure_the_drawn_loops_do_not_agree() -> None:
+    now = Measures(0.0081, 0.0354, 0.0, 0.0, 0.0)
+    measures = Measures(0.003, 0.0205, 0.0, 0.0, 0.0)
+    interval = {"amplitude": (0.0013, 0.0055), "iae_per_hour": (0.0198, 0.0211)}
+    option = Option(What.SERVICE, measures, interval, "").where_agreed(now)
+    assert option.measures is None
+    assert option.interval == interval
+    assert "do not agree on its amplitude (0.0013 to 0.0055, now 0.0081)" in option.note
+    assert "On its IAE they do" in option.note

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -23,7 +24,20 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.set_points import SetPoints
 
+if TYPE_CHECKING:
+    from stiction_ros.identification import Identification
+    from stiction_ros.records.record import Record
+
 MODEL_ENDING = ".loop.yaml"
+
+MEASURES = {
+    "amplitude": "amplitude",
+    "iae_per_hour": "IAE per hour",
+    "travel_per_hour": "travel %/h",
+    "moves_per_hour": "moves/h",
+    "reversals_per_hour": "reversals/h",
+}
+"""Measures in the order in which they are printed, and what they are called."""
 
 
 def add(commands: Any) -> None:
@@ -54,8 +68,14 @@ def run(options: argparse.Namespace) -> int:
 
     if options.dry_run:
         return show_loops([Path(options.record)], intake_options(options))
-    found: Gain = _of_model(options) if _is_model(options.record) else _of_record(options)
-    hand_over(options.json, {"record": str(options.record)} | found.to_json(), lambda: show(found))
+    found: Gain
+    verdict: dict[str, Any] = {}
+    if _is_model(options.record):
+        found = _of_model(options)
+    else:
+        found, verdict = _of_record(options)
+    document = {"record": str(options.record)} | verdict | found.to_json()
+    hand_over(options.json, document, lambda: show(found, verdict))
     return 0
 
 
@@ -77,7 +97,7 @@ def _of_model(options: argparse.Namespace) -> Any:
         return gain_of_model(model, schedule, samples)
 
 
-def _of_record(options: argparse.Namespace) -> Any:
+def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
     from stiction_ros.gain.gain import gain_of
     from stiction_ros.identification import identify
     from stiction_ros.records.parts import longest_part
@@ -93,30 +113,80 @@ def _of_record(options: argparse.Namespace) -> Any:
     with bar("identifying") as show_share:
         identified = identify(record, progress=show_share)
     with bar("simulating"):
-        return gain_of(record, identified, options.valve)
+        gain = gain_of(record, identified, options.valve)
+    return gain, _verdict(record, identified, gain)
 
 
-def show(found: Any) -> None:
-    """Print the options as a table."""
-    table = Table(title=f"{found.valve} and {found.output}", title_justify="left")
-    for name in ("", "amplitude", "IAE per hour", "travel %/h", "moves/h", "reversals/h", ""):
-        table.add_column(name)
-    table.add_row("now", *_cells(found.now), "")
-    for option in found.options:
-        cells = ["–"] * 5 if option.measures is None else _cells(option.measures)
-        table.add_row(option.what.value, *cells, option.note)
+def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str, Any]:
+    """Return what was found of the valve that was looked at, as it stands in the JSON."""
+    from stiction_ros.records.valve_work import ValveWork
+    from stiction_ros.survey.ranking import confidence
+
+    index = record.valves.index(gain.valve)
+    valve = identified.valves[index].to_json()
+    cause = identified.outputs[record.outputs.index(gain.output)].cause
+    turns = round(ValveWork.of(identified.stem[:, index]).reversals)
+    keys = ("verdict", "f_s", "f_s_interval", "f_d", "f_d_interval")
+    sure = confidence(valve, None if cause is None else cause.kind.value, turns)
+    return {key: valve[key] for key in keys} | {"confidence": sure}
+
+
+def show(found: Any, verdict: Mapping[str, Any]) -> None:
+    """Print the verdict, what each option brings with its interval, and the notes.
+
+    Args:
+        found: what would help.
+        verdict: on the valve; empty for a model.
+    """
     console = Console()
+    console.print(_headline(found, verdict), highlight=False)
+    table = Table()
+    for name in ("", "measure", "now", "then", "5 to 95 % of the drawn loops"):
+        table.add_column(name)
+    for option in found.options:
+        for row in _rows(found.now, option):
+            table.add_row(*row)
+        table.add_section()
     console.print(table)
+    for option in found.options:
+        console.print(f"{option.what}: {option.note}", highlight=False)
     for note in found.notes:
-        console.print(f"note: {note}")
+        console.print(f"note: {note}", highlight=False)
 
 
-def _cells(measures: Any) -> list[str]:
-    values = (
-        measures.amplitude,
-        measures.iae_per_hour,
-        measures.travel_per_hour,
-        measures.moves_per_hour,
-        measures.reversals_per_hour,
+def _headline(found: Any, verdict: Mapping[str, Any]) -> str:
+    said = f"{found.valve} and {found.output}"
+    if not verdict:
+        return said
+    (low, high), (least, most) = verdict["f_s_interval"], verdict["f_d_interval"]
+    said += (
+        f": {verdict['verdict']}, f_S {verdict['f_s']:.3g} % ({low:.3g} to {high:.3g}), "
+        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g}), "
+        f"confidence {verdict['confidence']:.2f}"
     )
-    return ["–" if value is None else f"{value:.3g}" for value in values]
+    if verdict["verdict"] == "undecided":
+        said += (
+            ". The record does not decide whether the valve has friction: half of the drawn loops "
+            "have none, and figures are means of both"
+        )
+    return f"{said}."
+
+
+def _rows(now: Any, option: Any) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each measure that an option has; one of dashes where it has none."""
+    if option.measures is None and not option.interval:
+        yield str(option.what), "–", "", "–", ""
+        return
+    shown = str(option.what)
+    for key, name in MEASURES.items():
+        if (value := getattr(now, key)) is None:
+            continue
+        then = None if option.measures is None else getattr(option.measures, key)
+        low, high = option.interval.get(key, (None, None))
+        between = "" if low is None else f"{_figure(low)} to {_figure(high)}"
+        yield shown, name, _figure(value), _figure(then), between
+        shown = ""
+
+
+def _figure(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
