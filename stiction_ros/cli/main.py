@@ -6,7 +6,8 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 # Two cores are shared with the nodes: linear algebra gets one thread unless told otherwise.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -69,6 +70,38 @@ COMMANDS: dict[str, tuple[str, str]] = {
 """Module of each command below this package, loaded when it is called, and what ``--help`` says."""
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that tells with its own usage what it does not know, and what may be meant."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Return what was parsed; a command leaves nothing to others.
+
+        Raises:
+            SystemExit: there are words that the command does not know.
+        """
+        found, spare = super().parse_known_args(args, namespace)
+        if spare and self._subparsers is None:
+            self.error(self._unknown(spare))
+        return found, spare
+
+    def _unknown(self, spare: Sequence[str]) -> str:
+        words = [word.partition("=")[0] for word in spare if word.startswith("-")]
+        if words:
+            told = [f"{word}{_meant(word, self._option_string_actions)}" for word in words]
+            return f"unknown option {', '.join(told)}"
+        many = any(action.dest == "record" for action in self._actions)
+        fix = "; it takes one record, stiction survey PATH … judges several" if many else ""
+        return f"unexpected {' '.join(spare)}{fix}"
+
+
+def _meant(word: str, known: Iterable[str]) -> str:
+    """Return what a misspelt word may mean, as the end of a sentence."""
+    import difflib  # only where something is wrong
+
+    near = difflib.get_close_matches(word, list(known), n=2)
+    return f": did you mean {' or '.join(near)}?" if near else ""
+
+
 def parser(only: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of all commands.
 
@@ -76,7 +109,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
         only: the command whose options are known, the others by name alone: no module but its
             own is imported. None for all.
     """
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="stiction",
         description="Find, quantify and compensate valve stiction in MPC loops.",
     )
@@ -99,6 +132,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = next((word for word in given if not word.startswith("-")), "")
     try:
+        if command and command not in COMMANDS:
+            parser("").error(f"there is no command {command}{_meant(command, COMMANDS)}")
         options = parser(command).parse_args(given, argparse.Namespace(words=given))
         return int(options.run(options))
     except InputError as error:

@@ -38,6 +38,26 @@ def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[
     assert "usage: stiction " + name in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["surwey", "x"], "there is no command surwey: did you mean survey?"),
+        (["survey", "x", "--cots", "f"], "unknown option --cots: did you mean --cost"),
+        (["identify", "a.csv", "b.csv"], "unexpected b.csv; it takes one record, stiction survey"),
+    ],
+)
+def test_what_is_misspelt_is_told_with_what_may_be_meant(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+    err = " ".join(capsys.readouterr().err.split())
+    assert said in err
+    assert "usage: stiction" in err
+    assert "demo," not in err
+
+
 def test_help_says_of_every_command_what_the_command_says(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

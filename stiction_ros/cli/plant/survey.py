@@ -19,6 +19,9 @@ from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.plant.survey_list import print_list
 from stiction_ros.cli.plant.survey_progress import progress
 from stiction_ros.errors import InputError, storing
+from stiction_ros.intake.sheets.cells import Numbers
+from stiction_ros.intake.sheets.layout import delimiter_of
+from stiction_ros.intake.sheets.text import open_text
 
 LOCAL = "local"
 """The engine of this machine."""
@@ -43,8 +46,16 @@ def add(commands: Any) -> None:
     add_intake(parser, many=True)
     parser.add_argument("--delay", type=delay_range, metavar="LO:HI", help="samples (0:10)")
     parser.add_argument("--no-gain", action="store_true", help="simulate nothing")
-    parser.add_argument("--cost", metavar="F", help="CSV: loop, money per hour and unit of |PV−SP|")
-    parser.add_argument("--units", metavar="F", help="CSV: loop, unit of PV, for the pages")
+    parser.add_argument(
+        "--cost",
+        metavar="F",
+        help="CSV with or without a head loop,cost: money per hour and unit of |PV−SP|",
+    )
+    parser.add_argument(
+        "--units",
+        metavar="F",
+        help="CSV with or without a head loop,unit: unit of PV, for the pages",
+    )
     parser.add_argument(
         "--previous", action="append", default=[], metavar="F", help="JSON of an earlier survey"
     )
@@ -75,8 +86,8 @@ def run(options: argparse.Namespace) -> int:
     intake = intake_options(options)
     if options.dry_run:
         return show_loops(paths, intake)
-    costs = {name: _number(value, options.cost) for name, value in _pairs(options.cost)}
-    units = dict(_pairs(options.units))
+    costs = _costs(options.cost)
+    units = {name: unit for _, name, unit in _pairs(options.units)}
     identification = IdentificationOptions()
     if options.delay is not None:
         identification = dataclasses.replace(identification, delay=options.delay)
@@ -165,20 +176,22 @@ def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
                 page.write_text(told, encoding="utf-8")
 
 
-def _pairs(file: str | None) -> list[tuple[str, str]]:
-    """Return the first two columns of a CSV; a first line whose second cell is a word is a head."""
+def _pairs(file: str | None) -> list[tuple[int, str, str]]:
+    """Return row and first two cells of each row of a table, semicolons or commas between them.
+
+    A first line whose first cell is ``loop``, ``tag`` or ``name`` is a head.
+    """
     if file is None:
         return []
-    try:
-        with Path(file).open(encoding="utf-8-sig", newline="") as source:
-            rows = [row for row in csv.reader(source) if row and row[0].strip()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read ({error})", where=file) from None
-    short = next((number for number, row in enumerate(rows, start=1) if len(row) < 2), None)
+    with open_text(Path(file)) as source:
+        lines = source.read().splitlines()
+    read = enumerate(csv.reader(lines, delimiter=delimiter_of(lines)), start=1)
+    rows = [(number, row) for number, row in read if row and row[0].strip()]
+    short = next((number for number, row in rows if len(row) < 2), None)
     if short is not None:
         raise InputError("has no second column", where=f"{file}: row {short}", fix="loop,value")
-    pairs = [(row[0].strip(), row[1].strip()) for row in rows]
-    return pairs[1:] if pairs and pairs[0][0].lower() in ("loop", "tag", "name") else pairs
+    pairs = [(number, row[0].strip(), row[1].strip()) for number, row in rows]
+    return pairs[1:] if pairs and pairs[0][1].lower() in ("loop", "tag", "name") else pairs
 
 
 def _tell_strangers(file: str | None, names: Iterable[str], loops: set[str]) -> None:
@@ -189,14 +202,22 @@ def _tell_strangers(file: str | None, names: Iterable[str], loops: set[str]) -> 
         print(f"{file}: no loop is called {', '.join(strange[:NAMED])}{more}", file=sys.stderr)
 
 
-def _number(text: str, file: str | None) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 <= value < float("inf"):
-        raise InputError(f"{text!r} is no cost", where=file or "--cost", fix="use a number")
-    return value
+def _costs(file: str | None) -> dict[str, float]:
+    """Return the cost of each loop; numbers are written as in exports, with point or comma.
+
+    Raises:
+        InputError: the file cannot be read, or a cost is no number of 0 or more.
+    """
+    found = {}
+    for row, name, text in _pairs(file):
+        cells = Numbers(decimal_comma=True)
+        cells.add([text])
+        value = float(cells.values()[0])
+        if not 0.0 <= value < float("inf"):
+            said = f"{text!r} is no cost of loop {name}"
+            raise InputError(said, where=f"{file}: row {row}", fix="use a number of 0 or more")
+        found[name] = value
+    return found
 
 
 def _earlier(files: Sequence[str]) -> list[Any]:

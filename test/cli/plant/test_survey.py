@@ -7,6 +7,7 @@ import pytest
 
 from stiction_ros.cli.main import main
 from stiction_ros.cli.plant.survey_progress import Counted, Forecast, Lines
+from stiction_ros.errors import InputError
 from stiction_ros.survey import survey as surveying
 from stiction_ros.survey.engines import dask as dask_engine
 from stiction_ros.survey.entry import Entry, Status
@@ -61,7 +62,7 @@ def test_a_folder_gives_a_list_with_a_reason_for_every_loop(
         (["--engine", "dask://127.0.0.1:1"], "no scheduler answers"),
         (["--resume"], "add --out DIR"),
         (["--jobs", "0"], "no number of processes"),
-        (["--cost", "none.csv"], "cannot be read"),
+        (["--cost", "none.csv"], "no such file"),
         (["--previous", "none.json"], "cannot be read"),
     ],
 )
@@ -166,3 +167,14 @@ def test_gain_of_a_model_in_json(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert whats == ["service", "embedding", "retune", "leave"]
     for option in document["options"]:
         assert set(option) >= {*document["now"], "what", "interval", "note"}
+
+
+def test_costs_are_read_like_exports(tmp_path: Path) -> None:
+    from stiction_ros.cli.plant.survey import _costs
+
+    path = tmp_path / "cost.csv"
+    path.write_text("loop;cost\nFIC1;3,5\nFIC2;2\n")
+    assert _costs(str(path)) == {"FIC1": 3.5, "FIC2": 2.0}
+    path.write_text("FIC1,3.5\nFIC2,much\n")
+    with pytest.raises(InputError, match=r"row 2: 'much' is no cost of loop FIC2"):
+        _costs(str(path))
