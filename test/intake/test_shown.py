@@ -129,3 +129,13 @@ def test_empty_cells_of_other_rows_are_not_counted(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", text(rows, header))
     told = {loop.name: said(loop) for loop in read(path)}
     assert "F1.PV: 1 value of 80 missing (1 empty)" in told["F1"]
+
+
+def test_all_columns_that_are_missing_are_named_at_once(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", text(table(), ["when", "Stell", "Ist", "Soll"]))
+    problem = str(one(path).problem)
+    assert "has no columns OP and PV; its columns are when, Stell, Ist, Soll" in problem
+    assert "--op TAG=COLUMN --pv TAG=COLUMN [--sp TAG=COLUMN]" in problem
+    rows = [["x", *row[1:]] for row in table()]
+    path = write(tmp_path / "b.csv", text(rows, ["when", "Stell", "Ist", "Soll"]))
+    assert "has no columns OP, PV and t;" in str(one(path).problem)

@@ -108,6 +108,7 @@ def _one_loop(sheet: Sheet, columns: CsvColumns) -> Plan:
         stem = written.get("stem", plain)
     _same_tags(sp, pv, "--sp", sheet)
     _same_tags(stem, op, "--stem", sheet)
+    _refuse_missing(sheet, [*op.values()], [*pv.values()], columns.time)
     time = time_column(sheet, columns.time)
     chosen: dict[Key, int] = {}
     for signal, mapping in (("op", op), ("pv", pv), ("sp", sp), ("stem", stem)):
@@ -119,6 +120,30 @@ def _one_loop(sheet: Sheet, columns: CsvColumns) -> Plan:
     named = bool(columns.op and columns.pv) or bool(written)
     quality, whole = _qualities(sheet, set(chosen.values()))
     return Plan(Shape.ONE, time, {sheet.name: chosen}, quality, whole, named=named)
+
+
+def _refuse_missing(sheet: Sheet, op: list[str], pv: list[str], time: str | None) -> None:
+    """Raise where several of OP, PV and the time are missing, with all that is to be said.
+
+    Raises:
+        InputError: two or more of them are missing.
+    """
+    wanted = [("op", name) for name in op] + [("pv", name) for name in pv]
+    missing = [(signal, name) for signal, name in wanted if sheet.find(name) is None]
+    options = [OPTIONS[signal] for signal, _ in missing]
+    names = [name for _, name in missing]
+    try:
+        time_column(sheet, time)
+    except InputError:
+        names.append(time or "t")
+        options.append("--time COLUMN")
+    if len(names) > 1:
+        raise InputError(
+            f"has no columns {', '.join(names[:-1])} and {names[-1]}",
+            where=str(sheet.path),
+            fix=f"its columns are {', '.join(sheet.layout.given)}; choose with "
+            f"{' '.join(options)} [--sp TAG=COLUMN]",
+        )
 
 
 def _usual(sheet: Sheet, signal: str) -> str:
