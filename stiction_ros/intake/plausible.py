@@ -229,8 +229,7 @@ def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
     return InputError(
         f"OP and PV look swapped: {reason}",
         where=str(block.path),
-        fix=f"name them, {exchanged}, or as they are, {as_they_are}; of one file among many in a "
-        "row of --tags F with its column file",
+        fix=f"name them, {exchanged}, or as they are, {as_they_are}",
     )
 
 
