@@ -79,7 +79,7 @@ def extend(
     """
     effects = refit_together(bare, runs, [*added, new])
     worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
-    after_base = Baseline.of(run_with(bare, runs, worth))
+    after_base = base_with(bare, runs, worth)
     trouble = _trouble(base, after_base, new.fit.candidate.dated) or _stem_trouble(base, after_base)
     if trouble:
         return Extension(tuple(added), base, False, trouble)
@@ -120,6 +120,11 @@ def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Fre
         if kind == "valve":
             leads[tag] = effect.fit.candidate.lead(effect.fit.point)
     return FreeRun(model, runs, leads)
+
+
+def base_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Baseline:
+    """Return the baseline of a model with effects, its noise also begun at that of each fit."""
+    return Baseline.of(run_with(bare, runs, effects), like=[each.fit.noise for each in effects])
 
 
 def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> Baseline:

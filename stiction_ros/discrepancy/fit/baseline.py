@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -71,8 +71,16 @@ class Baseline:
         run: FreeRun,
         gap: FloatArray | None = None,
         columns: Sequence[FloatArray] | None = None,
+        like: Sequence[Mapping[int, NoiseFit]] = (),
     ) -> Baseline:
-        """Fit the noise of the current model; ``gap``, shape (N, p), replaces the recorded one."""
+        """Fit the noise of the current model.
+
+        Args:
+            run: its free run.
+            gap: shape (N, p), in place of the recorded one.
+            columns: per output what every fit projects out, shape (N, q), in place of the run's.
+            like: noises per output with which the search for its own begins, too.
+        """
         gap = run.gap if gap is None else gap
         shared = tuple(run.free if columns is None else columns)
         blocks = tuple(run.blocks(i) for i in range(gap.shape[1]))
@@ -81,10 +89,10 @@ class Baseline:
             () if thinned else tuple(noise.ar for noise in forms)
             for forms, thinned in zip(seen, run.runs.thinned, strict=True)
         )
-        forms = [
-            noise_forms(gap[:, i], shared[i], blocks[i], _FIRST_GUESSES, declared[i])
-            for i in range(gap.shape[1])
-        ]
+        forms = []
+        for i in range(gap.shape[1]):
+            starts = (*_FIRST_GUESSES, *(noise[i].ar for noise in like if i in noise))
+            forms.append(noise_forms(gap[:, i], shared[i], blocks[i], starts, declared[i]))
         plain = tuple(best_noise(each) for each in forms)
         noise = tuple(
             best_noise(each, quantum, own)

@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck
 from stiction_ros.discrepancy.data.gate import DataFinding, Gate
-from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, run_with
+from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, base_with
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.decision.testable import Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
@@ -89,5 +89,5 @@ class State:
 
     def with_added(self, runs: Runs, added: Sequence[AddedEffect]) -> State:
         """Return the same process with these effects in place of those that were added."""
-        base = Baseline.of(run_with(self.bare, runs, added))
+        base = base_with(self.bare, runs, added)
         return dataclasses.replace(self, added=tuple(added), base=base)

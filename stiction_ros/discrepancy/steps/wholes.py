@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 
 from stiction_ros.discrepancy.decision.decide import on_the_way
-from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together, run_with
+from stiction_ros.discrepancy.decision.extend import AddedEffect, base_with, refit_together
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
@@ -53,7 +53,7 @@ def whole(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Whole:
         runs: the records.
         effects: those of the explanation.
     """
-    base = Baseline.of(run_with(bare, runs, effects))
+    base = base_with(bare, runs, effects)
     score = sum(fit.bic(0) + fit.held_minus_two_log for fit in base.noise)
     rows = max(fit.rows for fit in base.noise)
     figures = sum(each.fit.candidate.count(each.fit.point) for each in effects)

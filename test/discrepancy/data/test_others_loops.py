@@ -198,3 +198,8 @@ def test_a_set_in_doubt_that_leaves_a_larger_noise_is_no_answer() -> None:
     answer = answered(162)  # healthy; a controller that scans twice in a sample, OP rounded
     assert answer.verdict is GapVerdict.UNKNOWN
     assert answer.alternatives == ()
+
+
+def test_noise_behind_an_effect_is_searched_from_where_the_effect_was_found() -> None:
+    answer = answered(110059)  # a slew where the model declares no noise
+    assert names(answer) == [("valve:V1", "slew")]
