@@ -12,7 +12,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.modes import manual_marked
-from stiction_ros.intake.options import IntakeOptions, OpUnit
+from stiction_ros.intake.options import IntakeOptions
 from stiction_ros.intake.plausible import in_percent, refuse_swapped
 from stiction_ros.intake.repairs import (
     Rules,
@@ -39,7 +39,6 @@ class Found:
         record: name of its records.
         blocks: its signals.
         named: whether a user said which column is what.
-        op_unit: that a tag list says, None when it does not.
         shared: whether other loops stand in the same rows.
     """
 
@@ -47,7 +46,6 @@ class Found:
     record: str
     blocks: tuple[Block, ...]
     named: bool = False
-    op_unit: OpUnit | None = None
     shared: bool = False
 
     @property
@@ -73,7 +71,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     block = without_outliers(block, rules)
     unit = "its own unit"
     if not options.as_given:
-        block, unit, note = in_percent(block, options.op_unit or found.op_unit, named=found.named)
+        block, unit, note = in_percent(block, options.op_unit, named=found.named)
         rules.told.extend([note] if note else [])
         if not found.named:
             refuse_swapped(block)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError
@@ -14,6 +14,7 @@ from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.shown import spreads_of_records
 from stiction_ros.intake.tables.block import Block
+from stiction_ros.intake.tables.file_way import FileWay, way_of
 from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
 from stiction_ros.intake.tables.tags import TagList, read_tag_list
@@ -38,7 +39,7 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
         options: how to read them.
 
     Raises:
-        InputError: the tag list cannot be read.
+        InputError: the tag list cannot be read, or names a file that may be one of several.
     """
     tags = None if options.tags is None else read_tag_list(options.tags)
     yield from _with_names_of_their_own(_loops(paths, options, tags))
@@ -46,28 +47,44 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
 
 def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
     tables: list[_Table] = []
-    for file in _files(paths, options):
+    for file in _named(_files(paths, options), tags):
         if is_bag(file):
             yield from _bags(file, options)
             continue
         try:
+            way = way_of(file, options, tags)
             sheets = open_sheets(file)
         except InputError as error:
             yield Loop(stem(file), (file,), (), problem=str(error))
             continue
         for sheet in sheets:
             try:
-                plan = plan_of(sheet, options, tags)
+                plan = plan_of(sheet, way.options, way.tags)
             except InputError as error:
                 yield Loop(sheet.name, (file,), (), problem=str(error))
                 continue
-            table = _Table(sheet, plan)
+            table = _Table(sheet, plan, way)
             if plan.shape is Shape.ONE:
-                yield from _read([table], options, tags)
+                yield from _read([table])
             else:
                 tables.append(table)
     for group in _groups(tables):
-        yield from _read(group, options, tags)
+        yield from _read(group)
+
+
+def strange_files(paths: Sequence[Path], options: IntakeOptions) -> list[str]:
+    """Return the files that the tag list names and that are not there.
+
+    Args:
+        paths: files and folders.
+        options: how to read them.
+
+    Raises:
+        InputError: the tag list cannot be read.
+    """
+    if options.tags is None:
+        return []
+    return read_tag_list(options.tags).strange(list(_files(paths, options)))
 
 
 def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loop:
@@ -114,6 +131,20 @@ def is_bag(path: str | Path) -> bool:
 class _Table:
     sheet: Sheet
     plan: Plan
+    way: FileWay
+
+
+def _named(files: Iterator[Path], tags: TagList | None) -> Iterator[Path]:
+    """Return the files, none of which a row of the tag list takes for another.
+
+    Raises:
+        InputError: a row names several.
+    """
+    if tags is None or not tags.rows:
+        return files
+    every = list(files)
+    tags.refuse_ambiguous(list(dict.fromkeys(every)))
+    return iter(every)
 
 
 def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
@@ -191,12 +222,14 @@ def _groups(tables: Sequence[_Table]) -> Iterator[list[_Table]]:
     yield from (members for _, members in groups if members)
 
 
-def _read(group: Sequence[_Table], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
+def _read(group: Sequence[_Table]) -> Iterator[Loop]:
     """Yield the loops of tables that belong together."""
     blocks: dict[str, list[Block]] = {}
+    ways = {table.sheet.path: table.way for table in group}
     for table in group:
         try:
-            for name, read in blocks_of(table.sheet, table.plan, options, tags).items():
+            read_blocks = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
+            for name, read in read_blocks.items():
                 blocks.setdefault(name, []).extend(read)
         except InputError as error:
             for name in table.plan.loops or [table.sheet.name]:
@@ -208,10 +241,34 @@ def _read(group: Sequence[_Table], options: IntakeOptions, tags: TagList | None)
     for name in list(blocks):
         own = tuple(blocks.pop(name))
         single = group[0].plan.shape is Shape.ONE
-        unit = None if tags is None else tags.units.get(name)
         record = own[0].path.name if single else name
-        found = Found(name, record, own, group[0].plan.named, unit, not single)
+        files = {block.path for block in own}
+        named = all(table.plan.named for table in group if table.sheet.path in files)
+        found = Found(name, record, own, named, not single)
         try:
-            yield loop_of(found, options)
+            yield loop_of(found, _options_of(found, ways))
         except InputError as error:
             yield unread(found, str(error))
+
+
+def _options_of(found: Found, ways: Mapping[Path, FileWay]) -> IntakeOptions:
+    """Return the options of a loop, of which several files may hold signals.
+
+    Raises:
+        InputError: its files have OP in different units, or other sample times.
+    """
+    of_op = {block.path for block in found.blocks if any(k.signal == "op" for k in block.columns)}
+    single = not found.shared
+    units = {ways[path].op_unit(found.name, single=single) for path in of_op}
+    steps = {ways[path].options.sample_time for path in found.files}
+    for what, said in (("unit of OP", units), ("sample time", steps)):
+        if len(said) > 1:
+            raise InputError(
+                f"the {what} of {found.name} is not the same in all its files",
+                where=str(found.files[0]),
+                fix="say it in a row of --tags for each of them",
+            )
+    first = ways[found.files[0]].options
+    return dataclasses.replace(
+        first, op_unit=next(iter(units), first.op_unit), sample_time=next(iter(steps))
+    )

@@ -10,6 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.options import TO_PERCENT, OpUnit, known_op_unit
+from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block
 
 PERCENT = (-10.0, 110.0)
@@ -74,7 +75,7 @@ def in_percent(
             raise InputError(
                 f"OP lies between {low:.3g} and {high:.3g}: a share of travel, or %",
                 where=str(block.path),
-                fix="say which with --op-unit share or --op-unit percent",
+                fix=f"say which with --op-unit share or --op-unit percent {OR_ROW}",
             )
         if low < 0.0 and low >= -1.5 and high <= 1.5:
             note = (
@@ -229,7 +230,7 @@ def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
     return InputError(
         f"OP and PV look swapped: {reason}",
         where=str(block.path),
-        fix=f"name them, {exchanged}, or as they are, {as_they_are}",
+        fix=f"name them, {exchanged}, or as they are, {as_they_are} {OR_ROW}",
     )
 
 

@@ -10,9 +10,12 @@ from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
-from stiction_ros.intake.intake import is_bag
+from stiction_ros.intake.intake import is_bag, strange_files
 from stiction_ros.intake.options import OpUnit, TimeUnit
 from stiction_ros.intake.sheets.stamps import DateOrder
+
+NAMED = 8
+"""Names that a remark lists."""
 
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +48,9 @@ def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     """
     group = parser.add_argument_group("exports")
     group.add_argument(
-        "--tags", metavar="F", help="table loop,pv,sp,op,mode with the tags of each loop"
+        "--tags",
+        metavar="F",
+        help="table loop,pv,sp,op,mode with the tags of each loop, with file for one file alone",
     )
     if not many:
         group.add_argument("--loop", metavar="NAME", help="of several loops in a file")
@@ -150,7 +155,22 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
         for note in loop.notes:
             print(f"  note: {note}")
     print(f"{known} loops, {readable} can be read" if known else "no file of a loop")
+    if len(paths) > 1 or paths[0].is_dir():
+        tell_strangers(options.tags, "export", strange_files(paths, options))
     return 0 if readable else 1
+
+
+def tell_strangers(file: str | Path | None, what: str, names: Sequence[str]) -> None:
+    """Print to standard error which names of a file are not there, as they may be misspelt.
+
+    Args:
+        file: that has the names.
+        what: is called so, in a word.
+        names: that nothing has.
+    """
+    if names:
+        more = " and others" if len(names) > NAMED else ""
+        print(f"{file}: no {what} is called {', '.join(names[:NAMED])}{more}", file=sys.stderr)
 
 
 def _signals(loop: Loop) -> Iterator[str]:

@@ -9,12 +9,18 @@ import datetime
 import json
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from stiction_ros.cli.loop.identify import delay_range
-from stiction_ros.cli.options.intake import add_columns, add_intake, intake_options, show_loops
+from stiction_ros.cli.options.intake import (
+    add_columns,
+    add_intake,
+    intake_options,
+    show_loops,
+    tell_strangers,
+)
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.plant.survey_list import print_list
 from stiction_ros.cli.plant.survey_progress import progress
@@ -25,9 +31,6 @@ from stiction_ros.intake.sheets.text import open_text
 
 LOCAL = "local"
 """The engine of this machine."""
-
-NAMED = 8
-"""Names that a remark lists."""
 
 PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
 
@@ -75,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     # Judging takes compiled code, which other commands do not wait for.
     from stiction_ros.identification.options import IdentificationOptions
-    from stiction_ros.intake import loops
+    from stiction_ros.intake.intake import loops, strange_files
     from stiction_ros.survey.options import SurveyOptions
     from stiction_ros.survey.survey import Plan, survey
 
@@ -116,8 +119,10 @@ def run(options: argparse.Namespace) -> int:
     found = dataclasses.replace(
         found, date=datetime.datetime.now(datetime.UTC).isoformat(" ", "minutes")
     )
+    there = {entry.name for entry in found.entries}
     for file, names in ((options.cost, costs), (options.units, units)):
-        _tell_strangers(file, names, {entry.name for entry in found.entries})
+        tell_strangers(file, "loop", [name for name in names if name not in there])
+    tell_strangers(options.tags, "export", strange_files(paths, intake))
     if plan.out is not None:
         _write(found, plan.out, earlier)
     if options.json is not None:
@@ -192,14 +197,6 @@ def _pairs(file: str | None) -> list[tuple[int, str, str]]:
         raise InputError("has no second column", where=f"{file}: row {short}", fix="loop,value")
     pairs = [(number, row[0].strip(), row[1].strip()) for number, row in rows]
     return pairs[1:] if pairs and pairs[0][1].lower() in ("loop", "tag", "name") else pairs
-
-
-def _tell_strangers(file: str | None, names: Iterable[str], loops: set[str]) -> None:
-    """Say which names of a file are no loop, as a misspelt one would not be missed."""
-    strange = [name for name in names if name not in loops]
-    if strange:
-        more = " and others" if len(strange) > NAMED else ""
-        print(f"{file}: no loop is called {', '.join(strange[:NAMED])}{more}", file=sys.stderr)
 
 
 def _costs(file: str | None) -> dict[str, float]:

@@ -42,6 +42,7 @@ class Layout:
         units: unit of each column, empty where not known.
         first: row of cells (not counting blank ones) at which data begin.
         skipped: rows above the data that are neither header nor units.
+        place: row of cells of the header.
     """
 
     header: tuple[str, ...]
@@ -49,6 +50,7 @@ class Layout:
     units: tuple[str, ...]
     first: int
     skipped: int
+    place: int = 0
 
 
 def delimiter_of(lines: Sequence[str]) -> str:
@@ -71,8 +73,8 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
     """
     first = _first_data(rows)
     above = list(rows[:first])
-    if above and re.fullmatch(r"sep=.?", above[0][0].strip()):
-        above = above[1:]
+    told = bool(above and re.fullmatch(r"sep=.?", above[0][0].strip()))
+    above = above[told:]
     if not above:
         return Layout((), (), (), first, 0)
     width = len(rows[first]) if first < len(rows) else max(map(len, above))
@@ -91,7 +93,7 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
             below.remove(row)
             break
     skipped = place + len(below)
-    return Layout(tuple(header), given, tuple(units), first, skipped)
+    return Layout(tuple(header), given, tuple(units), first, skipped, told + place)
 
 
 def _paired(units: Sequence[str], row: Sequence[str]) -> list[tuple[str, str]]:

@@ -30,6 +30,9 @@ UNIT_NAMES = ("unit", "units", "uom", "eu", "engunits", "eng units", "einheit")
 SIGNALS = {word: signal for signal, words in SIGNAL_WORDS.items() for word in words}
 """Word to signal."""
 
+OR_ROW = "(or a row for this file in --tags)"
+"""What helps in one file where an option would hold for all."""
+
 _ATTRIBUTE = re.compile(r"(?i)[./](cv|f_cv|val|value|act|actual|target|measured)$")
 _BLOCK = re.compile(r"(?i)[./](pid\w*|regctl\w*|daca\w*|pic|fic_block|pidx|ctrl)$")
 _QUALITY = re.compile(r"(?i)[ ._:/-](quality|status|qual|q)$")

@@ -18,6 +18,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets import text
 from stiction_ros.intake.sheets.cells import Cells, is_number
 from stiction_ros.intake.sheets.layout import LOOKED_AT, Layout, delimiter_of, layout_of
+from stiction_ros.intake.sheets.names import OR_ROW
 
 PIECE = 200_000
 """Cells that are held as text at one time."""
@@ -97,7 +98,8 @@ class Sheet(abc.ABC):
             raise InputError(
                 f"has no column {name}",
                 where=str(self.path),
-                fix=f"its columns are {', '.join(self.layout.given)}; choose with {option}",
+                fix=f"its columns are {', '.join(self.layout.given)}; choose with {option} "
+                f"{OR_ROW}",
             )
         return index
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, number
+from stiction_ros.intake.sheets.names import OR_ROW
 
 DAY = 86400.0
 
@@ -228,7 +229,7 @@ class Stamps:
             raise InputError(
                 f"{next(iter(self._dates))} may begin with the day or with the month",
                 where=where,
-                fix="say which with --dates dmy or --dates mdy",
+                fix=f"say which with --dates dmy or --dates mdy {OR_ROW}",
             )
         order, read = next(iter(found.items()))
         first = "day" if order is DateOrder.DAY else "month"

@@ -11,7 +11,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
 from stiction_ros.intake.sheets.cells import is_stamp
-from stiction_ros.intake.sheets.names import TIME_NAMES
+from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Times
 from stiction_ros.intake.tables.block import Clock
@@ -113,7 +113,7 @@ def in_seconds(
         raise InputError(
             f"samples are {step:g} apart in {name}, which may be milliseconds or seconds",
             where=str(sheet.path),
-            fix="say which with --time-unit ms or --time-unit s",
+            fix=f"say which with --time-unit ms or --time-unit s {OR_ROW}",
         )
     dated = 3e8 <= times.start <= 4e9
     return times.seconds, clock._replace(dated=dated, zoned=dated), ""

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from stiction_ros.errors import InputError
 from stiction_ros.intake.options import CsvColumns, IntakeOptions
 from stiction_ros.intake.sheets.names import (
+    OR_ROW,
     QUALITY_NAMES,
     TAG_NAMES,
     UNIT_NAMES,
@@ -16,7 +17,7 @@ from stiction_ros.intake.sheets.names import (
     Tag,
     read_tag,
 )
-from stiction_ros.intake.sheets.sheet import Sheet
+from stiction_ros.intake.sheets.sheet import Sheet, stem
 from stiction_ros.intake.tables.block import Key
 from stiction_ros.intake.tables.clock import TimeColumn, time_column
 from stiction_ros.intake.tables.tags import TagList
@@ -80,6 +81,7 @@ def plan_of(sheet: Sheet, options: IntakeOptions, tags: TagList | None) -> Plan:
             tag=long[0],
             value=long[1],
             unit=_first(sheet, UNIT_NAMES),
+            named=tags is not None and bool(tags.own),
         )
     written = tagged_columns(sheet.layout.given)
     if written and (len(written["op"]) == 1 or set(written["op"]) != set(written["pv"])):
@@ -142,7 +144,7 @@ def _refuse_missing(sheet: Sheet, op: list[str], pv: list[str], time: str | None
             f"has no columns {', '.join(names[:-1])} and {names[-1]}",
             where=str(sheet.path),
             fix=f"its columns are {', '.join(sheet.layout.given)}; choose with "
-            f"{' '.join(options)} [--sp TAG=COLUMN]",
+            f"{' '.join(options)} [--sp TAG=COLUMN] {OR_ROW}",
         )
 
 
@@ -185,6 +187,8 @@ def _wide(sheet: Sheet, columns: CsvColumns, tags: TagList | None) -> Plan | Non
             notes.append(f"{given} is left out: {tag.signal.upper()} of {tag.loop} is {first}")
             continue
         signals[key] = index
+    if tags is not None:
+        _refuse_strange(sheet, tags)
     if not loops:
         return None
     time = time_column(sheet, columns.time)
@@ -194,7 +198,25 @@ def _wide(sheet: Sheet, columns: CsvColumns, tags: TagList | None) -> Plan | Non
         key = Key(tag.signal, "" if tag.signal == "mode" else tag.loop)
         if (of := loops.get(tag.loop, {}).get(key)) is not None:
             beside[of] = index
-    return Plan(Shape.WIDE, time, loops, beside, whole, notes=tuple(notes))
+    named = tags is not None and bool(tags.own)
+    return Plan(Shape.WIDE, time, loops, beside, whole, named=named, notes=tuple(notes))
+
+
+def _refuse_strange(sheet: Sheet, tags: TagList) -> None:
+    """Raise where rows for this file name what is none of its columns; sheets share theirs.
+
+    Raises:
+        InputError: they do.
+    """
+    names = (*sheet.layout.given, *sheet.layout.header, sheet.name)
+    known = {" ".join(name.split()).casefold() for name in names}
+    strange = [tag for key, tag in tags.own.items() if key not in known]
+    if strange and sheet.name == stem(sheet.path):
+        raise InputError(
+            f"has no column {' and no '.join(strange)}",
+            where=str(sheet.path),
+            fix=f"its columns are {', '.join(sheet.layout.given)}; correct its row in --tags",
+        )
 
 
 def _qualities(sheet: Sheet, signals: set[int]) -> tuple[dict[int, int], int | None]:

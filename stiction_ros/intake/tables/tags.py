@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import OpUnit, op_unit
-from stiction_ros.intake.sheets.cells import Words
-from stiction_ros.intake.sheets.names import SIGNAL_WORDS, SIGNALS, Tag
-from stiction_ros.intake.sheets.typed import open_sheets
+from stiction_ros.intake.options import OpUnit
+from stiction_ros.intake.sheets.names import Tag
+from stiction_ros.intake.tables.tag_rows import TagRow, read_rows
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,73 +19,92 @@ class TagList:
     Attributes:
         loops: name of the loop, signal, for each tag in small letters.
         units: unit of OP of loops of which the list says it.
+        rows: rows that count for one file alone, by its name.
+        own: in the list of a file the tags that its rows name, by their small letters.
     """
 
     loops: Mapping[str, Tag]
     units: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)
+    rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)
+    own: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def read(self, name: str) -> Tag | None:
         """Return what a tag is, None when the list does not have it."""
-        return self.loops.get(" ".join(name.split()).casefold())
+        return self.loops.get(_key(name))
+
+    def of_file(self, path: Path) -> TagList | None:
+        """Return the list for one file, its own rows first; None when nothing is in it.
+
+        Raises:
+            InputError: its rows have a tag twice.
+        """
+        rows = self.rows_of(path)
+        if not rows and self.loops:
+            return self
+        own = {_key(tag): tag for row in rows for _, tag in row.tags}
+        loops = {**self.loops, **_by_tag(rows)}
+        return TagList(loops, self.units, own=own) if loops or self.units else None
+
+    def rows_of(self, path: Path) -> list[TagRow]:
+        """Return the rows that count for one file alone."""
+        return [row for row in self.rows.get(path.name, ()) if row.names(path)]
+
+    def refuse_ambiguous(self, files: Sequence[Path]) -> None:
+        """Raise where a row names several files.
+
+        Raises:
+            InputError: it does, and its line.
+        """
+        taken: dict[str, Path] = {}
+        for file in files:
+            for row in self.rows_of(file):
+                if taken.setdefault(row.where, file) != file:
+                    raise InputError(
+                        f"{row.file} may be {taken[row.where]} or {file}",
+                        where=row.where,
+                        fix="write more of its path in the column file",
+                    )
+
+    def strange(self, files: Sequence[Path]) -> list[str]:
+        """Return the files of rows that are none of ``files``."""
+        there = {row.file for file in files for row in self.rows_of(file)}
+        named = dict.fromkeys(row.file for rows in self.rows.values() for row in rows)
+        return [file for file in named if file not in there]
 
 
 def read_tag_list(path: Path) -> TagList:
     """Read a table with a row a loop (``loop,pv,sp,op,mode``) or a tag (``tag,loop,signal``).
 
-    A column ``op_unit`` may say ``percent``, ``share`` or ``ma``. Other columns are ignored.
+    A column ``op_unit`` may say ``percent``, ``share`` or ``ma``. A row with a ``file`` counts
+    for that file alone, and may have ``time``, ``dates``, ``time_unit`` and ``sample_time``.
+    Other columns are ignored.
 
     Raises:
         InputError: it cannot be read, has other columns, or a tag twice.
     """
-    sheet = open_sheets(path)[0]
-    header = [name.casefold() for name in sheet.layout.header]
-    words = [Words() for _ in header]
-    for piece in sheet.pieces():
-        for column, cells in zip(words, piece.columns, strict=True):
-            column.add(cells)
-    table = [[list(w.known)[code].strip() for code in w.codes().tolist()] for w in words]
-    columns = dict(zip(header, table, strict=True))
-    named = {signal: columns[signal] for signal in SIGNAL_WORDS if signal in columns}
-    loop = columns.get("loop", columns.get("name"))
-    if loop is not None and "pv" in named and "op" in named:
-        rows = [
-            (name, signal, tag)
-            for signal, tags in named.items()
-            for name, tag in zip(loop, tags, strict=True)
-        ]
-    elif loop is not None and "tag" in columns and "signal" in columns:
-        triples = zip(loop, columns["signal"], columns["tag"], strict=True)
-        rows = [(name, _known(signal, path), tag) for name, signal, tag in triples]
-    else:
-        raise InputError(
-            f"has the columns {', '.join(sheet.layout.given)}",
-            where=str(path),
-            fix="a tag list has the columns loop,pv,sp,op,mode with a row a loop, or "
-            "tag,loop,signal",
-        )
-    units = columns.get("op_unit", columns.get("unit", [""] * len(loop)))
+    rows = read_rows(path)
+    general = [row for row in rows if not row.file]
+    of_files: dict[str, list[TagRow]] = {}
+    for row in rows:
+        if row.file:
+            of_files.setdefault(row.file_name, []).append(row)
     return TagList(
-        _by_tag(rows, path),
-        {name: op_unit(unit, path) for name, unit in zip(loop, units, strict=True) if unit},
+        _by_tag(general),
+        {row.loop: row.unit for row in general if row.unit is not None},
+        of_files,
     )
 
 
-def _by_tag(rows: Sequence[tuple[str, str, str]], path: Path) -> dict[str, Tag]:
+def _by_tag(rows: Sequence[TagRow]) -> dict[str, Tag]:
     found: dict[str, Tag] = {}
-    for loop, signal, tag in rows:
-        key = " ".join(tag.split()).casefold()
-        if not key or not loop:
-            continue
-        if key in found and found[key] != Tag(loop, signal):
-            raise InputError(f"tag {tag} is there twice", where=str(path), fix="list it once")
-        found[key] = Tag(loop, signal)
+    for row in rows:
+        for signal, tag in row.tags:
+            key, told = _key(tag), Tag(row.loop, signal)
+            if found.setdefault(key, told) != told:
+                fix = "list it once" if row.file else "list it once, or with the file of each"
+                raise InputError(f"tag {tag} is there twice", where=row.where, fix=fix)
     return found
 
 
-def _known(word: str, path: Path) -> str:
-    signal = SIGNALS.get(word.casefold())
-    if signal is None:
-        raise InputError(
-            f"signal {word!r} is unknown", where=str(path), fix=f"use {', '.join(SIGNAL_WORDS)}"
-        )
-    return signal
+def _key(name: str) -> str:
+    return " ".join(name.split()).casefold()
