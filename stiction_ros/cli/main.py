@@ -84,6 +84,18 @@ class _Parser(argparse.ArgumentParser):
             self.error(self._unknown(spare))
         return found, spare
 
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as error:
+            raise _with_meant(error, action, arg_string) from None
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            raise _with_meant(error, action, value) from None
+
     def _unknown(self, spare: Sequence[str]) -> str:
         words = [word.partition("=")[0] for word in spare if word.startswith("-")]
         if words:
@@ -92,6 +104,14 @@ class _Parser(argparse.ArgumentParser):
         many = any(action.dest == "record" for action in self._actions)
         fix = "; it takes one record, stiction survey PATH … judges several" if many else ""
         return f"unexpected {' '.join(spare)}{fix}"
+
+
+def _with_meant(
+    error: argparse.ArgumentError, action: argparse.Action, word: object
+) -> argparse.ArgumentError:
+    """Return the error of a choice that there is not, with the one that may be meant."""
+    near = _meant(str(word), map(str, action.choices or ()))
+    return argparse.ArgumentError(action, f"{error.message}{near}")
 
 
 def _meant(word: str, known: Iterable[str]) -> str:

@@ -43,6 +43,9 @@ def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[
     [
         (["surwey", "x"], "there is no command surwey: did you mean survey?"),
         (["survey", "x", "--cots", "f"], "unknown option --cots: did you mean --cost"),
+        (["bench", "gian"], "): did you mean gain?"),
+        (["survey", "x", "--dates", "dym"], "did you mean mdy or dmy?"),
+        (["survey", "x", "--op-unit", "shar"], "invalid OpUnit value: 'shar': did you mean share?"),
         (["identify", "a.csv", "b.csv"], "unexpected b.csv; it takes one record, stiction survey"),
     ],
 )
