@@ -52,7 +52,7 @@ class WaveCandidate(Candidate):
             factors=wave.factors,
             twins=twins,
             dated=wave.dated,
-            sharp=isinstance(wave, ShapedWave | StepWave),
+            sharp=isinstance(wave, SineWave | ShapedWave | StepWave),
             wave=wave,
             index=index,
         )

@@ -19,6 +19,7 @@ FRICTION = "friction"  # families of effects
 LAGS = "lag"
 SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
 DOUBTFUL = 3.0  # standard deviations
+EQUAL = 1.0  # BIC by which two explanations differ that are one
 MOMENT = 10.0  # what held-out rows may lose by an effect of one moment
 
 
@@ -109,7 +110,7 @@ def decide(
         names += [twin for twin in rival.candidate.twins if twin not in names]
     if names:
         reason = "OP and PV do not tell them apart"
-        one_family = all(_lags(f) and _lags(best) for f in rivals)
+        one_family = all((_lags(f) and _lags(best)) or _as_well(f, best) for f in rivals)
         return Decision(GapVerdict.AMBIGUOUS, best, tuple(names), one_family, reason)
     return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
 
@@ -165,6 +166,12 @@ def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
 
 def _lags(fit: CandidateFit) -> bool:
     return fit.candidate.about.family == LAGS
+
+
+def _as_well(fit: CandidateFit, best: CandidateFit) -> bool:
+    """Tell whether the same effect at another place explains all of it, as a sine's load does."""
+    same = fit.candidate.effect == best.candidate.effect
+    return same and abs(best.evidence - fit.evidence) < EQUAL
 
 
 def _same_family(one: CandidateFit, other: CandidateFit) -> bool:

@@ -17,8 +17,10 @@ from stiction_ros.loop.model import PiTuning
 QUICK = GapOptions(quick=True)
 
 
-def answered(seed: int, stem: bool = True, given: str = "exact") -> Discrepancy:
-    loop = hidden_loop(seed, given=given)
+def answered(
+    seed: int, stem: bool = True, given: str = "exact", family: str = "single"
+) -> Discrepancy:
+    loop = hidden_loop(seed, family, given)
     record = loop.record if stem else dataclasses.replace(loop.record, stem=None)
     return find_discrepancy(LoopModel.from_mapping(loop.given), [record], QUICK)
 
@@ -203,3 +205,16 @@ def test_a_set_in_doubt_that_leaves_a_larger_noise_is_no_answer() -> None:
 def test_noise_behind_an_effect_is_searched_from_where_the_effect_was_found() -> None:
     answer = answered(110059)  # a slew where the model declares no noise
     assert names(answer) == [("valve:V1", "slew")]
+
+
+@pytest.mark.parametrize(("seed", "first"), [(841, "saturation"), (130038, "stiction")])
+def test_a_sine_is_found_beside_what_was_found_first(seed: int, first: str) -> None:
+    valve, wave = answered(seed, family="two").effects
+    assert (valve.place, valve.effect) == ("valve:V1", first)
+    places = {wave.place, *(place for place, effect in wave.alternatives if effect == "sine")}
+    assert wave.effect == "sine"
+    assert places == {"disturbance:PV1", "load:V1"}
+
+
+def test_a_step_that_held_out_rows_refuse_does_not_take_in_one_at_another_place() -> None:
+    assert names(answered(101)) == [("valve:V1", "stiction")]
