@@ -1,13 +1,24 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import pytest
 from evidence_loops import pi_loop
 
+from stiction_ros.field import field_loop
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.evidence.engine import doubted
-from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.identification.evidence import engine
+from stiction_ros.identification.evidence.rates import PRICE
+from stiction_ros.identification.evidence.verdict import (
+    AS_RECORDED,
+    CONFIRMED,
+    confirms,
+    doubted,
+)
+from stiction_ros.identification.result.cause import Cause, CauseKind
+from stiction_ros.identification.result.identification import Identification, ValveEstimate
+from stiction_ros.records.parts import longest_part
 
 
 def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:
@@ -62,7 +73,10 @@ def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
         ({"loop_gone": 0.01, "controller_fit": 0.99}, VerdictKind.UNDECIDED),
         ({"loop_gone": 0.01, "controller_fit": 0.5}, VerdictKind.STICKY),
         ({"loop_gone": 0.01, "delta_bic": 60.0}, VerdictKind.STICKY),
-        ({"loop_gone": 0.0, "delta_bic": 60.0, "moved_with": 1e6}, VerdictKind.UNDECIDED),
+        ({"outside_line": 50.0, "line_rivalry": 2.0, "held": 0.0}, VerdictKind.UNDECIDED),
+        ({"outside_line": 50.0, "line_rivalry": 0.5, "held": 0.0}, VerdictKind.STICKY),
+        ({"outside_line": 50.0, "line_rivalry": 2.0, "held": 1.0}, VerdictKind.STICKY),
+        ({"outside_line": -5.0, "line_rivalry": 2.0, "held": 0.0}, VerdictKind.STICKY),
     ],
 )
 def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(
@@ -99,3 +113,54 @@ def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(
     for kind in (VerdictKind.HEALTHY, VerdictKind.UNDECIDED):
         other = dataclasses.replace(valve, verdict=kind)
         assert doubted(other) == other
+
+
+@pytest.fixture(scope="module")
+def told() -> Identification:
+    """A sticky valve whose loop moves as recorded, and a third less without the friction."""
+    return with_loop(identify(pi_loop(3.0, 1.0)))
+
+
+def with_loop(
+    found: Identification, *, kind: CauseKind = CauseKind.NONE, **changes: float
+) -> Identification:
+    """Return an identification whose first valve and output say something else."""
+    loop = {"controller_fit": 0.99, "moved_with": 1.0, "loop_gone": 0.33} | changes
+    valve = dataclasses.replace(found.valves[0], evidence=loop)
+    cause = Cause(kind, None, 0.0, 0.0, "")
+    output = dataclasses.replace(found.outputs[0], cause=cause)
+    return dataclasses.replace(found, valves=(valve,), outputs=(output,))
+
+
+@pytest.mark.parametrize(
+    ("changes", "confirmed"),
+    [
+        ({}, True),
+        ({"moved_with": 0.99 / AS_RECORDED}, False),
+        ({"moved_with": 1.01 * AS_RECORDED}, False),
+        ({"loop_gone": 0.9 * CONFIRMED}, False),
+        ({"controller_fit": 0.8}, False),
+        ({"kind": CauseKind.UNKNOWN}, True),
+        ({"kind": CauseKind.VALVE}, True),
+        ({"kind": CauseKind.TUNING}, False),
+        ({"kind": CauseKind.DISTURBANCE}, False),
+        ({"kind": CauseKind.SET_POINT}, False),
+    ],
+)
+def test_a_loop_confirms_a_friction_without_which_it_moves_less_and_nothing_else_explains_it(
+    told: Identification, changes: dict[str, Any], confirmed: bool
+) -> None:
+    assert confirms(with_loop(told, **changes), 0) is confirmed
+
+
+def test_a_friction_that_one_rate_shows_counts_where_its_loop_confirms_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A record slower than its controller, of the field: no mean of samples shows it."""
+    record = longest_part([field_loop(380).record])
+    valve = identify(record).valves[0]
+    assert valve.verdict.has_friction
+    assert valve.evidence["gain_1"] > 2 * PRICE > 2 * valve.evidence["gain_2"]
+    assert valve.evidence["rate"] == 1.0
+    monkeypatch.setattr(engine, "confirms", lambda found, valve: False)
+    assert identify(record).valves[0].verdict is VerdictKind.UNDECIDED
