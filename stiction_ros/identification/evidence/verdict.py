@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 
 from stiction_ros.identification.closed_loop.explanation import (
-    LINE,
     OPEN,
     SURE,
     is_wave_itself,
@@ -22,6 +21,7 @@ from stiction_ros.identification.result.identification import (
 
 LEAST_GONE = 0.08  # share of OP's recorded movement that must go away with a friction
 WIDER = 2.0  # of OP's movement: a wider band is not what makes it
+MATTERS = 0.1  # of OP's movement about its mean: a smaller band hardly keeps anything from the stem
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
 REJECTED = 3.0
 """−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
@@ -29,8 +29,7 @@ likelihood of none at both together."""
 REJECTING = 2  # rates that do
 SURELY = 10.0  # what they must lose where one rate alone rejects them
 NOTHING = 10.0
-"""What they may gain at any rate with news, beside a wave more as friction must gain more: about as
-much as the best of many frictions does on noise."""
+"""What they may gain at any rate with news: about as much as the best of many does on noise."""
 CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
 AS_RECORDED = 1.3  # factor within which its loop moves as recorded
 ELSEWHERE = (CauseKind.TUNING, CauseKind.DISTURBANCE, CauseKind.SET_POINT)
@@ -71,11 +70,7 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
     speak = [look for look in seen if look.speaks(valve)]
     if any(look.accepted[valve].material_gain > look.price + SURE for look in speak):
         return False
-    gains = [
-        look.accepted[valve].material_gain + PRICE - look.price
-        for look in speak
-        if look.carries_news
-    ]
+    gains = [look.accepted[valve].material_gain for look in speak if look.carries_news]
     lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
     twice = sum(one >= REJECTED for one in lost) >= REJECTING
     surely = max(lost, default=0.0) >= SURELY
@@ -101,9 +96,10 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
 
     A friction without which OP would move all the same is not what moves it, where the controller
     is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
-    that comes from outside; neither can one that gains less than a line from outside alone, where
-    its rates speak of processes that the controller would not hold. And a band that is wider than
-    OP moves about its mean moves with its large moves alone, as those in manual are.
+    that comes from outside; neither can one beside which a line from outside gains, where its rates
+    speak of processes that the controller would not hold. A band that is wider than OP moves about
+    its mean moves with its large moves alone, as those in manual are, and one that is a small share
+    of them is none to speak of.
     """
     if not valve.verdict.has_friction:
         return valve
@@ -112,9 +108,9 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     gone = told.get("loop_gone", 1.0) * min(told.get("moved_with", 1.0), 1.0)
     idle = known and gone < LEAST_GONE and told.get("delta_bic", 0.0) < SURE
     wide = valve.band_share > WIDER
-    line = told.get("outside_line", 0.0) > LINE and told.get("line_rivalry", 0.0) > 1.0
-    rival = line and not told.get("held", 1.0)
-    if not (idle or wide or rival or stem_is_wave(valve)):
+    small = 0.0 < valve.band_share < MATTERS
+    rival = told.get("outside_line", 0.0) > 0.0 and not told.get("held", 1.0)
+    if not (idle or wide or small or rival or stem_is_wave(valve)):
         return valve
     return dataclasses.replace(
         valve,

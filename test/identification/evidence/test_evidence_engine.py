@@ -13,6 +13,8 @@ from stiction_ros.identification.evidence.rates import PRICE
 from stiction_ros.identification.evidence.verdict import (
     AS_RECORDED,
     CONFIRMED,
+    MATTERS,
+    WIDER,
     confirms,
     doubted,
 )
@@ -73,10 +75,9 @@ def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
         ({"loop_gone": 0.01, "controller_fit": 0.99}, VerdictKind.UNDECIDED),
         ({"loop_gone": 0.01, "controller_fit": 0.5}, VerdictKind.STICKY),
         ({"loop_gone": 0.01, "delta_bic": 60.0}, VerdictKind.STICKY),
-        ({"outside_line": 50.0, "line_rivalry": 2.0, "held": 0.0}, VerdictKind.UNDECIDED),
-        ({"outside_line": 50.0, "line_rivalry": 0.5, "held": 0.0}, VerdictKind.STICKY),
-        ({"outside_line": 50.0, "line_rivalry": 2.0, "held": 1.0}, VerdictKind.STICKY),
-        ({"outside_line": -5.0, "line_rivalry": 2.0, "held": 0.0}, VerdictKind.STICKY),
+        ({"outside_line": 5.0, "held": 0.0}, VerdictKind.UNDECIDED),
+        ({"outside_line": 5.0, "held": 1.0}, VerdictKind.STICKY),
+        ({"outside_line": -5.0, "held": 0.0}, VerdictKind.STICKY),
     ],
 )
 def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(
@@ -103,6 +104,9 @@ def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(
         moves=40,
         evidence=plain | changes,
     )
+    for share, taken_back in ((0.9 * MATTERS, True), (1.1 * WIDER, True), (0.5, False)):
+        other = doubted(dataclasses.replace(valve, band_share=share)).verdict
+        assert other is (VerdictKind.UNDECIDED if taken_back else verdict)
     found = doubted(valve)
     assert found.verdict is verdict
     assert found.static_interval[0] == (2.5 if verdict is VerdictKind.STICKY else 0.0)

@@ -12,7 +12,7 @@ from stiction_ros.identification.closed_loop.explanation import SURE
 from stiction_ros.identification.evidence.accepted import Accepted
 from stiction_ros.identification.evidence.engine import _stability
 from stiction_ros.identification.evidence.fit.problem import Problem
-from stiction_ros.identification.evidence.rates import BESIDE, PRICE, Agreement, Look
+from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
 from stiction_ros.identification.evidence.search import Found, ideal
 from stiction_ros.identification.evidence.verdict import (
     MATERIAL,
@@ -128,15 +128,6 @@ def test_rows_without_news_acquit_no_valve_and_speak_for_friction_when_sure(
     assert verdict_of(figures, found, told, 0, options) is verdict
     silent = tuple(dataclasses.replace(look, carries_news=False) for look in seen[1:])
     assert verdict_of(figures, found, silent, 0, options) is UNDECIDED
-
-
-def test_beside_a_wave_what_matters_may_gain_as_much_more_as_friction_must(blank: Look) -> None:
-    figures, options = FIGURES | {"delta_bic": -13.0}, IdentificationOptions()
-    for more, verdict in ((BESIDE - 1.0, HEALTHY), (BESIDE + 1.0, UNDECIDED)):
-        found, seen = agreed(blank, rejected(30.0), held(NOTHING + more, (0.1, 0.2)))
-        waved = tuple(dataclasses.replace(look, wave_gain=0.0) for look in seen)
-        assert verdict_of(figures, found, waved, 0, options) is verdict
-        assert verdict_of(figures, found, seen, 0, options) is UNDECIDED
 
 
 def test_what_gains_beside_a_process_that_no_controller_holds_is_nothing(
