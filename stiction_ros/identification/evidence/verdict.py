@@ -6,6 +6,7 @@ import dataclasses
 
 from stiction_ros.identification.closed_loop.explanation import (
     OPEN,
+    RIVAL,
     SURE,
     is_wave_itself,
 )
@@ -96,10 +97,10 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
 
     A friction without which OP would move all the same is not what moves it, where the controller
     is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
-    that comes from outside; neither can one beside which a line from outside gains, where its rates
-    speak of processes that the controller would not hold. A band that is wider than OP moves about
-    its mean moves with its large moves alone, as those in manual are, and one that is a small share
-    of them is none to speak of.
+    that comes from outside; neither can one beside which a line from outside gains, and alone about
+    as much, where its rates speak of processes that the controller would not hold. A band that is
+    wider than OP moves about its mean moves with its large moves alone, as those in manual are, and
+    one that is a small share of them is none to speak of.
     """
     if not valve.verdict.has_friction:
         return valve
@@ -109,7 +110,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     idle = known and gone < LEAST_GONE and told.get("delta_bic", 0.0) < SURE
     wide = valve.band_share > WIDER
     small = 0.0 < valve.band_share < MATTERS
-    rival = told.get("outside_line", 0.0) > 0.0 and not told.get("held", 1.0)
+    line = told.get("outside_line", 0.0) > 0.0 and told.get("line_rivalry", 0.0) > RIVAL
+    rival = line and not told.get("held", 1.0)
     if not (idle or wide or small or rival or stem_is_wave(valve)):
         return valve
     return dataclasses.replace(

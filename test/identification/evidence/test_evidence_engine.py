@@ -75,9 +75,10 @@ def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
         ({"loop_gone": 0.01, "controller_fit": 0.99}, VerdictKind.UNDECIDED),
         ({"loop_gone": 0.01, "controller_fit": 0.5}, VerdictKind.STICKY),
         ({"loop_gone": 0.01, "delta_bic": 60.0}, VerdictKind.STICKY),
-        ({"outside_line": 5.0, "held": 0.0}, VerdictKind.UNDECIDED),
-        ({"outside_line": 5.0, "held": 1.0}, VerdictKind.STICKY),
-        ({"outside_line": -5.0, "held": 0.0}, VerdictKind.STICKY),
+        ({"outside_line": 5.0, "line_rivalry": 0.4, "held": 0.0}, VerdictKind.UNDECIDED),
+        ({"outside_line": 5.0, "line_rivalry": 0.4, "held": 1.0}, VerdictKind.STICKY),
+        ({"outside_line": 5.0, "line_rivalry": 0.2, "held": 0.0}, VerdictKind.STICKY),
+        ({"outside_line": -5.0, "line_rivalry": 0.4, "held": 0.0}, VerdictKind.STICKY),
     ],
 )
 def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(
