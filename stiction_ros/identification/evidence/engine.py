@@ -27,6 +27,7 @@ from stiction_ros.identification.evidence.rates import (
 )
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.evidence.verdict import (
+    acquits,
     confirms,
     doubted,
     stem_is_wave,
@@ -106,6 +107,7 @@ def answered(
     )
     heard = _Heard(record, data, part, data if part is record else prepare(part, options), options)
     looped = heard.confirmed(seen, heard.without_waves(seen, valves))
+    looped = heard.acquitted(seen, looped)
     judged = tuple(doubted(valve) for valve in looped.valves)
     surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
     return dataclasses.replace(
@@ -190,6 +192,22 @@ class _Heard:
                     break
         return best
 
+    def acquitted(self, seen: tuple[Look, ...], found: Identification) -> Identification:
+        """Return ``found``, undecided valves healthy whose loop moves as recorded without friction.
+
+        What else explains the movement has to do so beside valves that follow OP, too.
+        """
+        best = found
+        for j, valve in enumerate(found.valves):
+            if valve.verdict is not VerdictKind.UNDECIDED or not acquits(best, seen, j):
+                continue
+            tried, agreed = list(best.valves), agreement(seen, j)
+            tried[j] = _judged(self.part, seen, j, self.options, agreed, VerdictKind.HEALTHY)
+            again = self.looped(tuple(tried))
+            if acquits(again, seen, j):
+                best = again
+        return best
+
 
 def _at(valve: ValveEstimate, other: Candidate, look: Look, record: Record) -> ValveEstimate:
     """Return an estimate with the friction of another candidate, which its intervals hold."""
@@ -211,8 +229,9 @@ def _judged(
     valve: int,
     options: IdentificationOptions,
     agreed: Agreement,
+    verdict: VerdictKind | None = None,
 ) -> ValveEstimate:
-    """Return the estimate of one valve at the rate of ``agreed``."""
+    """Return the estimate of one valve at the rate of ``agreed``; its verdict may be known."""
     problem, found = agreed.look.problem, agreed.look.found
     span = float(problem.span[valve])
     held = agreed.look.accepted[valve].times(span)
@@ -222,7 +241,7 @@ def _judged(
         if look.wave_gain is not None:
             figures[f"wave_{look.problem.rate}"] = look.wave_gain
         figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
-    verdict = verdict_of(figures, agreed, seen, valve, options)
+    verdict = verdict or verdict_of(figures, agreed, seen, valve, options)
     healthy = verdict is VerdictKind.HEALTHY
     unseen = Unseen(0.0, 0.0) if healthy else Unseen.of(span * problem.op[valve])
     ends = [unseen.static(held.static), unseen.dynamic(held.dynamic), unseen.band(held.band)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from stiction_ros.identification.closed_loop.explanation import MATERIAL as CAUSES
 from stiction_ros.identification.closed_loop.explanation import (
     OPEN,
     RIVAL,
@@ -32,8 +33,10 @@ SURELY = 10.0  # what they must lose where one rate alone rejects them
 NOTHING = 10.0
 """What they may gain at any rate with news: about as much as the best of many does on noise."""
 CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
+HARDLY = 0.05  # share of the movement that goes away, at most, with one that does not matter
 AS_RECORDED = 1.3  # factor within which its loop moves as recorded
-ELSEWHERE = (CauseKind.TUNING, CauseKind.DISTURBANCE, CauseKind.SET_POINT)
+OWN = (CauseKind.TUNING, CauseKind.SET_POINT)
+ELSEWHERE = (*OWN, CauseKind.DISTURBANCE)
 
 
 def verdict_of(
@@ -90,6 +93,27 @@ def confirms(found: Identification, valve: int) -> bool:
     known = told.get("controller_fit", 0.0) > OPEN
     as_recorded = 1.0 / AS_RECORDED < moved < AS_RECORDED
     return known and as_recorded and told.get("loop_gone", 0.0) > CONFIRMED
+
+
+def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
+    """Tell whether a loop closed again shows that the friction of a valve does not matter.
+
+    No friction is sure, and without any the loop moves as recorded, hardly less than with what the
+    record does not reject. Its controller rings with the process, or its set-point cycles; or
+    nothing cycles, no rate finds friction, and one rejects all that matters. A wave from outside
+    acquits no valve: a stem that goes to and fro with it may be missed.
+    """
+    told = found.valves[valve].evidence
+    free, gone = told.get("moved_without", 0.0), told.get("loop_gone", 0.0)
+    known = told.get("controller_fit", 0.0) > OPEN and told["delta_bic"] <= 0.0
+    causes = [model.cause.kind if model.cause else CauseKind.UNKNOWN for model in found.outputs]
+    if not known or not 1.0 / AS_RECORDED < free < AS_RECORDED or CauseKind.DISTURBANCE in causes:
+        return False
+    if all(kind in OWN for kind in causes):
+        return gone < CAUSES
+    finds = any(look.beyond_price(valve) > 0.0 for look in seen)
+    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
+    return gone < HARDLY and not finds and max(lost, default=0.0) >= REJECTED
 
 
 def doubted(valve: ValveEstimate) -> ValveEstimate:

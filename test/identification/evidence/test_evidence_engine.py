@@ -8,13 +8,17 @@ from evidence_loops import pi_loop
 
 from stiction_ros.field import field_loop
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
+from stiction_ros.identification.closed_loop.explanation import MATERIAL
 from stiction_ros.identification.evidence import engine
-from stiction_ros.identification.evidence.rates import PRICE
+from stiction_ros.identification.evidence.rates import PRICE, Look, looks
 from stiction_ros.identification.evidence.verdict import (
     AS_RECORDED,
     CONFIRMED,
+    HARDLY,
     MATTERS,
+    REJECTED,
     WIDER,
+    acquits,
     confirms,
     doubted,
 )
@@ -168,4 +172,64 @@ def test_a_friction_that_one_rate_shows_counts_where_its_loop_confirms_it(
     assert valve.evidence["gain_1"] > 2 * PRICE > 2 * valve.evidence["gain_2"]
     assert valve.evidence["rate"] == 1.0
     monkeypatch.setattr(engine, "confirms", lambda found, valve: False)
+    assert identify(record).valves[0].verdict is VerdictKind.UNDECIDED
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Look:
+    """A rate at which every friction that matters is rejected."""
+    look = looks(pi_loop(0.0, 0.0, samples=200), IdentificationOptions())[0]
+    lost = dataclasses.replace(look.accepted[0], gain=0.0, material_gain=-1.1 * REJECTED)
+    return dataclasses.replace(look, accepted=(lost,))
+
+
+@pytest.mark.parametrize(
+    ("changes", "acquitted"),
+    [
+        ({}, True),
+        ({"delta_bic": 1.0}, False),
+        ({"controller_fit": 0.8}, False),
+        ({"moved_without": 0.99 / AS_RECORDED}, False),
+        ({"moved_without": 1.01 * AS_RECORDED}, False),
+        ({"loop_gone": 1.1 * HARDLY}, False),
+        ({"kind": CauseKind.UNKNOWN}, True),
+        ({"kind": CauseKind.VALVE}, True),
+        ({"kind": CauseKind.DISTURBANCE}, False),
+        ({"kind": CauseKind.TUNING, "loop_gone": 1.1 * HARDLY}, True),
+        ({"kind": CauseKind.SET_POINT, "loop_gone": 1.1 * HARDLY}, True),
+        ({"kind": CauseKind.TUNING, "loop_gone": 1.1 * MATERIAL}, False),
+        ({"kind": CauseKind.TUNING, "delta_bic": 1.0}, False),
+    ],
+)
+def test_a_loop_acquits_a_valve_where_it_moves_as_recorded_without_friction(
+    told: Identification, quiet: Look, changes: dict[str, Any], acquitted: bool
+) -> None:
+    plain = {"delta_bic": -5.0, "moved_without": 1.0, "loop_gone": 0.9 * HARDLY}
+    found = with_loop(told, **(plain | changes))
+    assert acquits(found, (quiet,), 0) is acquitted
+
+
+def test_a_loop_that_does_not_cycle_acquits_no_valve_alone(
+    told: Identification, quiet: Look
+) -> None:
+    plain = {"delta_bic": -5.0, "moved_without": 1.0, "loop_gone": 0.0}
+    found, rings = with_loop(told, **plain), with_loop(told, kind=CauseKind.TUNING, **plain)
+    for gain, material in ((0.0, -0.9 * REJECTED), (1.1 * PRICE, -1.1 * REJECTED)):
+        other = dataclasses.replace(quiet.accepted[0], gain=gain, material_gain=material)
+        seen = (dataclasses.replace(quiet, accepted=(other,)),)
+        assert not acquits(found, seen, 0)
+        assert acquits(rings, seen, 0)
+
+
+def test_a_valve_of_a_loop_that_rings_is_healthy_where_no_friction_is_needed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Rates leave it open in this loop of the field, which moves as recorded without friction."""
+    record = longest_part([field_loop(229).record])
+    found = identify(record)
+    assert found.valves[0].verdict is VerdictKind.HEALTHY
+    assert found.valves[0].static_friction == 0.0
+    assert found.outputs[0].cause is not None
+    assert found.outputs[0].cause.kind is CauseKind.TUNING
+    monkeypatch.setattr(engine, "acquits", lambda found, seen, valve: False)
     assert identify(record).valves[0].verdict is VerdictKind.UNDECIDED
