@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -186,7 +186,7 @@ class _Heard:
                 tried[j] = _judged(self.part, seen, j, self.options, one)
                 if not tried[j].verdict.has_friction:
                     continue
-                again = self.looped(tuple(tried))
+                again = self.looped(_by_loop(tried, j))
                 if confirms(again, j):
                     best = again
                     break
@@ -203,10 +203,19 @@ class _Heard:
                 continue
             tried, agreed = list(best.valves), agreement(seen, j)
             tried[j] = _judged(self.part, seen, j, self.options, agreed, VerdictKind.HEALTHY)
-            again = self.looped(tuple(tried))
+            again = self.looped(_by_loop(tried, j))
             if acquits(again, seen, j):
                 best = again
         return best
+
+
+def _by_loop(valves: Sequence[ValveEstimate], valve: int) -> tuple[ValveEstimate, ...]:
+    """Return estimates, of which that of one valve says that its loop is a witness."""
+    told = list(valves)
+    told[valve] = dataclasses.replace(
+        told[valve], evidence={**told[valve].evidence, "by_loop": 1.0}
+    )
+    return tuple(told)
 
 
 def _at(valve: ValveEstimate, other: Candidate, look: Look, record: Record) -> ValveEstimate:
