@@ -30,7 +30,7 @@ REJECTED = 3.0
 likelihood of none at both together."""
 REJECTING = 2  # rates that do
 SURELY = 10.0  # what they must lose where one rate alone rejects them
-NOTHING = 10.0
+NOTHING = 8.0
 """What they may gain at any rate with news: about as much as the best of many does on noise."""
 CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
 HARDLY = 0.05  # share of the movement that goes away, at most, with one that does not matter
@@ -109,11 +109,11 @@ def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
     causes = [model.cause.kind if model.cause else CauseKind.UNKNOWN for model in found.outputs]
     if not known or not 1.0 / AS_RECORDED < free < AS_RECORDED or CauseKind.DISTURBANCE in causes:
         return False
+    gains = [look.beyond_price(valve) for look in seen]
     if all(kind in OWN for kind in causes):
-        return gone < CAUSES
-    finds = any(look.beyond_price(valve) > 0.0 for look in seen)
+        return gone < CAUSES and max(gains) < SURE
     lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
-    return gone < HARDLY and not finds and max(lost, default=0.0) >= REJECTED
+    return gone < HARDLY and max(gains) <= 0.0 and max(lost, default=0.0) >= REJECTED
 
 
 def doubted(valve: ValveEstimate) -> ValveEstimate:

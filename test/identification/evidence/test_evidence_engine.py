@@ -8,7 +8,7 @@ from evidence_loops import pi_loop
 
 from stiction_ros.field import field_loop
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.closed_loop.explanation import MATERIAL
+from stiction_ros.identification.closed_loop.explanation import MATERIAL, SURE
 from stiction_ros.identification.evidence import engine
 from stiction_ros.identification.evidence.rates import PRICE, Look, looks
 from stiction_ros.identification.evidence.verdict import (
@@ -219,6 +219,8 @@ def test_a_loop_that_does_not_cycle_acquits_no_valve_alone(
         seen = (dataclasses.replace(quiet, accepted=(other,)),)
         assert not acquits(found, seen, 0)
         assert acquits(rings, seen, 0)
+    sure = dataclasses.replace(quiet.accepted[0], gain=PRICE + 1.1 * SURE)
+    assert not acquits(rings, (dataclasses.replace(quiet, accepted=(sure,)),), 0)
 
 
 def test_a_valve_of_a_loop_that_rings_is_healthy_where_no_friction_is_needed(
