@@ -46,6 +46,21 @@ def test_a_sticky_valve_is_the_cause(friction: tuple[float, float], noise: float
 
 
 @pytest.mark.parametrize(
+    ("verdict", "said"),
+    [(VerdictKind.STICKY, "Without the friction of V1"), (VerdictKind.UNDECIDED, "Nothing else")],
+)
+def test_a_friction_that_is_found_is_a_cause_however_little_is_beyond_its_price(
+    verdict: VerdictKind, said: str
+) -> None:
+    one = known(Kind(friction=(6.0, 2.0), noise=0.05))
+    valve = dataclasses.replace(one.found.valves[0], verdict=verdict, evidence={"delta_bic": 1.0})
+    found = explained(one.record, dataclasses.replace(one.found, valves=(valve,)))
+    assert found.outputs[0].cause is not None
+    assert found.outputs[0].cause.kind is CauseKind.VALVE
+    assert found.outputs[0].cause.sentence.startswith(said)
+
+
+@pytest.mark.parametrize(
     ("fit", "evidence", "blamed"),
     [(0.5, 60.0, True), (0.5, 20.0, False), (0.99, 60.0, False)],
     ids=["a controller not known", "and little evidence", "a controller that is known"],
