@@ -45,19 +45,18 @@ def test_a_sticky_valve_is_the_cause(friction: tuple[float, float], noise: float
     assert "V1" in found.sentence
 
 
-@pytest.mark.parametrize(
-    ("verdict", "said"),
-    [(VerdictKind.STICKY, "Without the friction of V1"), (VerdictKind.UNDECIDED, "Nothing else")],
-)
+@pytest.mark.parametrize(("verdict", "made"), [("sticky", True), ("undecided", False)])
 def test_a_friction_that_is_found_is_a_cause_however_little_is_beyond_its_price(
-    verdict: VerdictKind, said: str
+    verdict: str, made: bool
 ) -> None:
     one = known(Kind(friction=(6.0, 2.0), noise=0.05))
-    valve = dataclasses.replace(one.found.valves[0], verdict=verdict, evidence={"delta_bic": 1.0})
+    valve = dataclasses.replace(
+        one.found.valves[0], verdict=VerdictKind(verdict), evidence={"delta_bic": 1.0}
+    )
     found = explained(one.record, dataclasses.replace(one.found, valves=(valve,)))
-    assert found.outputs[0].cause is not None
-    assert found.outputs[0].cause.kind is CauseKind.VALVE
-    assert found.outputs[0].cause.sentence.startswith(said)
+    told = found.outputs[0].cause
+    assert told is not None
+    assert (told.kind is CauseKind.VALVE) is made
 
 
 @pytest.mark.parametrize(
