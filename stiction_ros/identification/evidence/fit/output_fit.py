@@ -193,7 +193,7 @@ def _fitted(problem: Problem, output: int, whole: Whitened, prior: ResponsePrior
     responses = weights[known:].reshape(len(whole.stems), len(problem.edges) - 1)
     rest = problem.pv[output].copy()
     for stem, levels in zip(whole.stems, responses, strict=True):
-        rest -= answered(stem, np.repeat(levels, np.diff(problem.edges)))
+        rest -= answered(stem, problem.taps_of(levels))
     if known > 1:
         sines, cosines = weights[1:known].reshape(2, -1)
         sizes = (cosines - 1j * sines) / whole.passed
