@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from stiction_ros.errors import InputError
-from stiction_ros.gain.draws import DRAWS, Draws, drawn_frictions, resampled
+from stiction_ros.gain.draws import (
+    DRAWS,
+    Draws,
+    drawn_frictions,
+    possible_frictions,
+    resampled,
+)
 from stiction_ros.gain.embedding import RUNS, EmbeddingDesign, embedded, pair_of
 from stiction_ros.gain.gain import Gain, Option, What, embedding_part, gain_of
 from stiction_ros.gain.measures import Measures
@@ -280,6 +286,44 @@ def test_draws_stay_inside_the_intervals_and_keep_their_order(found: Identificat
     assert tuple(pairs[0]) == (3.0, 2.5)
     assert np.all((pairs[:, 0] >= 2.0) & (pairs[:, 0] <= 4.0))
     assert np.all((pairs[:, 1] >= 1.0) & (pairs[:, 1] <= pairs[:, 0]))
+
+
+@pytest.mark.parametrize(("band", "many"), [((4.0, 5.0), 20), ((4.98, 5.0), 2), ((9.0, 9.1), 1)])
+def test_possible_frictions_have_a_possible_band(
+    found: Identification, band: tuple[float, float], many: int
+) -> None:
+    valve = dataclasses.replace(
+        found.valves[0],
+        static_friction=2.6,
+        static_interval=(2.0, 4.0),
+        dynamic_friction=2.4,
+        dynamic_interval=(1.0, 3.5),
+        band_interval=band,
+    )
+    pairs = possible_frictions(valve, 20, np.random.default_rng(0))
+    assert pairs.shape == (20, 2)
+    assert tuple(pairs[0]) == (2.6, 2.4)
+    others = pairs[np.any(pairs != pairs[0], axis=1)]
+    assert len(others) >= many - 1
+    assert np.all((others >= (2.0, 1.0)) & (others <= (4.0, 3.5)))
+    assert np.all(others[:, 1] <= others[:, 0])
+    assert np.all((others.sum(axis=1) >= band[0]) & (others.sum(axis=1) <= band[1]))
+
+
+def test_jumps_are_less_certain_than_bands(loop: RecordedLoop) -> None:
+    likely = loop.drawn(np.random.default_rng(5)).frictions
+    possible = loop.possible(np.random.default_rng(5)).frictions
+    spreads = [np.std(pairs[:, 0] - pairs[:, 1]) for pairs in (likely, possible)]
+    assert spreads[0] < spreads[1]
+
+
+def test_nothing_is_said_of_a_controller_that_is_faster_than_the_record_shows(
+    record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiction_ros.gain.gain.FASTEST", 0.1)
+    embedding = gain_of(record, found).option(What.EMBEDDING)
+    assert embedding.measures is None
+    assert "times as fast as the recorded loop" in embedding.note
 
 
 def test_frictions_are_taken_as_often_as_they_are_likely() -> None:
