@@ -294,8 +294,10 @@ def _embedding(loop: RecordedLoop, found: Identification, now: Measures) -> Opti
         return Option(What.EMBEDDING, None, {}, note)
     note = f"Predictive control that knows the friction, on {len(runs)} drawn loops."
     weights = design.weights(loop.pv_scale, loop.op_scale)
-    option = option_of(What.EMBEDDING, runs, note, weights).beside(now, part.now())
-    return dataclasses.replace(option, measures=None) if None in runs else option
+    if gone := runs.count(None):
+        note = f"{note} In {gone} of them the loop grows without end."
+        return Option(What.EMBEDDING, None, {}, note, weights)
+    return option_of(What.EMBEDDING, runs, note, weights).beside(now, part.now())
 
 
 def embedding_part(loop: RecordedLoop) -> RecordedLoop:

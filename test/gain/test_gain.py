@@ -317,6 +317,15 @@ def test_jumps_are_less_certain_than_bands(loop: RecordedLoop) -> None:
     assert spreads[0] < spreads[1]
 
 
+def test_loops_that_grow_without_end_are_told(
+    record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiction_ros.gain.gain.embedded", lambda part, *_: [part.now(), None])
+    embedding = gain_of(record, found).option(What.EMBEDDING)
+    assert embedding.measures is None
+    assert "In 1 of them the loop grows without end." in embedding.note
+
+
 def test_nothing_is_said_of_a_controller_that_is_faster_than_the_record_shows(
     record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -203,6 +203,8 @@ def test_the_list_says_what_is_saved_or_why_nothing_is(tmp_path: Path) -> None:
         (gain(2.06, ""), "service", "+3 %"),
         (gain(None, disagree), "service", "draws disagree"),
         (gain(None, repeat), "service", "does not repeat"),
+        (gain(None, "In 2 of them the loop grows without end."), "service", "unstable"),
+        (gain(None, "It would answer 4 times as fast."), "service", "faster than shown"),
         (None, "service", "not simulated"),
         (rest, "retune", "none helps"),
     ]
@@ -211,6 +213,8 @@ def test_the_list_says_what_is_saved_or_why_nothing_is(tmp_path: Path) -> None:
     assert in_words(entry("A", "healthy"), "service") == ""
     page = list_page(Survey("local", 1, 1.0, (entry("A", gain=rows[2][0]),), ()))
     assert f'title="{disagree}">draws disagree' in page
+    page_of = list_page(Survey("local", 1, 1.0, (entry("A", gain=rows[0][0]),), ()))
+    assert "−75&nbsp;%" in page_of  # a figure and its unit are not parted on a phone
     assert "simulated: −75 % leaves a quarter" in page
 
 
