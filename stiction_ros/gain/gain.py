@@ -27,6 +27,9 @@ or 95th percentile of those drawn is not given: the record does not tell what wo
 AGREED_NOW = 0.05
 """The same as a share of now."""
 
+PROMISED = 0.10
+"""Share of now from which on less is a promise: then each drawn loop must become better, too."""
+
 EMBEDDING_SAMPLES = 1000
 """Samples of a run of the embedding, the last ones."""
 
@@ -120,11 +123,16 @@ class Option:
         return dataclasses.replace(self, measures=None, note=note)
 
     def _apart(self, now: Measures) -> dict[str, tuple[float, float]]:
-        """Return the interval of each measure whose figure would not hold in each drawn loop."""
+        """Return the interval of each measure whose figure would not hold in each drawn loop.
+
+        Nor does one that promises less where some loops show no less than now.
+        """
         found = {}
         for key in WORDS.keys() & self.interval.keys():
-            said, small = getattr(self.measures, key), AGREED_NOW * getattr(now, key)
-            if any(abs(said - came) > max(AGREED * came, small) for came in self.interval[key]):
+            said, before = getattr(self.measures, key), getattr(now, key)
+            room = AGREED_NOW * before
+            far = any(abs(said - came) > max(AGREED * came, room) for came in self.interval[key])
+            if far or (said <= (1.0 - PROMISED) * before <= before <= self.interval[key][1]):
                 found[key] = self.interval[key]
         return dict(sorted(found.items(), reverse=True))
 

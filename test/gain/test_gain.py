@@ -172,7 +172,9 @@ def test_what_drawn_loops_do_not_agree_on_has_no_figures(
 @pytest.mark.parametrize(
     ("said", "interval", "given"),
     [
-        (0.85, (0.70, 1.00), True),
+        (0.85, (0.70, 0.99), True),
+        (0.85, (0.70, 1.00), False),  # in some it becomes no better
+        (0.95, (0.80, 1.00), True),  # nothing is promised
         (0.80, (0.60, 1.00), False),  # a third more than the least, though a quarter of itself
         (0.74, (0.73, 1.00), False),
         (0.06, (0.02, 0.09), True),  # what is small beside now

@@ -20,6 +20,9 @@ SHOWN = 30
 WHOLE = ("rank", "loop", "verdict", "f_S")
 """Columns that are not broken in a narrow window."""
 
+LONGEST = 20
+"""Letters of a word that is not broken there."""
+
 
 def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
     """Print the first rows, in the words of the page.
@@ -69,10 +72,12 @@ def _table(entries: Sequence[Entry]) -> Table:
         *(HEADS["service"], "reason"),
     )
     kept = [place for place in range(len(heads)) if any(row[place] for row in rows)]
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for place in kept:
         whole = heads[place] in WHOLE
-        longest = max(len(row[place]) for row in rows) if whole else None
+        cells = [row[place] for row in rows]
+        words = cells if whole else [word for cell in cells for word in cell.split()]
+        longest = min(max(map(len, words)), LONGEST)
         table.add_column(heads[place], no_wrap=whole, min_width=longest, overflow="fold")
     for row in rows:
         table.add_row(*(row[place] for place in kept))
