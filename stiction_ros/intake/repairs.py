@@ -310,7 +310,7 @@ def outside(values: FloatArray) -> FlagArray:
     found = np.zeros(len(values), dtype=np.bool_)
     known = np.isin(values, SENTINELS)
     rest = values[there & ~known]
-    if known.any() and len(rest):
+    if known.any() and len(rest) and len(values) > FEWEST_USUAL:
         low, high = float(rest.min()), float(rest.max())
         room = SENTINEL_FAR * max(high - low, 1e-3 * abs(high), 1e-12)
         found |= known & ((values < low - room) | (values > high + room))

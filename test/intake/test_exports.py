@@ -205,6 +205,20 @@ def test_manual_stretches_are_cut_by_mode(tmp_path: Path, words: tuple[str, str]
     assert f"20 samples not in automatic ({words[1]}), cut out" in loop.notes
 
 
+def test_a_mode_without_a_tag_is_that_of_the_one_loop(tmp_path: Path) -> None:
+    rows = [[*row, "MAN" if 40 <= k < 60 else "AUTO"] for k, row in enumerate(table())]
+    header = ["time", "FIC1.OP", "FIC1.PV", "SP", "MODE"]
+    (record,) = one(write(tmp_path / "a.csv", text(rows, header))).parts
+    assert record.usable_rows() == [(0, 40), (60, ROWS)]
+    assert record.sp is not None
+    two = [[*row[:3], *row[1:3], row[4]] for row in rows]
+    header = ["time", "FIC1.OP", "FIC1.PV", "FIC2.OP", "FIC2.PV", "MODE"]
+    found = read(write(tmp_path / "b.csv", text(two, header)))
+    assert [loop.name for loop in found] == ["FIC1", "FIC2"]
+    for loop in found:
+        assert "MODE is left out: it names none of the 2 loops" in loop.notes
+
+
 def test_a_mode_that_nobody_knows_is_asked_for(tmp_path: Path) -> None:
     rows = [[*row, "P1" if k < 40 else "Q1"] for k, row in enumerate(table())]
     path = write(tmp_path / "a.csv", text(rows, [*HEADER, "MODE"]))
