@@ -34,6 +34,11 @@ def why(found: Identification, valve: int) -> str:
         return estimate.experiment.partition(". ")[0].rstrip(".") + "."
     if kind is VerdictKind.HEALTHY:
         high = estimate.static_interval[1]
+        if estimate.evidence.get("by_loop"):
+            return (
+                f"Simulated without friction, the loop of {name} moves as recorded; what friction "
+                f"this record does not rule out, f_S up to {high:.2g} %, moves it hardly more."
+            )
         return f"The stem of {name} follows OP: f_S above {high:.2g} % is ruled out by this record."
     rests = f"When OP turns, the stem of {name} rests until OP has gone back by {band:.2g} %"
     if kind is VerdictKind.BACKLASH:

@@ -22,7 +22,8 @@ ENDLESS = 1e6
 """Stands in the figures for a movement that grows without end."""
 
 BELIEVED = 10.0
-"""BIC by which friction must beat the friction-free model to be a cause: very strong evidence."""
+"""BIC by which a friction that is not found must beat the friction-free model to be a cause: very
+strong evidence."""
 
 MATERIAL = 0.15
 """Share of OP's movement that must go away with the friction for the valve to be the cause."""
@@ -174,7 +175,7 @@ def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> 
 
 def _is_cause(valve: ValveEstimate, loop: ValveLoop) -> bool:
     """Tell whether the friction of a valve makes its loop move."""
-    believed = valve.evidence.get("delta_bic", 0.0) > BELIEVED
+    believed = valve.verdict.has_friction or valve.evidence.get("delta_bic", 0.0) > BELIEVED
     return believed and (_gone(loop) > MATERIAL or _open_and_sure(valve, loop))
 
 

@@ -19,7 +19,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import IntArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.closed_loop import UNSEEN_CYCLES, paired
 from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.identification.closed_loop.repeated_runs import period_of
@@ -58,6 +58,23 @@ class Tuning:
         heights = np.clip(min(rows, taps) - edges[:-1], 0.0, np.diff(edges))
         seen = min(1.0, taps / rows)
         return Reach(self.valve, heights, seen / (self.gain * pv_shrunk))
+
+    def holds(self, rate: int, pv_shrunk: float, taps: FloatArray) -> bool:
+        """Return whether the loop of this controller and a process comes to rest.
+
+        Its poles are the roots of (1 − q⁻¹) + K ((1 + 1 / T_i) − q⁻¹) H(q⁻¹), in rows. A loop that
+        was recorded did not grow without end: a process behind which it would is none.
+
+        Args:
+            rate: samples per row.
+            pv_shrunk: standard deviation of the rows of PV over that of its samples.
+            taps: of the response of the scaled output to the scaled stem, shape (M,).
+        """
+        resets = self.time / RESETS / rate
+        law = self.gain * pv_shrunk * np.array([1.0 + 1.0 / resets, -1.0])
+        poles = np.convolve(law, np.append(0.0, taps))
+        poles[:2] += [1.0, -1.0]
+        return bool(np.abs(np.roots(poles)).max(initial=0.0) < 1.0)
 
 
 def tunings(record: Record) -> tuple[Tuning | None, ...]:

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.explanation import (
-    ENDLESS,
-    OPEN,
-    SURE,
-    explained,
-    is_wave_itself,
-)
+from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
@@ -32,11 +26,17 @@ from stiction_ros.identification.evidence.rates import (
     looks,
 )
 from stiction_ros.identification.evidence.unseen import Unseen
+from stiction_ros.identification.evidence.verdict import (
+    acquits,
+    confirms,
+    doubted,
+    stem_is_wave,
+    verdict_of,
+)
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import (
     half_gains,
     is_deadband,
-    kind_of,
 )
 from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.options import IdentificationOptions
@@ -60,17 +60,6 @@ from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
-
-LEAST_GONE = 0.08  # share of OP's recorded movement that must go away with a friction
-WIDER = 2.0  # of OP's movement: a wider band is not what makes it
-MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
-REJECTED = 6.0
-"""−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
-likelihood of none each."""
-REJECTING = 2  # rates that do
-SURELY = 10.0  # what they must lose where one rate alone rejects them
-NOTHING = 8.0
-"""What they may gain at any rate with news: as much as the best of many frictions does on noise."""
 
 
 def identify(
@@ -113,9 +102,12 @@ def answered(
         seen: each rate of that.
         options: of the search.
     """
-    valves = tuple(_judged(part, seen, j, options) for j in range(len(part.valves)))
+    valves = tuple(
+        _judged(part, seen, j, options, agreement(seen, j)) for j in range(len(part.valves))
+    )
     heard = _Heard(record, data, part, data if part is record else prepare(part, options), options)
-    looped = heard.without_waves(seen, valves)
+    looped = heard.confirmed(seen, heard.without_waves(seen, valves))
+    looped = heard.acquitted(seen, looped)
     judged = tuple(doubted(valve) for valve in looped.valves)
     surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
     return dataclasses.replace(
@@ -160,17 +152,70 @@ class _Heard:
         """
         best = self.looped(valves)
         for j, valve in enumerate(best.valves):
-            if not (valve.verdict.has_friction and _is_wave(valve)):
+            if not (valve.verdict.has_friction and stem_is_wave(valve)):
                 continue
             look = agreement(seen, j).look
             for other in not_rejected(look.found, j, self.options.confidence)[1:]:
                 tried = list(valves)
                 tried[j] = _at(valves[j], other, look, self.part)
                 found = self.looped(tuple(tried))
-                if not _is_wave(found.valves[j]):
+                if not stem_is_wave(found.valves[j]):
                     valves, best = tuple(tried), found
                     break
         return best
+
+    def confirmed(self, seen: tuple[Look, ...], found: Identification) -> Identification:
+        """Return ``found``, with frictions that one rate shows alone and their loop confirms.
+
+        A record that is slower than its controller shows nothing in means of samples. Then the
+        loop is the second witness: closed again it moves as recorded, less without the friction,
+        and nothing else explains that it moves. Beside a wave from outside it is none, as that
+        moves with any stem.
+        """
+        if any(look.wave_gain is not None for look in seen):
+            return found
+        best = found
+        for j, valve in enumerate(found.valves):
+            if valve.verdict is not VerdictKind.UNDECIDED:
+                continue
+            shown = [one for look in seen if (one := Agreement.alone(look, j)).gain > 0.0]
+            for one in sorted(shown, key=lambda agreed: -agreed.gain):
+                if not (one.look.carries_news and one.held):
+                    continue
+                tried = list(best.valves)
+                tried[j] = _judged(self.part, seen, j, self.options, one)
+                if not tried[j].verdict.has_friction:
+                    continue
+                again = self.looped(_by_loop(tried, j))
+                if confirms(again, j):
+                    best = again
+                    break
+        return best
+
+    def acquitted(self, seen: tuple[Look, ...], found: Identification) -> Identification:
+        """Return ``found``, undecided valves healthy whose loop moves as recorded without friction.
+
+        What else explains the movement has to do so beside valves that follow OP, too.
+        """
+        best = found
+        for j, valve in enumerate(found.valves):
+            if valve.verdict is not VerdictKind.UNDECIDED or not acquits(best, seen, j):
+                continue
+            tried, agreed = list(best.valves), agreement(seen, j)
+            tried[j] = _judged(self.part, seen, j, self.options, agreed, VerdictKind.HEALTHY)
+            again = self.looped(_by_loop(tried, j))
+            if acquits(again, seen, j):
+                best = again
+        return best
+
+
+def _by_loop(valves: Sequence[ValveEstimate], valve: int) -> tuple[ValveEstimate, ...]:
+    """Return estimates, of which that of one valve says that its loop is a witness."""
+    told = list(valves)
+    told[valve] = dataclasses.replace(
+        told[valve], evidence={**told[valve].evidence, "by_loop": 1.0}
+    )
+    return tuple(told)
 
 
 def _at(valve: ValveEstimate, other: Candidate, look: Look, record: Record) -> ValveEstimate:
@@ -187,44 +232,15 @@ def _at(valve: ValveEstimate, other: Candidate, look: Look, record: Record) -> V
     )
 
 
-def _is_wave(valve: ValveEstimate) -> bool:
-    """Tell whether the stem of a valve is a wave itself."""
-    band_share = valve.evidence["share"] * (1.0 + valve.dynamic_friction / valve.static_friction)
-    return is_wave_itself(valve.evidence, band_share)
-
-
-def doubted(valve: ValveEstimate) -> ValveEstimate:
-    """Return the estimate, no longer with friction where its loop says otherwise.
-
-    A friction without which OP would move all the same is not what moves it, where the controller
-    is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
-    that comes from outside. And a band that is wider than OP moves about its mean moves with its
-    large moves alone, as those in manual are.
-    """
-    if not valve.verdict.has_friction:
-        return valve
-    told = valve.evidence
-    known = told.get("controller_fit", 0.0) > OPEN
-    endless = told.get("moved_with", 0.0) >= ENDLESS
-    gone = told.get("loop_gone", 1.0) * min(told.get("moved_with", 1.0), 1.0)
-    idle = known and gone < LEAST_GONE
-    idle = idle and (endless or told.get("delta_bic", 0.0) < SURE)
-    wide = valve.band_share > WIDER
-    if not (idle or wide or _is_wave(valve)):
-        return valve
-    return dataclasses.replace(
-        valve,
-        verdict=VerdictKind.UNDECIDED,
-        static_interval=(0.0, valve.static_interval[1]),
-        dynamic_interval=(0.0, valve.dynamic_interval[1]),
-        band_interval=(0.0, valve.sum_interval[1]),
-    )
-
-
 def _judged(
-    record: Record, seen: tuple[Look, ...], valve: int, options: IdentificationOptions
+    record: Record,
+    seen: tuple[Look, ...],
+    valve: int,
+    options: IdentificationOptions,
+    agreed: Agreement,
+    verdict: VerdictKind | None = None,
 ) -> ValveEstimate:
-    agreed = agreement(seen, valve)
+    """Return the estimate of one valve at the rate of ``agreed``; its verdict may be known."""
     problem, found = agreed.look.problem, agreed.look.found
     span = float(problem.span[valve])
     held = agreed.look.accepted[valve].times(span)
@@ -234,7 +250,7 @@ def _judged(
         if look.wave_gain is not None:
             figures[f"wave_{look.problem.rate}"] = look.wave_gain
         figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
-    verdict = _verdict(figures, agreed, seen, valve, options)
+    verdict = verdict or verdict_of(figures, agreed, seen, valve, options)
     healthy = verdict is VerdictKind.HEALTHY
     unseen = Unseen(0.0, 0.0) if healthy else Unseen.of(span * problem.op[valve])
     ends = [unseen.static(held.static), unseen.dynamic(held.dynamic), unseen.band(held.band)]
@@ -300,6 +316,7 @@ def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
         "moves": float(np.count_nonzero(np.diff(best.stems[valve]))),
         "rate": float(problem.rate),
         "alike": float(agreed.alike),
+        "held": float(agreed.held),
         "deadband_loss": agreed.look.accepted[valve].deadband_loss,
     }
 
@@ -319,37 +336,6 @@ def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
 
 def _free_run(problem: Problem, candidate: Candidate) -> float:
     return float(sum(np.sum(fit.rest[problem.first :] ** 2) for fit in candidate.fits))
-
-
-def _verdict(
-    figures: dict[str, float],
-    agreed: Agreement,
-    seen: tuple[Look, ...],
-    valve: int,
-    options: IdentificationOptions,
-) -> VerdictKind:
-    held = agreed.look.accepted[valve]
-    slips = figures["moves"] >= options.min_moves
-    if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL:
-        both = min(figures["half_1"], figures["half_2"]) > 0.0
-        kind = kind_of(held.deadband_loss, held.static, held.dynamic)
-        return kind if both and slips else VerdictKind.UNDECIDED
-    return VerdictKind.HEALTHY if slips and _harmless(seen, valve) else VerdictKind.UNDECIDED
-
-
-def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
-    """Tell whether the record rejects all bands that would matter: at two rates, or surely at one.
-
-    A rate that takes something else for the process rejects nothing, as neither do rows that are
-    drawn between reports; and what such rows say for friction is not believed before it is sure.
-    """
-    if any(look.accepted[valve].material_gain > look.price + SURE for look in seen):
-        return False
-    gains = [look.accepted[valve].material_gain for look in seen if look.carries_news]
-    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
-    twice = sum(one >= REJECTED for one in lost) >= REJECTING
-    surely = max(lost, default=0.0) >= SURELY
-    return max(gains, default=PRICE) < NOTHING and (twice or surely)
 
 
 def _over_all(

@@ -105,11 +105,29 @@ class Look:
         taps = [np.abs([fit.responses for fit in one.fits]) for one in tried]
         return any(one[..., -1].max() <= UNDIED * one.max() for one in taps)
 
+    def is_held(self, valve: int, candidate: Candidate) -> bool:
+        """Return whether the controller of a valve holds what a candidate takes for its process.
+
+        Means of samples, lines and held values can turn a controlled process into one that no
+        controller would hold. Where none is known, any is held.
+        """
+        problem = self.problem
+        told = zip(problem.tunings, candidate.fits, problem.shrunk, strict=False)
+        return all(
+            tuning.holds(problem.rate, float(shrunk), problem.taps_of(fit.responses[valve]))
+            for tuning, fit, shrunk in told
+            if tuning is not None and tuning.valve == valve
+        )
+
+    def speaks(self, valve: int) -> bool:
+        """Return whether the process beside the best friction is one that the controller holds."""
+        return self.is_held(valve, self.found.best)
+
     def sees_process(self, valve: int) -> bool:
         """Return whether what this rate takes for the process is the one that is controlled.
 
-        It has news, sees all of the response, and this has the sign for which the controller was
-        tuned.
+        It has news, sees all of the response, the controller holds it, and it has the sign for
+        which this was tuned.
         """
         fits = zip(self.found.ideal.fits, self.problem.reaches, strict=True)
         backwards = any(
@@ -118,7 +136,8 @@ class Look:
             for fit, reach in fits
             if reach is not None and reach.valve == valve
         )
-        return self.carries_news and not backwards and self.covers(valve)
+        seen = self.carries_news and not backwards and self.covers(valve)
+        return seen and self.is_held(valve, self.found.without[valve])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,12 +151,19 @@ class Agreement:
         alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
             have a say.
         tied: the other one, where which of both has more evidence only tells where a fit has ended.
+        held: whether both speak of processes that the controller holds.
     """
 
     look: Look
     gain: float
     alike: bool
     tied: Look | None = None
+    held: bool = True
+
+    @classmethod
+    def alone(cls, look: Look, valve: int) -> Agreement:
+        """Return what one rate says, its word taken for as much as that of two."""
+        return cls(look, look.beyond_price(valve), look.covers(valve), held=look.speaks(valve))
 
 
 def price_beside(wave_gain: float | None) -> float:
@@ -234,7 +260,7 @@ def _heads(problem: Problem, found: Found) -> list[Candidate]:
 def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
-        return Agreement(seen[0], seen[0].beyond_price(valve), seen[0].covers(valve))
+        return Agreement.alone(seen[0], valve)
     say, pairs = _with_a_say(seen, valve), []
     for k, two in enumerate(itertools.pairwise(seen)):
         held = [look.accepted[valve] for look in two]
@@ -243,7 +269,8 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
         alike = low <= ALIKE * high and say[k] and say[k + 1]
         more = gains.index(max(gains))
         tied = two[1 - more] if max(gains) - min(gains) < TIED else None
-        pairs.append(Agreement(two[more], min(gains), alike, tied))
+        speak = all(look.speaks(valve) for look in two)
+        pairs.append(Agreement(two[more], min(gains), alike, tied, speak))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
 
 

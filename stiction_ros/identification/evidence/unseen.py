@@ -4,9 +4,10 @@ A law is judged on OP as it was sampled, and two things are in no sample. The st
 does between them, too, and slips at peaks there: OP turned farther than the record shows. And it
 may answer up to a sample later than OP moves: what OP has moved on by then is no friction.
 
-The band f_S + f_D is what OP passes from one slip to the next in the other direction, and has two
-such ends. The jump f_S − f_D is what it passes from one slip to the next in the same direction, and
-has one: of a slip that the samples give no reason for a smaller jump makes the best.
+The band f_S + f_D is what OP passes from one slip to the next in the other direction, the jump
+f_S − f_D what it passes to the next in the same direction. Either has two such ends. A jump is not
+smaller than the samples show for answering late: of a slip that they give no reason for, a smaller
+jump makes the best already.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from stiction_ros.identification.evidence.fit.output_fit import noise_of
 from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER
 from stiction_ros.identification.kernels.lags import whitened
 
-BETWEEN = 1.5  # standard deviations of OP's innovations by which an end may lie farther out
+BETWEEN = 2.0  # standard deviations of OP's innovations by which an end may lie farther out
 LATE = 1.0  # samples by which a stem answers late, at most
 
 
@@ -48,11 +49,11 @@ class Unseen:
 
     def static(self, held: Interval) -> Interval:
         """Return the f_S, half of band and jump, that are possible."""
-        return max(held[0] - self.less, 0.0), held[1] + 1.5 * self.more
+        return max(held[0] - self.less, 0.0), held[1] + 2.0 * self.more
 
     def dynamic(self, held: Interval) -> Interval:
         """Return the f_D, half of what the band has more than the jump, that are possible."""
-        return max(held[0] - self.less - 0.5 * self.more, 0.0), held[1] + self.more
+        return max(held[0] - self.less - self.more, 0.0), held[1] + self.more
 
 
 def innovation(op: FloatArray) -> float:

@@ -11,6 +11,11 @@ Evidence, all under the noise model:
 - ``deadband_loss``: −2 log likelihood lost by J = 0.
 - ``wave_1`` … ``wave_8``: −2 log likelihood that waves from outside add at a rate, where they were
   tried beside the friction.
+- ``gain_1`` … ``gain_8``, ``band_high_1`` …: −2 log likelihood that friction adds at a rate, and
+  the largest band f_S + f_D that this does not reject, %.
+- ``alike``, ``held``: 1 where two rates agree on the band, and where both speak of processes that
+  the controller would hold.
+- ``by_loop``: 1 where the loop closed again is a witness to the verdict beside the rates.
 - ``patterns``, ``patterns_closed``: switching patterns enumerated round the best, and whether
   all at the edge were rejected.
 - ``stem_error``: mean squared error of the stem, %², where the record holds the true one (the

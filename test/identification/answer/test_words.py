@@ -88,6 +88,14 @@ def test_without_friction_nothing_is_material() -> None:
     assert materiality(found(HEALTHY, CauseKind.NONE).valves[0]) == ""
 
 
+def test_a_valve_that_its_loop_acquits_is_said_to_move_nothing() -> None:
+    told = found(HEALTHY, CauseKind.TUNING, evidence={"by_loop": 1.0})
+    assert why(told, 0) == (
+        "Simulated without friction, the loop of V1 moves as recorded; what friction this record "
+        "does not rule out, f_S up to 0.4 %, moves it hardly more."
+    )
+
+
 @pytest.mark.parametrize(
     ("verdict", "kind", "said"),
     [

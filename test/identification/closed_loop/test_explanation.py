@@ -45,6 +45,20 @@ def test_a_sticky_valve_is_the_cause(friction: tuple[float, float], noise: float
     assert "V1" in found.sentence
 
 
+@pytest.mark.parametrize(("verdict", "made"), [("sticky", True), ("undecided", False)])
+def test_a_friction_that_is_found_is_a_cause_however_little_is_beyond_its_price(
+    verdict: str, made: bool
+) -> None:
+    one = known(Kind(friction=(6.0, 2.0), noise=0.05))
+    valve = dataclasses.replace(
+        one.found.valves[0], verdict=VerdictKind(verdict), evidence={"delta_bic": 1.0}
+    )
+    found = explained(one.record, dataclasses.replace(one.found, valves=(valve,)))
+    told = found.outputs[0].cause
+    assert told is not None
+    assert (told.kind is CauseKind.VALVE) is made
+
+
 @pytest.mark.parametrize(
     ("fit", "evidence", "blamed"),
     [(0.5, 60.0, True), (0.5, 20.0, False), (0.99, 60.0, False)],

@@ -10,18 +10,17 @@ from evidence_loops import pi_loop
 from stiction_ros.identification import IdentificationOptions, VerdictKind
 from stiction_ros.identification.closed_loop.explanation import SURE
 from stiction_ros.identification.evidence.accepted import Accepted
-from stiction_ros.identification.evidence.engine import (
+from stiction_ros.identification.evidence.engine import _stability
+from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
+from stiction_ros.identification.evidence.search import Found, ideal
+from stiction_ros.identification.evidence.verdict import (
     MATERIAL,
     NOTHING,
-    PRICE,
     REJECTED,
     SURELY,
-    _stability,
-    _verdict,
+    verdict_of,
 )
-from stiction_ros.identification.evidence.fit.problem import Problem
-from stiction_ros.identification.evidence.rates import Agreement, Look
-from stiction_ros.identification.evidence.search import Found, ideal
 from stiction_ros.identification.inference.verdict import DEADBAND
 
 STICKY, BACKLASH, HEALTHY, UNDECIDED = VerdictKind
@@ -54,7 +53,8 @@ def blank() -> Look:
 
 @pytest.fixture(autouse=True)
 def sighted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let every rate with news see the process."""
+    """Let every rate with news see the process, and speak of one that is held."""
+    monkeypatch.setattr(Look, "speaks", lambda look, valve: True)
     monkeypatch.setattr(Look, "sees_process", lambda look, valve: look.carries_news)
 
 
@@ -93,7 +93,7 @@ def test_the_verdict_follows_from_what_the_rates_say(
     blank: Look, changes: dict[str, float], rate: Accepted, alike: bool, verdict: VerdictKind
 ) -> None:
     found, seen = agreed(blank, rate, alike=alike)
-    assert _verdict(FIGURES | changes, found, seen, 0, IdentificationOptions()) is verdict
+    assert verdict_of(FIGURES | changes, found, seen, 0, IdentificationOptions()) is verdict
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_valve_is_healthy_where_rates_reject_all_that_matters_and_none_finds_i
 ) -> None:
     found, seen = agreed(blank, *rates)
     figures = FIGURES | {"delta_bic": -13.0}
-    assert _verdict(figures, found, seen, 0, IdentificationOptions()) is verdict
+    assert verdict_of(figures, found, seen, 0, IdentificationOptions()) is verdict
 
 
 @pytest.mark.parametrize(
@@ -125,9 +125,19 @@ def test_rows_without_news_acquit_no_valve_and_speak_for_friction_when_sure(
     figures, options = FIGURES | {"delta_bic": -13.0}, IdentificationOptions()
     found, seen = agreed(blank, held(gain, (0.1, 0.2)), rejected(30.0), rejected(30.0))
     told = (dataclasses.replace(seen[0], carries_news=False), *seen[1:])
-    assert _verdict(figures, found, told, 0, options) is verdict
+    assert verdict_of(figures, found, told, 0, options) is verdict
     silent = tuple(dataclasses.replace(look, carries_news=False) for look in seen[1:])
-    assert _verdict(figures, found, silent, 0, options) is UNDECIDED
+    assert verdict_of(figures, found, silent, 0, options) is UNDECIDED
+
+
+def test_what_gains_beside_a_process_that_no_controller_holds_is_nothing(
+    blank: Look, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures, options = FIGURES | {"delta_bic": -13.0}, IdentificationOptions()
+    found, seen = agreed(blank, rejected(30.0), held(PRICE + SURE + 1.0, (0.1, 0.2)))
+    assert verdict_of(figures, found, seen, 0, options) is UNDECIDED
+    monkeypatch.setattr(Look, "speaks", lambda look, valve: look.problem.rate == 1)
+    assert verdict_of(figures, found, seen, 0, options) is HEALTHY
 
 
 def test_stability_tells_which_rates_and_halves_agree_on_friction(blank: Look) -> None:

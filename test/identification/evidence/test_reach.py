@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from evidence_loops import pi_loop
+from evidence_loops import FloatArray, pi_loop
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -195,3 +195,41 @@ def test_a_band_that_matters_is_above_what_is_harmless() -> None:
     held = accepted(problem, search(problem), 0, 0.95)
     assert held.band[0] > HARMLESS
     assert held.material_gain == pytest.approx(held.gain)
+
+
+def first_order(gain: float, pole: float, taps: int = 200) -> FloatArray:
+    """Return the impulse response of b q⁻¹ / (1 − a q⁻¹)."""
+    return gain * (1.0 - pole) * pole ** np.arange(taps)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(0.05, 12.0), st.floats(2.0, 200.0), st.floats(0.3, 0.97), st.sampled_from([1, 2]))
+def test_a_controller_holds_a_process_when_the_loop_of_both_comes_to_rest(
+    gain: float, reset: float, pole: float, rate: int
+) -> None:
+    taps = first_order(1.0, pole)
+    held = Tuning(0, gain, RESETS * reset * rate).holds(rate, 0.5, 2.0 * taps)
+    # u = u₋ + K ((e − e₋) + e / T), e = −y and y = a y₋ + (1 − a) u₋ have this characteristic
+    by = gain * (1.0 - pole)
+    wanted = np.abs(np.roots([1.0, by * (1.0 + 1.0 / reset) - 1.0 - pole, pole - by])).max() < 1.0
+    assert held is bool(wanted)
+
+
+def test_no_controller_holds_a_process_of_the_other_sign() -> None:
+    tuning = Tuning(0, 1.0, RESETS * 10.0)
+    assert tuning.holds(1, 1.0, first_order(1.0, 0.9))
+    assert not tuning.holds(1, 1.0, first_order(-1.0, 0.9))
+    assert not Tuning(0, 40.0, RESETS * 10.0).holds(1, 1.0, first_order(1.0, 0.9))
+
+
+def test_a_rate_speaks_of_what_the_controller_of_its_valve_holds() -> None:
+    look = looks(pi_loop(3.0, 1.0), IdentificationOptions())[0]
+    assert look.speaks(0)
+    best = look.found.best
+    fits = tuple(dataclasses.replace(fit, responses=60.0 * fit.responses) for fit in best.fits)
+    wild = dataclasses.replace(best, fits=fits)
+    other = dataclasses.replace(look, found=dataclasses.replace(look.found, best=wild))
+    assert not other.speaks(0)
+    assert not look.is_held(0, wild)
+    unknown = dataclasses.replace(other.problem, tunings=())
+    assert dataclasses.replace(other, problem=unknown).speaks(0)

@@ -159,6 +159,10 @@ class Problem:
         """M, length of an impulse response."""
         return int(self.edges[-1])
 
+    def taps_of(self, levels: FloatArray) -> FloatArray:
+        """Return the taps of a response, shape (M,), from the levels of their groups, (r,)."""
+        return np.repeat(levels, np.diff(self.edges))
+
     @functools.cached_property
     def reaches(self) -> tuple[Reach | None, ...]:
         """Per output, how far a valve is expected to move it; None where that is not known."""

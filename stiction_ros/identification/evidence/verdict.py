@@ -1,0 +1,153 @@
+"""The verdict on one valve: from what its rates say, and what its closed loop says of that."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.identification.closed_loop.explanation import MATERIAL as CAUSES
+from stiction_ros.identification.closed_loop.explanation import (
+    OPEN,
+    RIVAL,
+    SURE,
+    is_wave_itself,
+)
+from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
+from stiction_ros.identification.inference.verdict import kind_of
+from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.result.cause import CauseKind
+from stiction_ros.identification.result.identification import (
+    Identification,
+    ValveEstimate,
+    VerdictKind,
+)
+
+LEAST_GONE = 0.08  # share of OP's recorded movement that must go away with a friction
+WIDER = 2.0  # of OP's movement: a wider band is not what makes it
+MATTERS = 0.1  # of OP's movement about its mean: a smaller band hardly keeps anything from the stem
+MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
+REJECTED = 3.0
+"""−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
+likelihood of none at both together."""
+REJECTING = 2  # rates that do
+SURELY = 10.0  # what they must lose where one rate alone rejects them
+NOTHING = 8.0
+"""What they may gain at any rate with news: about as much as the best of many does on noise."""
+CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
+HARDLY = 0.05  # share of the movement that goes away, at most, with one that does not matter
+AS_RECORDED = 1.3  # factor within which its loop moves as recorded
+OWN = (CauseKind.TUNING, CauseKind.SET_POINT)
+ELSEWHERE = (*OWN, CauseKind.DISTURBANCE)
+
+
+def verdict_of(
+    figures: dict[str, float],
+    agreed: Agreement,
+    seen: tuple[Look, ...],
+    valve: int,
+    options: IdentificationOptions,
+) -> VerdictKind:
+    """Return the verdict on one valve by what its rates show.
+
+    Args:
+        figures: the evidence of ``agreed``.
+        agreed: the rates that agree best on its friction.
+        seen: each rate.
+        valve: index.
+        options: of the search.
+    """
+    held = agreed.look.accepted[valve]
+    slips = figures["moves"] >= options.min_moves
+    if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL:
+        both = min(figures["half_1"], figures["half_2"]) > 0.0
+        kind = kind_of(held.deadband_loss, held.static, held.dynamic)
+        return kind if both and slips else VerdictKind.UNDECIDED
+    return VerdictKind.HEALTHY if slips and _harmless(seen, valve) else VerdictKind.UNDECIDED
+
+
+def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
+    """Tell whether the record rejects all bands that would matter: at two rates, or surely at one.
+
+    A rate that takes something else for the process rejects nothing, as neither do rows that are
+    drawn between reports; and what such rows say for friction is not believed before it is sure.
+    Where that is beside a process that the controller would not hold, it is nothing.
+    """
+    speak = [look for look in seen if look.speaks(valve)]
+    if any(look.accepted[valve].material_gain > look.price + SURE for look in speak):
+        return False
+    gains = [look.accepted[valve].material_gain for look in speak if look.carries_news]
+    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
+    twice = sum(one >= REJECTED for one in lost) >= REJECTING
+    surely = max(lost, default=0.0) >= SURELY
+    return max(gains, default=PRICE) < NOTHING and (twice or surely)
+
+
+def confirms(found: Identification, valve: int) -> bool:
+    """Tell whether a loop closed again speaks for the friction of a valve.
+
+    It moves as recorded, less without the friction, and nothing else explains that it moves.
+    """
+    if any(model.cause and model.cause.kind in ELSEWHERE for model in found.outputs):
+        return False
+    told = found.valves[valve].evidence
+    moved = told.get("moved_with", 0.0)
+    known = told.get("controller_fit", 0.0) > OPEN
+    as_recorded = 1.0 / AS_RECORDED < moved < AS_RECORDED
+    return known and as_recorded and told.get("loop_gone", 0.0) > CONFIRMED
+
+
+def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
+    """Tell whether a loop closed again shows that the friction of a valve does not matter.
+
+    No friction is sure, and without any the loop moves as recorded, hardly less than with what the
+    record does not reject. Its controller rings with the process, or its set-point cycles; or
+    nothing cycles, no rate finds friction, and one rejects all that matters. A wave from outside
+    acquits no valve: a stem that goes to and fro with it may be missed.
+    """
+    told = found.valves[valve].evidence
+    free, gone = told.get("moved_without", 0.0), told.get("loop_gone", 0.0)
+    known = told.get("controller_fit", 0.0) > OPEN and told["delta_bic"] <= 0.0
+    causes = [model.cause.kind if model.cause else CauseKind.UNKNOWN for model in found.outputs]
+    if not known or not 1.0 / AS_RECORDED < free < AS_RECORDED or CauseKind.DISTURBANCE in causes:
+        return False
+    gains = [look.beyond_price(valve) for look in seen]
+    if all(kind in OWN for kind in causes):
+        return gone < CAUSES and max(gains) < SURE
+    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
+    return gone < HARDLY and max(gains) <= 0.0 and max(lost, default=0.0) >= REJECTED
+
+
+def doubted(valve: ValveEstimate) -> ValveEstimate:
+    """Return the estimate, no longer with friction where its loop says otherwise.
+
+    A friction without which OP would move all the same is not what moves it, where the controller
+    is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
+    that comes from outside; neither can one beside which a line from outside gains, and alone about
+    as much, where its rates speak of processes that the controller would not hold. A band that is
+    wider than OP moves about its mean moves with its large moves alone, as those in manual are, and
+    one that is a small share of them is none to speak of.
+    """
+    if not valve.verdict.has_friction:
+        return valve
+    told = valve.evidence
+    known = told.get("controller_fit", 0.0) > OPEN
+    gone = told.get("loop_gone", 1.0) * min(told.get("moved_with", 1.0), 1.0)
+    idle = known and gone < LEAST_GONE and told.get("delta_bic", 0.0) < SURE
+    wide = valve.band_share > WIDER
+    small = 0.0 < valve.band_share < MATTERS
+    line = told.get("outside_line", 0.0) > 0.0 and told.get("line_rivalry", 0.0) > RIVAL
+    rival = line and not told.get("held", 1.0)
+    if not (idle or wide or small or rival or stem_is_wave(valve)):
+        return valve
+    return dataclasses.replace(
+        valve,
+        verdict=VerdictKind.UNDECIDED,
+        static_interval=(0.0, valve.static_interval[1]),
+        dynamic_interval=(0.0, valve.dynamic_interval[1]),
+        band_interval=(0.0, valve.sum_interval[1]),
+    )
+
+
+def stem_is_wave(valve: ValveEstimate) -> bool:
+    """Tell whether the stem of a valve is a wave itself."""
+    band_share = valve.evidence["share"] * (1.0 + valve.dynamic_friction / valve.static_friction)
+    return is_wave_itself(valve.evidence, band_share)
