@@ -98,22 +98,24 @@ def confirms(found: Identification, valve: int) -> bool:
 def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
     """Tell whether a loop closed again shows that the friction of a valve does not matter.
 
-    No friction is sure, and without any the loop moves as recorded, hardly less than with what the
+    No rate finds any, and without any the loop moves as recorded, hardly less than with what the
     record does not reject. Its controller rings with the process, or its set-point cycles; or
-    nothing cycles, no rate finds friction, and one rejects all that matters. A wave from outside
-    acquits no valve: a stem that goes to and fro with it may be missed.
+    nothing cycles, and one rate rejects all that matters. A wave from outside acquits no valve: a
+    stem that goes to and fro with it may be missed.
     """
+    if any(look.beyond_price(valve) > 0.0 for look in seen):
+        return False
     told = found.valves[valve].evidence
     free, gone = told.get("moved_without", 0.0), told.get("loop_gone", 0.0)
-    known = told.get("controller_fit", 0.0) > OPEN and told["delta_bic"] <= 0.0
+    as_recorded = 1.0 / AS_RECORDED < free < AS_RECORDED
     causes = [model.cause.kind if model.cause else CauseKind.UNKNOWN for model in found.outputs]
-    if not known or not 1.0 / AS_RECORDED < free < AS_RECORDED or CauseKind.DISTURBANCE in causes:
+    known = told.get("controller_fit", 0.0) > OPEN
+    if not (known and as_recorded) or CauseKind.DISTURBANCE in causes:
         return False
-    gains = [look.beyond_price(valve) for look in seen]
     if all(kind in OWN for kind in causes):
-        return gone < CAUSES and max(gains) < SURE
+        return gone < CAUSES
     lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
-    return gone < HARDLY and max(gains) <= 0.0 and max(lost, default=0.0) >= REJECTED
+    return gone < HARDLY and max(lost, default=0.0) >= REJECTED
 
 
 def doubted(valve: ValveEstimate) -> ValveEstimate:
