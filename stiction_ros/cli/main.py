@@ -66,6 +66,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "listen": ("plant.listen", "fill the windows of all loops in the graph, in one process"),
     "paper": ("studies.paper", "every figure and table of the paper, printed beside ours"),
     "bench": ("benches.command", "measure speed, side by side"),
+    "completion": (
+        "options.completion",
+        "a script by which a shell ends commands and options at Tab",
+    ),
 }
 """Module of each command below this package, loaded when it is called, and what ``--help`` says."""
 

@@ -17,7 +17,9 @@ All weights follow from the identified loop, in units of OP's and PV's own movem
 - a valve with backlash alone has f_S = f_D, half its band, and so no least jump.
 
 The controller answers faster than the loop ever has, and what the process does then is known less
-well than what it did. So it is run on drawn loops, whose processes differ, too.
+well than what it did. So it is run on drawn loops, whose processes differ, too. And it lives by
+the jump of the stem, which a record tells worse than the band: so their frictions are all that are
+possible.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.control import ControlMode, ControlSettings, FrictionSpread, MpcController
-from stiction_ros.control.design import History
+from stiction_ros.control.design import ControlDesign, History
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.draws import Draws
@@ -59,8 +61,8 @@ STARTED = 1e-3
 MARGIN = 0.3
 """Share of the half-widths of the frictions' intervals that a jump is larger than it must be."""
 
-RUNS = 7
-"""Drawn loops that it is run on."""
+RUNS = 12
+"""Drawn loops that it is run on, at most."""
 
 BEYOND = 1e4
 """Standard deviations of PV from which on a run is taken as gone."""
@@ -166,14 +168,17 @@ class EmbeddingDesign:
         )
         return cls(model, settings, friction, spread)
 
+    def built(self) -> ControlDesign:
+        """Return the design with its weights, as controllers take it."""
+        return self.settings.design(self.model)
+
     def controller(self) -> MpcController:
         """Return a new controller.
 
         Raises:
             InputError: it cannot be set up for this process.
         """
-        design = self.settings.design(self.model)
-        return MpcController(design, ControlMode.EMBEDDING, [self.friction], [self.spread])
+        return MpcController(self.built(), ControlMode.EMBEDDING, [self.friction], [self.spread])
 
     def weights(self, pv_scale: float = 1.0, op_scale: float = 1.0) -> dict[str, float]:
         """Return the weights as a controller node takes them, in engineering units and %.
@@ -235,7 +240,7 @@ def embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws) -> list[
     Args:
         loop: whose rows are run.
         design: of the controller, which keeps its friction and its process.
-        draws: loops, the likeliest first; no more than :data:`RUNS` of them are run.
+        draws: loops; no more than :data:`RUNS` of them are run.
 
     Returns:
         None for a run that grows without end.

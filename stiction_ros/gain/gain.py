@@ -15,6 +15,7 @@ from stiction_ros.gain.embedding import EmbeddingDesign, embedded
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.gain.retuning import UNCHANGED, best_tuning
+from stiction_ros.gain.swiftness import FASTEST, times_as_fast
 from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import Identification
 from stiction_ros.records.record import Record
@@ -25,6 +26,9 @@ or 95th percentile of those drawn is not given: the record does not tell what wo
 
 AGREED_NOW = 0.05
 """The same as a share of now."""
+
+PROMISED = 0.10
+"""Share of now from which on less is a promise: then each drawn loop must become better, too."""
 
 EMBEDDING_SAMPLES = 1000
 """Samples of a run of the embedding, the last ones."""
@@ -67,8 +71,8 @@ class Option:
 
     Attributes:
         what: see :class:`What`.
-        measures: of the likeliest of the drawn loops; None where it could not be simulated, or
-            where the draws do not agree.
+        measures: of the likeliest of the drawn loops, of the embedding their medians; None where
+            it could not be simulated, or where the draws do not agree.
         interval: 5th and 95th percentile of each measure over the draws.
         note: one sentence.
         settings: weights of the embedding, factors of the retuning.
@@ -119,11 +123,16 @@ class Option:
         return dataclasses.replace(self, measures=None, note=note)
 
     def _apart(self, now: Measures) -> dict[str, tuple[float, float]]:
-        """Return the interval of each measure whose figure would not hold in each drawn loop."""
+        """Return the interval of each measure whose figure would not hold in each drawn loop.
+
+        Nor does one that promises less where some loops show no less than now.
+        """
         found = {}
         for key in WORDS.keys() & self.interval.keys():
-            said, small = getattr(self.measures, key), AGREED_NOW * getattr(now, key)
-            if any(abs(said - came) > max(AGREED * came, small) for came in self.interval[key]):
+            said, before = getattr(self.measures, key), getattr(now, key)
+            room = AGREED_NOW * before
+            far = any(abs(said - came) > max(AGREED * came, room) for came in self.interval[key])
+            if far or (said <= (1.0 - PROMISED) * before <= before <= self.interval[key][1]):
                 found[key] = self.interval[key]
         return dict(sorted(found.items(), reverse=True))
 
@@ -199,7 +208,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
     assert left.measures is not None
     service = _service(loop, draws, now).beside(now, left.measures)
     retuned = _retune(loop, draws, found, now).beside(now, left.measures)
-    options = (service, _embedding(loop, draws, found), retuned)
+    options = (service, _embedding(loop, found, now), retuned)
     told = tuple(option.where_agreed(now) for option in options)
     return Gain(*names, now, (*told, left.beside(now, left.measures)))
 
@@ -261,23 +270,42 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification, now: Measur
     return option_of(What.RETUNE, runs, note, settings, draws.likeliest)
 
 
-def _embedding(loop: RecordedLoop, draws: Draws, found: Identification) -> Option:
-    """Return what the embedding does, in the ratio to what is recorded of the same rows."""
+def _embedding(loop: RecordedLoop, found: Identification, now: Measures) -> Option:
+    """Return what the embedding does, in the ratio to what is recorded of the same rows.
+
+    It lives by the jump of the stem, so that its figures are the medians over loops with all
+    frictions that are possible, and not those of the likeliest one.
+    """
     cause = found.outputs[loop.output].cause
     if not loop.estimate.verdict.has_friction or cause is None or cause.kind is not CauseKind.VALVE:
         note = "The record does not show a valve whose friction makes the loop cycle."
         return Option(What.EMBEDDING, None, {}, f"{note} Nothing is promised of embedding it.")
-    part = embedding_part(loop)
+    draws = loop.possible(np.random.default_rng(SEED))
+    kept = [k for k, run in enumerate(loop.run(draws)) if _repeats(now, run)]
+    if len(kept) < FEWEST:
+        note = (
+            f"No more than {len(kept)} of {DRAWS} loops with possible frictions repeat the record."
+        )
+        return Option(What.EMBEDDING, None, {}, note)
+    draws, part = draws.taken(kept), embedding_part(loop)
     try:
         design = EmbeddingDesign.of(loop)
-        runs = embedded(part, design, draws)
+        ratio = times_as_fast(loop, design.built(), draws)
+        runs = [] if ratio > FASTEST else embedded(part, design, draws)
     except InputError as error:
         return Option(What.EMBEDDING, None, {}, f"It cannot be set up: {error}.")
+    if not runs:
+        note = (
+            f"It would answer {ratio:.2g} times as fast as the recorded loop; how the process "
+            "answers there the record does not show, so that nothing is said of it."
+        )
+        return Option(What.EMBEDDING, None, {}, note)
     note = f"Predictive control that knows the friction, on {len(runs)} drawn loops."
     weights = design.weights(loop.pv_scale, loop.op_scale)
-    option = option_of(What.EMBEDDING, runs, note, weights, draws.likeliest)
-    option = option.beside(loop.now(), part.now())
-    return dataclasses.replace(option, measures=None) if None in runs else option
+    if gone := runs.count(None):
+        note = f"{note} In {gone} of them the loop grows without end."
+        return Option(What.EMBEDDING, None, {}, note, weights)
+    return option_of(What.EMBEDDING, runs, note, weights).beside(now, part.now())
 
 
 def embedding_part(loop: RecordedLoop) -> RecordedLoop:

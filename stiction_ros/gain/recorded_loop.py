@@ -20,9 +20,11 @@ from stiction_ros.gain.answering import Answering
 from stiction_ros.gain.draws import (
     CANDIDATES,
     DRAWS,
+    TEMPER,
     Draws,
     drawn_frictions,
     drawn_tunings,
+    possible_frictions,
     resampled,
 )
 from stiction_ros.gain.loop_runs import Equations, Valves, run_again
@@ -204,8 +206,19 @@ class RecordedLoop:
         verdict = self.estimate.verdict
         pairs = drawn_frictions(self.estimate, CANDIDATES, random)
         frictions = resampled(pairs, self._losses(pairs), verdict, random)
+        return self._answered(frictions, 2 if verdict is VerdictKind.UNDECIDED else 1, random)
+
+    def possible(self, random: np.random.Generator) -> Draws:
+        """Return loops as :meth:`drawn`, whose jumps are as uncertain as those of the field."""
+        pairs = possible_frictions(self.estimate, CANDIDATES, random)
+        losses = self._losses(pairs) / TEMPER
+        return self._answered(resampled(pairs, losses, self.estimate.verdict, random), 1, random)
+
+    def _answered(
+        self, frictions: FloatArray, likeliest: int, random: np.random.Generator
+    ) -> Draws:
+        """Return the loops of frictions, %, shape (DRAWS, 2)."""
         tunings = drawn_tunings(self.law, DRAWS, random)
-        likeliest = 2 if verdict is VerdictKind.UNDECIDED else 1
         stems = self._stems(frictions)
         number, length = len(stems), stems.shape[2]
         delay = np.array([one.delay for one in self.answers])

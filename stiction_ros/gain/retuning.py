@@ -91,16 +91,32 @@ def best_tuning(loop: RecordedLoop, draws: Draws) -> Tuning:
 
 def sensitivity(loop: RecordedLoop, draws: Draws, tuning: Tuning) -> float:
     r"""Return the peak of :math:`|1 / (1 + C P)|` of the first loop, its valve without friction."""
-    law, (a, b, delay, _) = loop.law, draws.equations
-    i, j = loop.output, loop.valve
     turn = frequencies()
+    return peak(controller_response(loop, tuning, turn) * process_response(loop, draws, 0, turn))
+
+
+def controller_response(loop: RecordedLoop, tuning: Tuning, turn: ComplexArray) -> ComplexArray:
+    """Return C of the controller that is there, with factors on its tuning, shape (F,).
+
+    Args:
+        loop: scaled.
+        tuning: factors.
+        turn: the backward shift q at each frequency, shape (F,).
+    """
+    law = loop.law
     gain, reset, rate = tuning.applied(law.coefficients[None])[0]
-    share = law.smoothing
     control = gain + reset / (1.0 - turn) + rate * (1.0 - turn)
-    control = control * (1.0 - share) / (1.0 - share * turn) * turn**law.lag
-    poles = np.polyval(np.concatenate([a[0, i, ::-1], [1.0]]), turn)
-    zeros = np.polyval(b[0, i, j, ::-1], turn)
-    return peak(control * zeros * turn ** (1 + int(delay[i, j])) / poles)
+    return np.asarray(
+        control * (1.0 - law.smoothing) / (1.0 - law.smoothing * turn) * turn**law.lag
+    )
+
+
+def process_response(loop: RecordedLoop, draws: Draws, r: int, turn: ComplexArray) -> ComplexArray:
+    """Return P from the stem that is looked at to its output, of one draw, shape (F,)."""
+    (a, b, delay, _), i, j = draws.equations, loop.output, loop.valve
+    poles = np.polyval(np.concatenate([a[r, i, ::-1], [1.0]]), turn)
+    zeros = np.polyval(b[r, i, j, ::-1], turn)
+    return np.asarray(zeros * turn ** (1 + int(delay[i, j])) / poles)
 
 
 def frequencies() -> ComplexArray:

@@ -25,15 +25,22 @@ CURRENT = (3.8, 20.5)
 FOLLOWS = 0.9
 """Share of the moves of a controller's output that its law explains, at least."""
 
-LEADS = 3.0
-"""How many times more the law leaves unexplained the other way round, at least.
+LEADS = 8.0
+"""How many times more the law leaves unexplained the other way round, at least."""
 
-With both, 1 in 160 loops of the field is called swapped as it is, and a third of those that are:
-rounding, compression and strong proportional action hide the rest.
+STRIDES = (1, 2, 4, 8)
+"""Samples over which moves are looked at; one of them is enough.
+
+Rounding and compression hide the law from sample to sample: their part of a move stays the same
+while the move grows. Of the field's loops 1 in 160 is called swapped as it is, and half of those
+that are.
 """
 
 WORDS = {OpUnit.PERCENT: "%", OpUnit.SHARE: "0 to 1", OpUnit.CURRENT: "4 to 20 mA"}
 """Units of an OP as notes name them."""
+
+OWN = "its own unit"
+"""What stands for the unit of an OP that is not known to be in %."""
 
 EXAMINED = 20_000
 """Samples that are looked at."""
@@ -77,7 +84,8 @@ def in_percent(
                 where=str(block.path),
                 fix=f"say which with --op-unit share or --op-unit percent {OR_ROW}",
             )
-        if low < 0.0 and low >= -1.5 and high <= 1.5:
+        centred = low < 0.0 and low >= -1.5 and high <= 1.5
+        if centred:
             note = (
                 f"OP lies between {low:.3g} and {high:.3g}, perhaps without its mean: frictions "
                 "are in its own unit; if it is a share say --op-unit share"
@@ -94,10 +102,10 @@ def in_percent(
                 f"OP lies between {low:.4g} and {high:.4g} and bears no unit, {pv[0]} lies as an "
                 "OP in % would: look whether they are swapped"
             )
-        return block, "%" if usual else "its own unit", note
+        return block, "%" if usual and not centred else OWN, note
     factor, offset = TO_PERCENT[unit]
     if unit is OpUnit.OTHER:
-        return block, "its own unit", ""
+        return block, OWN, ""
     by = "OP is said to be in" if given else "the export says"
     note = _fits(block, unit, by, named=named)
     if (factor, offset) == (1.0, 0.0):
@@ -178,8 +186,8 @@ def refuse_swapped(block: Block) -> None:
 
     Where a set-point is recorded, the measurement is what stays near it. Else:
     In closed loop a controller's output moves by K (Δe + T_s/T_i e): its Δ is explained by the
-    measurement and its Δ at the same sample, and not the other way round. Rounding and
-    compression leave some of that. Of exact controllers
+    measurement and its Δ at the same sample, and not the other way round. What rounding and
+    compression hide of that shows over some samples, see :data:`STRIDES`. Of exact controllers
     :mod:`stiction_ros.identification.problem.input_checks` knows more.
 
     Raises:
@@ -193,9 +201,10 @@ def refuse_swapped(block: Block) -> None:
         if sp is not None and _stays_near(sp[1], op[1], pv[1]):
             raise _swapped(block, f"{op[0]} stays near the set-point {sp[0]}, {pv[0]} does not")
         return
-    right, wrong = _explained(op[1], pv[1]), _explained(pv[1], op[1])
-    if wrong > FOLLOWS and 1.0 - right > LEADS * (1.0 - wrong):
-        raise _swapped(block, f"{pv[0]} moves as a controller's output would, by {op[0]}")
+    for stride in STRIDES:
+        right, wrong = _explained(op[1], pv[1], stride), _explained(pv[1], op[1], stride)
+        if wrong > FOLLOWS and 1.0 - right > LEADS * (1.0 - wrong):
+            raise _swapped(block, f"{pv[0]} moves as a controller's output would, by {op[0]}")
 
 
 def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
@@ -240,14 +249,23 @@ def _only(block: Block, signal: str) -> tuple[str, FloatArray] | None:
     return (found[0].name, found[0].values[:EXAMINED]) if len(found) == 1 else None
 
 
-def _explained(output: FloatArray, measured: FloatArray) -> float:
-    """Return which share of the moves of ``output`` a PI law on ``measured`` explains."""
+def _explained(output: FloatArray, measured: FloatArray, stride: int) -> float:
+    """Return which share of the moves of ``output`` over some samples a PI law explains.
+
+    Args:
+        output: shape (N,).
+        measured: shape (N,).
+        stride: samples that a move takes.
+    """
     there = np.isfinite(output) & np.isfinite(measured)
     u, y = output[there], measured[there]
     if len(u) < FEWEST:
         return 0.0
-    moves = np.diff(u)
-    rows = np.column_stack([np.diff(y), y[1:], np.ones(len(moves))])
+    moves = u[stride:] - u[:-stride]
+    total = np.cumsum(y)
+    rows = np.column_stack(
+        [y[stride:] - y[:-stride], total[stride:] - total[:-stride], np.ones(len(moves))]
+    )
     spread = float(((moves - moves.mean()) ** 2).sum())
     if spread <= 0.0:
         return 0.0

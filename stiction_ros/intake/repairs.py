@@ -39,6 +39,9 @@ SENTINELS = (
 )
 """Numbers that loggers and controllers write in the place of a bad value."""
 
+FEWEST_USUAL = 10
+"""Values from which on it can be told that another one does not belong to them."""
+
 FEWEST_STAMPS = 5
 """Stamps from which on it can be told that they are cut off."""
 
@@ -305,20 +308,19 @@ def outside(values: FloatArray) -> FlagArray:
     """Return which values are sentinels or stray far from all others, shape (N,)."""
     there = np.isfinite(values)
     found = np.zeros(len(values), dtype=np.bool_)
-    if np.count_nonzero(there) < 10:
-        return found
     known = np.isin(values, SENTINELS)
     rest = values[there & ~known]
-    if known.any() and len(rest) >= 10:
+    if known.any() and len(rest) and len(values) > FEWEST_USUAL:
         low, high = float(rest.min()), float(rest.max())
         room = SENTINEL_FAR * max(high - low, 1e-3 * abs(high), 1e-12)
         found |= known & ((values < low - room) | (values > high + room))
     usual = values[there & ~found]
-    low, high = np.percentile(usual, [1.0, 99.0])
-    room = FAR * max(float(high - low), 1e-3 * abs(float(high)), 1e-12)
-    stray = there & ~found & ((values < low - room) | (values > high + room))
-    if _isolated(stray, there):
-        found |= stray
+    if len(usual) >= FEWEST_USUAL:
+        low, high = np.percentile(usual, [1.0, 99.0])
+        room = FAR * max(float(high - low), 1e-3 * abs(float(high)), 1e-12)
+        stray = there & ~found & ((values < low - room) | (values > high + room))
+        if _isolated(stray, there):
+            found |= stray
     return found if np.count_nonzero(found) <= RARE * len(values) else np.zeros_like(found)
 
 

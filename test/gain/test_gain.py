@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from stiction_ros.errors import InputError
-from stiction_ros.gain.draws import DRAWS, Draws, drawn_frictions, resampled
+from stiction_ros.gain.draws import (
+    DRAWS,
+    Draws,
+    drawn_frictions,
+    possible_frictions,
+    resampled,
+)
 from stiction_ros.gain.embedding import RUNS, EmbeddingDesign, embedded, pair_of
 from stiction_ros.gain.gain import Gain, Option, What, embedding_part, gain_of
 from stiction_ros.gain.measures import Measures
@@ -166,7 +172,9 @@ def test_what_drawn_loops_do_not_agree_on_has_no_figures(
 @pytest.mark.parametrize(
     ("said", "interval", "given"),
     [
-        (0.85, (0.70, 1.00), True),
+        (0.85, (0.70, 0.99), True),
+        (0.85, (0.70, 1.00), False),  # in some it becomes no better
+        (0.95, (0.80, 1.00), True),  # nothing is promised
         (0.80, (0.60, 1.00), False),  # a third more than the least, though a quarter of itself
         (0.74, (0.73, 1.00), False),
         (0.06, (0.02, 0.09), True),  # what is small beside now
@@ -280,6 +288,53 @@ def test_draws_stay_inside_the_intervals_and_keep_their_order(found: Identificat
     assert tuple(pairs[0]) == (3.0, 2.5)
     assert np.all((pairs[:, 0] >= 2.0) & (pairs[:, 0] <= 4.0))
     assert np.all((pairs[:, 1] >= 1.0) & (pairs[:, 1] <= pairs[:, 0]))
+
+
+@pytest.mark.parametrize(("band", "many"), [((4.0, 5.0), 20), ((4.98, 5.0), 2), ((9.0, 9.1), 1)])
+def test_possible_frictions_have_a_possible_band(
+    found: Identification, band: tuple[float, float], many: int
+) -> None:
+    valve = dataclasses.replace(
+        found.valves[0],
+        static_friction=2.6,
+        static_interval=(2.0, 4.0),
+        dynamic_friction=2.4,
+        dynamic_interval=(1.0, 3.5),
+        band_interval=band,
+    )
+    pairs = possible_frictions(valve, 20, np.random.default_rng(0))
+    assert pairs.shape == (20, 2)
+    assert tuple(pairs[0]) == (2.6, 2.4)
+    others = pairs[np.any(pairs != pairs[0], axis=1)]
+    assert len(others) >= many - 1
+    assert np.all((others >= (2.0, 1.0)) & (others <= (4.0, 3.5)))
+    assert np.all(others[:, 1] <= others[:, 0])
+    assert np.all((others.sum(axis=1) >= band[0]) & (others.sum(axis=1) <= band[1]))
+
+
+def test_jumps_are_less_certain_than_bands(loop: RecordedLoop) -> None:
+    likely = loop.drawn(np.random.default_rng(5)).frictions
+    possible = loop.possible(np.random.default_rng(5)).frictions
+    spreads = [np.std(pairs[:, 0] - pairs[:, 1]) for pairs in (likely, possible)]
+    assert spreads[0] < spreads[1]
+
+
+def test_loops_that_grow_without_end_are_told(
+    record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiction_ros.gain.gain.embedded", lambda part, *_: [part.now(), None])
+    embedding = gain_of(record, found).option(What.EMBEDDING)
+    assert embedding.measures is None
+    assert "In 1 of them the loop grows without end." in embedding.note
+
+
+def test_nothing_is_said_of_a_controller_that_is_faster_than_the_record_shows(
+    record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiction_ros.gain.gain.FASTEST", 0.1)
+    embedding = gain_of(record, found).option(What.EMBEDDING)
+    assert embedding.measures is None
+    assert "times as fast as the recorded loop" in embedding.note
 
 
 def test_frictions_are_taken_as_often_as_they_are_likely() -> None:

@@ -150,6 +150,7 @@ def test_an_op_between_0_and_1_is_asked_for(tmp_path: Path) -> None:
     centred = [[t, str(float(u) / 100.0 - 0.5), *rest] for t, u, *rest in table()]
     loop = one(write(tmp_path / "b.csv", text(centred)))
     assert "perhaps without its mean" in said(loop)
+    assert loop.op_unit == "its own unit"
 
 
 def test_a_current_becomes_percent(tmp_path: Path) -> None:
@@ -204,6 +205,20 @@ def test_manual_stretches_are_cut_by_mode(tmp_path: Path, words: tuple[str, str]
     assert f"20 samples not in automatic ({words[1]}), cut out" in loop.notes
 
 
+def test_a_mode_without_a_tag_is_that_of_the_one_loop(tmp_path: Path) -> None:
+    rows = [[*row, "MAN" if 40 <= k < 60 else "AUTO"] for k, row in enumerate(table())]
+    header = ["time", "FIC1.OP", "FIC1.PV", "SP", "MODE"]
+    (record,) = one(write(tmp_path / "a.csv", text(rows, header))).parts
+    assert record.usable_rows() == [(0, 40), (60, ROWS)]
+    assert record.sp is not None
+    two = [[*row[:3], *row[1:3], row[4]] for row in rows]
+    header = ["time", "FIC1.OP", "FIC1.PV", "FIC2.OP", "FIC2.PV", "MODE"]
+    found = read(write(tmp_path / "b.csv", text(two, header)))
+    assert [loop.name for loop in found] == ["FIC1", "FIC2"]
+    for loop in found:
+        assert "MODE is left out: it names none of the 2 loops" in loop.notes
+
+
 def test_a_mode_that_nobody_knows_is_asked_for(tmp_path: Path) -> None:
     rows = [[*row, "P1" if k < 40 else "Q1"] for k, row in enumerate(table())]
     path = write(tmp_path / "a.csv", text(rows, [*HEADER, "MODE"]))
@@ -221,6 +236,15 @@ def test_a_sentinel_is_held_and_told(tmp_path: Path, value: str) -> None:
     assert record.quality[50] == Quality.HELD
     assert abs(record.pv[50, 0] - pv(50)) < 2.0
     assert "1 value such as" in said(loop)
+
+
+def test_a_sentinel_among_few_good_values_is_one(tmp_path: Path) -> None:
+    rows = table()
+    for row in rows[9:-1]:
+        row[2] = "Bad"
+    rows[-1][2] = "-9999"
+    loop = one(write(tmp_path / "a.csv", text(rows)))
+    assert "1 value such as -9999" in said(loop)
 
 
 def test_a_value_that_may_be_meant_is_kept(tmp_path: Path) -> None:
@@ -315,14 +339,16 @@ def test_raw_stamps_are_brought_to_the_scan_and_what_is_lost_is_said(tmp_path: P
     assert "leave --strict out" in str(one(path, strict=True).problem)
 
 
-def test_op_and_pv_swapped_without_set_point(tmp_path: Path) -> None:
+@pytest.mark.parametrize("step", [0.1, 2.0])
+def test_op_and_pv_swapped_without_set_point(tmp_path: Path, step: float) -> None:
+    """Rounding to 2 % hides the controller's law from sample to sample, not over eight of them."""
     rng = np.random.default_rng(2)
     y, u, before, lines = 0.0, 50.0, 0.0, ["t,OP,PV"]
     for k in range(600):
         y = 0.8 * y + 0.2 * (u - 50.0) + 2.0 * rng.standard_normal()
         u += -0.5 * (y - before) - 0.3 * y
         before = y
-        lines.append(f"{k},{y + 20.0:.3f},{round(u, 1)}")  # rounded, and the wrong way round
+        lines.append(f"{k},{y + 20.0:.3f},{step * round(u / step):g}")  # the wrong way round
     path = write(tmp_path / "a.csv", "\n".join(lines))
     assert "--op V1=PV --pv PV1=OP" in str(one(path).problem)
     right = write(tmp_path / "b.csv", "\n".join(lines).replace("OP,PV", "PV,OP"))

@@ -32,6 +32,11 @@ from stiction_ros.records.quality import Quality
         ("FIC101.PV.Quality", Tag("FIC101", "pv", quality=True)),
         ("PV", Tag("", "pv")),
         ("setpoint", Tag("", "sp")),
+        ("LIC-4711 Istwert", Tag("LIC-4711", "pv")),
+        ("LIC-4711 Stellgröße", Tag("LIC-4711", "op")),
+        ("LIC-4711 STELLWERT", Tag("LIC-4711", "op")),
+        ("LIC-4711 Betriebsart", Tag("LIC-4711", "mode")),
+        ("FIC12 consigne", Tag("FIC12", "sp")),
     ],
 )
 def test_names_of_the_usual_makers(name: str, tag: Tag) -> None:

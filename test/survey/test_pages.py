@@ -84,6 +84,30 @@ def test_the_list_is_readable(list_file: Path, width: int, dark: bool) -> None:
 
 
 @needs_browser
+@pytest.mark.parametrize("width", [1400, 390])
+def test_a_list_with_all_columns_and_the_longest_words_is_readable(
+    tmp_path: Path, width: int
+) -> None:
+    said = {
+        "service": "The drawn loops do not agree on its amplitude.",
+        "embedding": "Nothing is promised of embedding it.",
+        "retune": "Neither valve nor tuning is the cause: another tuning is not looked for.",
+    }
+    gain = {"now": {"iae_per_hour": 2.0}}
+    gain |= {what: {"iae_per_hour": None, "note": note} for what, note in said.items()}
+    rest = {"gain": gain, "cost_per_hour": 11.25, "group": 12, "op_unit": "its own unit"}
+    small = {"f_s": 0.0489123, "f_d": 0.0246123, "band_share": 0.64}
+    rows = tuple(
+        entry(f"AIC-{k}.A", "backlash", "set_point", rank=k, **rest, **small)
+        for k in range(100, 104)
+    )
+    earlier = (Earlier("2023-11-02 03:04+00:00", {row.name: 0.0735123 for row in rows}),)
+    page = tmp_path / "survey.html"
+    page.write_text(list_page(Survey("local", 2, 12.0, rows, ()), earlier), encoding="utf-8")
+    _check(probe(page, width, dark=False), width, dark=False)
+
+
+@needs_browser
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [1400, 390])
 def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool) -> None:
@@ -203,6 +227,8 @@ def test_the_list_says_what_is_saved_or_why_nothing_is(tmp_path: Path) -> None:
         (gain(2.06, ""), "service", "+3 %"),
         (gain(None, disagree), "service", "draws disagree"),
         (gain(None, repeat), "service", "does not repeat"),
+        (gain(None, "In 2 of them the loop grows without end."), "service", "unstable"),
+        (gain(None, "It would answer 4 times as fast."), "service", "faster than shown"),
         (None, "service", "not simulated"),
         (rest, "retune", "none helps"),
     ]
@@ -211,6 +237,8 @@ def test_the_list_says_what_is_saved_or_why_nothing_is(tmp_path: Path) -> None:
     assert in_words(entry("A", "healthy"), "service") == ""
     page = list_page(Survey("local", 1, 1.0, (entry("A", gain=rows[2][0]),), ()))
     assert f'title="{disagree}">draws disagree' in page
+    page_of = list_page(Survey("local", 1, 1.0, (entry("A", gain=rows[0][0]),), ()))
+    assert "−75&nbsp;%" in page_of  # a figure and its unit are not parted on a phone
     assert "simulated: −75 % leaves a quarter" in page
 
 

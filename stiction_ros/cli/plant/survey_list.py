@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -15,6 +16,12 @@ if TYPE_CHECKING:
 
 SHOWN = 30
 """Rows of the list that are printed."""
+
+WHOLE = ("rank", "loop", "verdict", "f_S")
+"""Columns that are not broken in a narrow window."""
+
+LONGEST = 20
+"""Letters of a word that is not broken there."""
 
 
 def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
@@ -65,9 +72,13 @@ def _table(entries: Sequence[Entry]) -> Table:
         *(HEADS["service"], "reason"),
     )
     kept = [place for place in range(len(heads)) if any(row[place] for row in rows)]
-    table = Table()
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for place in kept:
-        table.add_column(heads[place])
+        whole = heads[place] in WHOLE
+        cells = [row[place] for row in rows]
+        words = cells if whole else [word for cell in cells for word in cell.split()]
+        longest = min(max(map(len, words)), LONGEST)
+        table.add_column(heads[place], no_wrap=whole, min_width=longest, overflow="fold")
     for row in rows:
         table.add_row(*(row[place] for place in kept))
     return table

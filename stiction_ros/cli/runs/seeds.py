@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import TypeVar
 
 from stiction_ros.cli.output.progress import bar
+from stiction_ros.orphans import spared
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -60,13 +61,14 @@ def run_each(work: Callable[[S], T], items: Sequence[S], jobs: int, text: str) -
     done: dict[int, T] = {}
     context = multiprocessing.get_context("spawn")
     with bar(text) as show, ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        futures = {pool.submit(work, item): place for place, item in enumerate(items)}
+        with spared():  # the first item starts the workers
+            futures = {pool.submit(work, item): place for place, item in enumerate(items)}
         try:
             for future in as_completed(futures):
                 done[futures[future]] = future.result()
                 show(len(done) / len(items))
         except BaseException:
-            drop(futures)
+            drop(pool)
             raise
     return [done[place] for place in range(len(items))]
 
@@ -80,7 +82,7 @@ def _one_by_one(work: Callable[[S], T], items: Sequence[S], text: str) -> list[T
     return done
 
 
-def drop(futures: Iterable[Future[Any]]) -> None:
-    """Cancel what has not begun, one by one: leaving its pool forgets that all were to be."""
-    for future in futures:
-        future.cancel()
+def drop(pool: ProcessPoolExecutor) -> None:
+    """End the workers, who are spared Ctrl-C; leaving the pool would wait for what has begun."""
+    for process in list((pool._processes or {}).values()):
+        process.terminate()

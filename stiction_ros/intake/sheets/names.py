@@ -7,13 +7,19 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 SIGNAL_WORDS: Mapping[str, tuple[str, ...]] = {
-    "pv": ("pv", "meas", "process_value", "processvalue", "pv_in", "me"),
-    "sp": ("sp", "sv", "spt", "setpoint", "set_point", "set point", "wsp"),
-    "op": ("op", "out", "mv", "co", "output", "opout", "lmn", "cout"),
+    "pv": ("pv", "meas", "process_value", "processvalue", "pv_in", "me", "istwert", "mesure"),
+    "sp": (
+        *("sp", "sv", "spt", "setpoint", "set_point", "set point", "wsp", "sollwert"),
+        "consigne",
+    ),
+    "op": (
+        *("op", "out", "mv", "co", "output", "opout", "lmn", "cout", "stellwert", "stellgrad"),
+        *("stellgröße", "stellgrösse", "stellgroesse", "sortie"),
+    ),
     "stem": ("stem", "zt", "pos", "position", "travel"),
-    "mode": ("mode", "md", "mode_act", "modeact", "a/m", "am", "auto"),
+    "mode": ("mode", "md", "mode_act", "modeact", "a/m", "am", "auto", "betriebsart"),
 }
-"""Last part of a tag, in the words of the makers of control systems, by signal."""
+"""Last part of a tag, in the words of makers of control systems and of users, by signal."""
 
 TIME_NAMES = (
     *("t", "time", "timestamp", "time stamp", "datetime", "date time", "date/time", "stamp", "ts"),

@@ -192,6 +192,7 @@ def _wide(sheet: Sheet, columns: CsvColumns, tags: TagList | None) -> Plan | Non
     if not loops:
         return None
     time = time_column(sheet, columns.time)
+    notes += _without_loop(sheet, loops, time.place)
     places = {index for signals in loops.values() for index in signals.values()}
     beside, whole = _qualities(sheet, places)
     for tag, index in quality.items():
@@ -200,6 +201,29 @@ def _wide(sheet: Sheet, columns: CsvColumns, tags: TagList | None) -> Plan | Non
             beside[of] = index
     named = tags is not None and bool(tags.own)
     return Plan(Shape.WIDE, time, loops, beside, whole, named=named, notes=tuple(notes))
+
+
+def _without_loop(sheet: Sheet, loops: dict[str, dict[Key, int]], time: int | None) -> list[str]:
+    """Give columns as a bare MODE to the one loop that there is; of several, return notes.
+
+    Args:
+        sheet: with columns of which some are tags.
+        loops: columns of each loop, added to.
+        time: place of the column of the time.
+    """
+    notes = []
+    taken = {index for signals in loops.values() for index in signals.values()} | {time}
+    for index, name in enumerate(sheet.layout.header):
+        tag = read_tag(name)
+        if tag is None or tag.loop or tag.quality or index in taken:
+            continue
+        if len(loops) > 1:
+            given = sheet.layout.given[index]
+            notes.append(f"{given} is left out: it names none of the {len(loops)} loops")
+            continue
+        ((loop, signals),) = loops.items()
+        signals.setdefault(Key(tag.signal, "" if tag.signal == "mode" else loop), index)
+    return notes
 
 
 def _refuse_strange(sheet: Sheet, tags: TagList) -> None:

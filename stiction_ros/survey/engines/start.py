@@ -15,6 +15,8 @@ from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from stiction_ros.orphans import spared
+
 
 def context_of(module: str) -> ForkServerContext | SpawnContext:
     """Return how processes are started here; there is no fork server on every system.
@@ -40,7 +42,7 @@ def started(
         arguments: of it.
     """
     process = context.Process(target=work, args=arguments, daemon=True)
-    with same_imports():
+    with same_imports(), spared():
         process.start()
     return process
 

@@ -156,7 +156,8 @@ def _saved(entry: Entry, what: str) -> Cell:
     shown, note = in_words(entry, what), note_of(entry, what)
     if not shown:
         return "", None
-    return f'<span title="{text(note)}">{text(shown)}</span>', change(entry, what)
+    whole = text(shown).replace(" %", "&nbsp;%")
+    return f'<span title="{text(note)}">{whole}</span>', change(entry, what)
 
 
 def _value(value: object) -> str:

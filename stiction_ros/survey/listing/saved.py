@@ -18,6 +18,7 @@ HEADS = {
 WHY = (
     ("do not agree", "draws disagree"),
     ("repeat the record", "does not repeat"),
+    ("times as fast", "faster than shown"),
     ("Not simulated", "not simulated"),
     ("grows without end", "unstable"),
     ("No other tuning", "none helps"),

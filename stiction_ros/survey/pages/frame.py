@@ -42,9 +42,9 @@ th button { font: inherit; color: inherit; background: none; border: 0; padding:
 th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t { text-align: left; }
-td.name, td.wordy { overflow-wrap: anywhere; } td.wordy { min-width: 20ch; }
+td.name, td.wordy { overflow-wrap: anywhere; } td.wordy { min-width: 14ch; }
 table.list { font-size: .84rem; }
-td.name { min-width: 14ch; font-weight: 600; }
+td.name { min-width: 12ch; font-weight: 600; }
 td.s, td.trend { white-space: nowrap; }
 .sticky, .backlash, .failed { color: var(--bad); font-weight: 600; }
 .healthy { color: var(--good); } .undecided, .skipped { color: var(--open); }
@@ -68,6 +68,7 @@ figure.plot { position: relative; }
 .key .stem { border-color: var(--stem); } .key .sp { border-color: var(--sp); }
 .key .free { border-color: var(--free); }
 svg.spark { width: 92px; height: 22px; vertical-align: middle; }
+table.list td.trend svg { display: block; margin-left: auto; }
 svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
 .plot button { position: absolute; right: 0; top: 0; font: inherit; font-size: .82rem;
   color: var(--ink); background: var(--panel); border: 1px solid var(--line);
@@ -86,6 +87,7 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   table.list td:empty { display: none; }
   table.list td.name, table.list td.wordy, table.list td.trend { grid-column: 1 / -1; }
   table.list td.wordy::before { content: none; }
+  table.list td.trend svg { display: inline-block; margin-left: 6px; }
   .plot[data-low] text { font-size: 24px; }
   table.list td.rank { order: 1; } table.list td { order: 2; } table.list td.name { order: 0; }
 }

@@ -22,6 +22,7 @@ from stiction_ros.cli.options import choices
 from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
 from stiction_ros.cli.runs.seeds import drop
+from stiction_ros.orphans import spared
 
 if TYPE_CHECKING:
     from stiction_ros.blind.scores.scoring import Scored
@@ -139,13 +140,14 @@ def judge_all(
         bar(f"{len(cases)} blind loops") as show_share,
         ProcessPoolExecutor(max(jobs, 1), mp_context=context) as pool,
     ):
-        futures = [pool.submit(judge, family, seed, full) for family, seed in cases]
+        with spared():  # the first case starts the workers
+            futures = [pool.submit(judge, family, seed, full) for family, seed in cases]
         try:
             for done, future in enumerate(as_completed(futures), start=1):
                 keep(future.result())
                 show_share(done / len(futures))
         except BaseException:
-            drop(futures)
+            drop(pool)
             raise
 
 
