@@ -20,7 +20,9 @@ LONGEST_REST = 12
 ENDS = 6
 MOST_CLIPPED = 0.5  # of the rows: what stands at its ends more often is no clipped measurement
 ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
-OFTEN_HELD = 0.2  # of the samples
+OFTEN = 0.05  # of the samples: held or interpolated values, from which on a record is thinned out
+FLOAT = 2e-7  # of the largest value: digits that a difference of three has by itself
+NEARLY = 5.0  # digits: noise is as often nearly nothing as that is wider than nothing
 LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
 ALONE = 8.0  # usual distances from the mean of both neighbours, beyond which one is a spike
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
@@ -112,15 +114,17 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                 usable[i, rows] &= ~alone
                 lonely[i] += int(alone.sum())
                 notes.append(f"{int(alone.sum())} samples of {name} stand alone and are not scored")
-            if _compressed(values):
+            if not rounded and _compressed(values, quantum):
                 notes.append(
                     f"{name} lies on straight lines: a historian has thinned it out, small "
                     "effects are lost"
                 )
         findings += rounded
         rounding.append(quantum if rounded else 0.0)
-        whole = [runs.pv[rows, i] for rows in runs.slices]
-        thinned.append(any(_compressed(v) or (not rounded and _held(v)) for v in whole))
+        whole = [(runs.pv[rows, i], usable[i, rows]) for rows in runs.slices]
+        thinned.append(
+            not rounded and any(_compressed(v, quantum) or _held(v, quantum, u) for v, u in whole)
+        )
     findings = [finding for finding in findings if not known_already(model, runs, finding)]
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
@@ -266,9 +270,13 @@ def _surprise(runs: Runs, output: int) -> float:
     return float(np.std(whiten(values, autoregression(values, rows))[rows]))
 
 
-def _held(values: FloatArray) -> bool:
-    """Tell whether many values are exactly those before them: reported by exception."""
-    return float(np.mean(np.diff(values) == 0.0)) > OFTEN_HELD
+def _held(values: FloatArray, quantum: float, usable: BoolArray) -> bool:
+    """Tell whether values are exactly those before them: reported by exception.
+
+    Values that are frozen or clipped are not asked.
+    """
+    moves = np.abs(np.diff(values))[usable[1:] & usable[:-1]]
+    return _too_often(moves, 0.5 * quantum, values)
 
 
 def _alone(values: FloatArray) -> BoolArray:
@@ -284,11 +292,27 @@ def _alone(values: FloatArray) -> BoolArray:
     return found
 
 
-def _compressed(values: FloatArray) -> bool:
-    bends = np.abs(np.diff(values, 2))
-    scale = float(np.ptp(values))
-    straight = float(np.mean((bends <= 1e-9 * scale) & (np.abs(np.diff(values))[1:] > 0.0)))
-    return straight > 0.5
+def _compressed(values: FloatArray, quantum: float) -> bool:
+    """Tell whether values lie on the straight line of their neighbours: drawn by lines."""
+    bends, moved = np.abs(np.diff(values, 2)), np.abs(np.diff(values))[1:] > 0.0
+    return _too_often(np.where(moved, bends, np.inf), 2.0 * quantum, values)
+
+
+def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> bool:
+    """Tell whether sizes are nothing, as far as digits tell, more often than they are small.
+
+    Args:
+        sizes: that would be spread about nothing smoothly by noise, shape (n,).
+        digits: that a size of nothing may seem to have by the rounding of the values.
+        values: of which they are the differences.
+    """
+    digits = max(digits, FLOAT * float(np.abs(values).max()))
+    nothing, small = sizes <= digits, sizes <= NEARLY * digits
+    share = float(np.mean(nothing)) if len(sizes) else 0.0
+    if share <= OFTEN or share <= float(np.mean(small)) - share:
+        return False
+    others = sizes[~nothing & np.isfinite(sizes)]
+    return len(others) > 0 and float(np.median(others)) > NEARLY * digits
 
 
 def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:

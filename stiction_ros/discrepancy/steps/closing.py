@@ -30,7 +30,12 @@ from stiction_ros.discrepancy.fit.uncertainty import (
     likelihood_intervals,
 )
 from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
-from stiction_ros.discrepancy.gap.noise_check import OutputNoise, check_noise, noise_sentences
+from stiction_ros.discrepancy.gap.noise_check import (
+    OutputNoise,
+    check_noise,
+    noise_sentences,
+    spans_steps,
+)
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.process.free_intervals import with_free_process
@@ -40,7 +45,6 @@ from stiction_ros.effects import from_mapping
 
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
-SOME_STEPS = 3.0  # of the rounding
 CLOSES = 0.2  # of the excess of the free run that an effect has to close by itself
 
 
@@ -54,11 +58,12 @@ def closing(task: Task, looked: State) -> Discrepancy:
     state, found = _named(task, looked)
     before, after = measure_gap(state.before), measure_gap(state.base)
     louder = _louder(task, state)
-    effects = [*(of_data(finding) for finding in task.data), *found, *louder]
-    verdict, alternatives = overall(effects, state.looks, state.testable)
+    shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
+    effects = [*shown, *answers]
+    verdict, alternatives = overall(shown, answers, state.looks, state.testable)
     model = state.bare
-    for shown, added in zip(found, state.added, strict=True):
-        model = model.with_effect(added.place, added.behaviour, **_provenance(task, shown))
+    for named, added in zip(found, state.added, strict=True):
+        model = model.with_effect(added.place, added.behaviour, **_provenance(task, named))
     for noise in louder:
         behaviour = from_mapping({"effect": noise.effect} | dict(noise.parameters))
         model = model.with_effect(noise.place, behaviour, **_provenance(task, noise))
@@ -74,8 +79,8 @@ def closing(task: Task, looked: State) -> Discrepancy:
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and (no_names or _noise_left(task, state, noises)):
         verdict = GapVerdict.UNKNOWN
-    named = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
-    named |= set(alternatives)
+    told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
+    told |= set(alternatives)
     task.report(1.0)
     return Discrepancy(
         verdict=verdict,
@@ -84,7 +89,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         experiment=experiment_for(verdict, effects, alternatives, state.testable),
         where=_where(task, state, no_names, verdict),
         untestable=tuple(
-            t for t in state.testable if not t.testable and (t.place, t.effect) not in named
+            t for t in state.testable if not t.testable and (t.place, t.effect) not in told
         ),
         noise=noises,
         process_changes=state.changes,
@@ -227,13 +232,12 @@ def _matters(task: Task, state: State, output: int) -> bool:
     """Tell whether what is left of an output is large enough to be an effect.
 
     A model of the field is never exact: beside a large effect it leaves a little of its own.
-    Rounding of a slow signal is no white noise: what is left has to span some steps.
     """
     rows = state.base.blocks[output].train
     before, after = (
         float(np.std(base.noise[output].residual[rows])) for base in (state.before, state.base)
     )
-    if after < SOME_STEPS * task.runs.quanta[output]:
+    if not spans_steps(state.base, output):
         return False
     return not (state.added or state.changes) or after > BESIDE * before
 
