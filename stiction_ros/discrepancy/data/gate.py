@@ -280,15 +280,19 @@ def _held(values: FloatArray, quantum: float, usable: BoolArray) -> bool:
 
 
 def _alone(values: FloatArray) -> BoolArray:
-    """Return single samples far off both neighbours, which are near each other."""
+    """Return samples far off both neighbours, which are near each other: one, or two in a row."""
     found = np.zeros(len(values), dtype=bool)
-    if len(values) < 3:
+    if len(values) < 4:
         return found
     beside = 0.5 * (values[:-2] + values[2:])
-    away, apart = values[1:-1] - beside, np.abs(values[2:] - values[:-2])
-    usual = float(np.median(np.abs(away)))
-    scale = max(usual, LATTICE * float(np.ptp(values)))
-    found[1:-1] = (np.abs(away) > ALONE * scale) & (apart < 0.5 * np.abs(away))
+    away, apart = np.abs(values[1:-1] - beside), np.abs(values[2:] - values[:-2])
+    scale = max(float(np.median(away)), LATTICE * float(np.ptp(values)))
+    found[1:-1] = (away > ALONE * scale) & (apart < 0.5 * away)
+    beside, apart = 0.5 * (values[:-3] + values[3:]), np.abs(values[3:] - values[:-3])
+    away = np.minimum(np.abs(values[1:-2] - beside), np.abs(values[2:-1] - beside))
+    pairs = (away > ALONE * scale) & (apart < 0.5 * away)
+    found[1:-2] |= pairs
+    found[2:-1] |= pairs
     return found
 
 

@@ -85,11 +85,12 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
     fits = not_contradicted(scored.scores.base.run, scored.scores.fits)
     mine = max((f.evidence for f in fits if f.candidate.key == own.key), default=0.0)
     twins = next((f.candidate.twins for f in fits if f.candidate.key == own.key), ())
+    known = {own.key, *(each.fit.candidate.key for each in others.added)}
     alike = [
         f
         for f in sorted(fits, key=lambda f: -f.evidence)
         if f.candidate.inside
-        and f.candidate.key != own.key
+        and f.candidate.key not in known
         and f.evidence > max(mine - NEAR, 0.0)
         and confirmed(f)
         and large_enough(f)

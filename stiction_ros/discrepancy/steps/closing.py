@@ -38,6 +38,7 @@ from stiction_ros.discrepancy.gap.noise_check import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.likelihood.noise import gain_of_noise
 from stiction_ros.discrepancy.process.free_intervals import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
 from stiction_ros.discrepancy.steps.state import State, Task
@@ -45,6 +46,7 @@ from stiction_ros.effects import from_mapping
 
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
+DROWNED = 4.0  # times the declared noise: more is none that thinned values add to it
 CLOSES = 0.2  # of the excess of the free run that an effect has to close by itself
 
 
@@ -223,9 +225,20 @@ def _mended(state: State) -> bool:
 def _noise_left(task: Task, state: State, noises: tuple[OutputNoise, ...]) -> bool:
     """Tell whether noise is left that no law tells, and that is large enough to matter."""
     return any(
-        each.memory and (not state.changes or _matters(task, state, i))
+        (each.memory and (not state.changes or _matters(task, state, i))) or _drowned(state, i)
         for i, each in enumerate(noises)
     )
+
+
+def _drowned(state: State, output: int) -> bool:
+    """Tell whether values that were thinned out leave far more than the declared noise."""
+    run = state.base.run
+    declared = declared_noise(run.model)[output]
+    if declared is None or not run.runs.thinned[output]:
+        return False
+    rows = state.base.blocks[output].train
+    left = float(np.std(state.base.noise[output].residual[rows]))
+    return left > DROWNED * declared.std * math.sqrt(gain_of_noise(declared.ar))
 
 
 def _matters(task: Task, state: State, output: int) -> bool:

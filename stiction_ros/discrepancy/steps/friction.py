@@ -16,7 +16,12 @@ from stiction_ros.effects import about
 
 
 def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
-    """Return what counts how often the stem of a fit leaves a rest."""
+    """Return what counts how often the stem of a fit leaves a rest, as far as PV shows it.
+
+    Where values were thinned out, PV does not show how a stem leaves its rest.
+    """
+    if any(run.runs.thinned):
+        return lambda fit: 0
     return lambda fit: departures(run, fit.candidate, fit.point)
 
 

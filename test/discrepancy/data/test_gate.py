@@ -209,3 +209,12 @@ def test_values_on_a_coarse_lattice_or_at_an_end_are_not_thinned_out() -> None:
     values = record(loop()).pv[:, 0]
     assert not thinned(values, 0.1)
     assert not thinned(np.minimum(values, np.quantile(values, 0.8)), 1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_samples_that_stand_alone_are_not_scored(count: int) -> None:
+    model, recorded = loop(), record(loop())
+    pv = recorded.pv.copy()
+    pv[300 : 300 + count, 0] += 9.0
+    gate = look_at_data(model, join_records(model, [dataclasses.replace(recorded, pv=pv)]))
+    assert np.flatnonzero(~gate.usable[0]).tolist() == list(range(300, 300 + count))

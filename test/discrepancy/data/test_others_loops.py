@@ -259,3 +259,13 @@ def test_a_needle_is_looked_for_over_the_whole_length_of_its_valley() -> None:
     assert (found.effect, found.alternatives) == ("stiction", ())
     assert found.parameters["f_s"] == pytest.approx(7.862, rel=0.01)
     assert found.parameters["f_d"] == pytest.approx(2.531, rel=0.02)
+
+
+def test_two_spikes_in_a_row_are_no_steps() -> None:
+    answer = answered(399, family="two")
+    assert names(answer) == [("valve:V1", "backlash"), ("disturbance:PV1", "sine")]
+
+
+def test_a_walk_behind_thinned_values_is_not_nothing() -> None:
+    assert answered(102).verdict is GapVerdict.UNKNOWN
+    assert answered(822).verdict is GapVerdict.NONE  # healthy
