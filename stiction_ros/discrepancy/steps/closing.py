@@ -41,6 +41,8 @@ from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.likelihood.noise import gain_of_noise
 from stiction_ros.discrepancy.process.free_intervals import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
+from stiction_ros.discrepancy.steps.look import explained
+from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import from_mapping
 
@@ -58,6 +60,10 @@ def closing(task: Task, looked: State) -> Discrepancy:
         looked: what is believed after the last step.
     """
     state, found = _named(task, looked)
+    if not explained(state):
+        assert state.doubted is not None
+        looked = settle(task, state.doubted)
+        state, found = _named(task, looked)
     before, after = measure_gap(state.before), measure_gap(state.base)
     louder = _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]

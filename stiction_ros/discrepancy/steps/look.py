@@ -60,7 +60,8 @@ def look_on(task: Task, state: State) -> State:
         state = look(task, state, k)
         if not state.looks[-1].kept:
             break
-    if state.doubted is not None and not _explained(state, state.doubted):
+    if not explained(state):
+        assert state.doubted is not None
         state = state.doubted
     while state.added and state.earlier and moved_away(state.before, state.base):
         state = withdrawn(task, state)
@@ -90,10 +91,15 @@ def look(task: Task, state: State, k: int) -> State:
     return changed_again(task, _grown(seen, scored, decision, step)) if step and kept else seen
 
 
-def _explained(state: State, doubted: State) -> bool:
+def explained(state: State) -> bool:
     """Tell whether more was found beside an effect in doubt, and both leave the declared noise."""
-    enlarged = any(fit.enlarged for fit in state.base.noise)
-    return len(state.added) > len(doubted.added) + 1 and not enlarged
+    if state.doubted is None:
+        return True
+    declared = all(
+        forms and not fit.enlarged
+        for fit, forms in zip(state.base.noise, state.base.declared, strict=True)
+    )
+    return declared and len(state.added) > len(state.doubted.added) + 1
 
 
 def withdrawn(task: Task, state: State) -> State:
