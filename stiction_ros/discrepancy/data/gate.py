@@ -53,7 +53,7 @@ class Gate:
     Attributes:
         usable: per output the rows whose PV is a measurement, shape (p, N).
         findings: frozen, clipped and rounded PVs, but for what the model has already.
-        thinned: per output whether values were held or interpolated.
+        thinned: per output the share of values that were held or interpolated; 0 where none were.
         quantum: per output the distance of PV's values; 0 where they are as good as continuous.
         rounding: the same, where it is coarse enough to matter; 0 elsewhere.
         set_point_moves: per output, over all records; None where SP is not recorded.
@@ -64,7 +64,7 @@ class Gate:
 
     usable: BoolArray
     findings: tuple[DataFinding, ...]
-    thinned: tuple[bool, ...]
+    thinned: tuple[float, ...]
     quantum: tuple[float, ...]
     rounding: tuple[float, ...]
     set_point_moves: tuple[int, ...] | None
@@ -122,9 +122,8 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
         findings += rounded
         rounding.append(quantum if rounded else 0.0)
         whole = [(runs.pv[rows, i], usable[i, rows]) for rows in runs.slices]
-        thinned.append(
-            not rounded and any(_compressed(v, quantum) or _held(v, quantum, u) for v, u in whole)
-        )
+        shares = [max(_compressed(v, quantum), _held(v, quantum, u)) for v, u in whole]
+        thinned.append(0.0 if rounded else max(shares))
     findings = [finding for finding in findings if not known_already(model, runs, finding)]
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
@@ -270,8 +269,8 @@ def _surprise(runs: Runs, output: int) -> float:
     return float(np.std(whiten(values, autoregression(values, rows))[rows]))
 
 
-def _held(values: FloatArray, quantum: float, usable: BoolArray) -> bool:
-    """Tell whether values are exactly those before them: reported by exception.
+def _held(values: FloatArray, quantum: float, usable: BoolArray) -> float:
+    """Return the share of values that are exactly those before them: reported by exception.
 
     Values that are frozen or clipped are not asked.
     """
@@ -296,14 +295,16 @@ def _alone(values: FloatArray) -> BoolArray:
     return found
 
 
-def _compressed(values: FloatArray, quantum: float) -> bool:
-    """Tell whether values lie on the straight line of their neighbours: drawn by lines."""
+def _compressed(values: FloatArray, quantum: float) -> float:
+    """Return the share of values on the straight line of their neighbours: drawn by lines."""
     bends, moved = np.abs(np.diff(values, 2)), np.abs(np.diff(values))[1:] > 0.0
     return _too_often(np.where(moved, bends, np.inf), 2.0 * quantum, values)
 
 
-def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> bool:
-    """Tell whether sizes are nothing, as far as digits tell, more often than they are small.
+def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> float:
+    """Return the share of sizes that are nothing, as far as digits tell.
+
+    0 where they are not so more often than they are small.
 
     Args:
         sizes: that would be spread about nothing smoothly by noise, shape (n,).
@@ -314,9 +315,11 @@ def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> bool:
     nothing, small = sizes <= digits, sizes <= NEARLY * digits
     share = float(np.mean(nothing)) if len(sizes) else 0.0
     if share <= OFTEN or share <= float(np.mean(small)) - share:
-        return False
+        return 0.0
     others = sizes[~nothing & np.isfinite(sizes)]
-    return len(others) > 0 and float(np.median(others)) > NEARLY * digits
+    if not len(others) or float(np.median(others)) <= NEARLY * digits:
+        return 0.0
+    return share
 
 
 def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:

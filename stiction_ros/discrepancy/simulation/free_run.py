@@ -40,8 +40,8 @@ class Runs:
         usable: per output the rows whose PV can be scored, shape (p, N).
         quanta: per output the step of a coarse rounding; 0 where there is none.
         lattices: per output the distance of PV's values, however fine; 0 where there is none.
-        thinned: per output whether values were held or interpolated, so that their noise is
-            no longer that of the loop.
+        thinned: per output the share of values that were held or interpolated, so that their
+            noise is no longer that of the loop; 0 where none were.
         unseen: per valve what may act beside the recorded OP; empty where nothing does.
         between: per valve whether it is left open how late within a sample an effect that is added
             moves its stem; empty where that is not asked.
@@ -54,7 +54,7 @@ class Runs:
     slices: tuple[slice, ...]
     usable: BoolArray
     quanta: tuple[float, ...]
-    thinned: tuple[bool, ...]
+    thinned: tuple[float, ...]
     lattices: tuple[float, ...]
     unseen: tuple[tuple[Unseen, ...], ...] = ()
     between: tuple[bool, ...] = ()
@@ -95,7 +95,7 @@ def join_records(
     time = np.concatenate([r.time for r in records])
     count = pv.shape[1]
     op = np.clip(op, low, high)
-    none = (0.0,) * count, (False,) * count, (0.0,) * count
+    none = (0.0,) * count, (0.0,) * count, (0.0,) * count
     return Runs(tuple(records), op, pv, time, slices, usable, *none)
 
 

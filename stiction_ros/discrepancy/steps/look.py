@@ -29,6 +29,7 @@ from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 
 SCORED = 0.8  # of the time of a look
+MOST_THINNED = 0.95  # of the values
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,14 +146,20 @@ def scored_by(task: Task, state: State, k: int) -> Scored:
 
 
 def decided(task: Task, state: State, scored: Scored) -> Decision:
-    """Return what the scores allow to say."""
-    base, margin = scored.scores.base, task.options.margin
+    """Return what the scores allow to say.
+
+    Values between those that were kept are none that were measured: all evidence counts by the
+    share of the others.
+    """
+    base = scored.scores.base
+    margin = task.options.margin / (1.0 - min(max(task.runs.thinned), MOST_THINNED))
     if task.options.quick:
         chance = stored_threshold(sum(each.inside for each in scored.candidates))
     else:
         chance = chance_threshold(base, scored.candidates, task.random)
     possible = not_contradicted(base.run, scored.scores.fits)
     allowed = [fit for fit in possible if not has_friction(state.added, fit)]
+    chance *= margin / task.options.margin
     decision = decide(allowed, margin, max(margin, chance), rests_left(base.run))
     if task.options.free_process:
         decision = in_doubt_of_place(base, decision)
