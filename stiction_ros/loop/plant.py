@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects import Behaviour, DrivenByNoise, FloatArray, Memory
+from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
 from stiction_ros.loop.model import LoopModel
 from stiction_ros.loop.valve_changes import ValveChange
 from stiction_ros.processes import NoiseEntry
@@ -101,7 +102,12 @@ class Plant:
         self._loads = [
             (model.valve_names.index(d.place), _Chain((d.behaviour,), 0.0, random_effects))
             for d in model.disturbances
-            if d.load
+            if d.load and not isinstance(d.behaviour, PeriodicDisturbance)
+        ]
+        self._waves = [  # go on between two samples, in which a process takes up their mean
+            (model.valve_names.index(d.place), d.behaviour)
+            for d in model.disturbances
+            if d.load and isinstance(d.behaviour, PeriodicDisturbance)
         ]
         self._measurement_std = process.noise_std(NoiseEntry.MEASUREMENT)
         self._equation_std = process.noise_std(NoiseEntry.EQUATION)
@@ -127,9 +133,11 @@ class Plant:
             asked = min(max(float(op[j]), low), high)
             stem[j] = min(max(chain.step(asked, time), low), high)
         noise = self._equation_std * self._random.standard_normal(len(self._equation_std))
-        moved = stem.copy() if self._loads else stem
+        moved = stem.copy() if self._loads or self._waves else stem
         for j, chain in self._loads:
             moved[j] += chain.step(0.0, time)
+        for j, wave in self._waves:
+            moved[j] += float(wave.entering(np.array([time]), self.model.sample_time)[0])
         self._state = self.model.process.advance(self._state, moved, self._upset, noise)
         self._stem = stem
         self.sample += 1

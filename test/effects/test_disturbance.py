@@ -99,3 +99,13 @@ def test_a_random_walk_spreads_with_the_root_of_time(second: float) -> None:
         ends.append(value)
     assert np.std(ends) == pytest.approx(0.3 * math.sqrt(20 * second), rel=0.1)
     assert walk.simulate(np.ones(3)) == pytest.approx(np.ones(3))
+
+
+@pytest.mark.parametrize("kind", [SquareDisturbance, TriangleDisturbance])
+def test_what_enters_in_a_sample_is_the_mean_of_the_wave(
+    kind: type[SquareDisturbance | TriangleDisturbance],
+) -> None:
+    wave, fine = kind(amplitude=2.0, period=13.7, phase=0.9), 2000
+    values = wave.simulate(np.zeros(40 * fine), 0.0, 1.0 / fine).reshape(40, fine).mean(axis=1)
+    near = 1e-2 if kind is SquareDisturbance else 0.15  # of a bend, its middle stands for all
+    np.testing.assert_allclose(wave.entering(np.arange(40.0), 1.0), values, atol=near)

@@ -165,9 +165,9 @@ def holds_nothing_out(
     span = float(np.ptp(signal))
     lasts = float(run.runs.time.max())
     for key, (low, high) in intervals.items():
-        if key in SIZES:
+        if key in SIZES and candidate.factors:  # of a wave or a walk; a slew has a rate of its own
             reach = span / lasts if key == "rate" else span
-            if low <= 0.0 <= high and candidate.factors:
+            if low <= 0.0 <= high:
                 return True
             if kind != "load" and high - low > WIDEST * reach and reach > 0.0:
                 return True

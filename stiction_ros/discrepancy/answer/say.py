@@ -15,14 +15,32 @@ LEFT = 0.4  # of the last effect's score: what may stay unexplained beside a nam
 
 
 def overall(
-    effects: Sequence[FoundEffect], looks: Sequence[Look], testable: Sequence[Testable]
+    shown: Sequence[FoundEffect],
+    effects: Sequence[FoundEffect],
+    looks: Sequence[Look],
+    testable: Sequence[Testable],
 ) -> tuple[GapVerdict, tuple[tuple[str, str], ...]]:
     """Return the verdict of all looks and what stays possible beside the effects.
 
     With several effects it is that of the largest, which is found first; each effect has a
     verdict of its own. What is left in doubt and leaves a larger noise than declared explains
-    nothing.
+    nothing. What the values of the record show by themselves is no answer to what else there is.
+
+    Args:
+        shown: by the values of the record.
+        effects: all others.
+        looks: the rounds.
+        testable: what the last look could have seen.
     """
+    verdict, alternatives = _of_looks(effects, looks, testable)
+    if shown and not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE):
+        return GapVerdict.NAMED, ()
+    return verdict, alternatives
+
+
+def _of_looks(
+    effects: Sequence[FoundEffect], looks: Sequence[Look], testable: Sequence[Testable]
+) -> tuple[GapVerdict, tuple[tuple[str, str], ...]]:
     last = looks[-1].decision
     alternatives = [name for effect in effects for name in effect.alternatives]
     open_set = last.verdict is GapVerdict.AMBIGUOUS and not last.inseparable

@@ -174,6 +174,19 @@ class Candidate(ABC):
         """
         raise NotImplementedError(f"{self.name} is no needle")
 
+    def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
+        """Return values along the valley of a point, over its whole length; for needles alone.
+
+        Args:
+            point: values, shape (axes,).
+            cube: points between −1 and 1, shape (G, axes).
+        """
+        raise NotImplementedError(f"{self.name} is no needle")
+
+    def valley(self, point: FloatArray) -> float:
+        """Return the figure that any record tells well, by which valleys differ, in logarithms."""
+        raise NotImplementedError(f"{self.name} is no needle")
+
     def lead(self, point: FloatArray) -> float:
         """Return how far from OP a stem stands before the first sample, %."""
         return 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from typing import Self
 
@@ -37,8 +38,8 @@ _NEGLIGIBLE = 1e-9
 class ValveCandidate(Candidate):
     """A behaviour at the end of a valve's chain.
 
-    Its stems start at rest at the first OP; stiction, backlash and a lag have one more figure,
-    where the stem stood then.
+    Its stems start at rest at the first OP; stiction, backlash, a lag and a slew have one more
+    figure, where the stem stood then.
 
     Attributes:
         valve: its index.
@@ -135,9 +136,20 @@ class StictionCandidate(ValveCandidate):
         total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
         totals = total * np.exp(SUM_BOX * size * cube[:, 0])
         jumps = np.clip(jump + JUMP_BOX * total * size * cube[:, 1], 0.0, totals)
+        leads = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
+        return self._points(totals, jumps, leads)
+
+    def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
+        """Return points of about the same sum of the frictions, with any jump and any start."""
+        totals = math.exp(self.valley(point)) * np.exp(SUM_BOX * cube[:, 0])
+        return self._points(totals, 0.5 * totals * (1.0 + cube[:, 1]), cube[:, 2])
+
+    def valley(self, point: FloatArray) -> float:
+        return math.log(float(point[0] * (1.0 + point[1])))
+
+    def _points(self, totals: FloatArray, jumps: FloatArray, leads: FloatArray) -> FloatArray:
         low, high = self.axes[0].low, self.axes[0].high
         static = np.clip(0.5 * (totals + jumps), low, high)
-        leads = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
         return np.column_stack([static, (totals - jumps) / (totals + jumps), leads])
 
 
@@ -165,6 +177,31 @@ class LagCandidate(ValveCandidate):
 
     def lead(self, point: FloatArray) -> float:
         return float(point[1])
+
+    def count(self, point: FloatArray) -> int:
+        return 1
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class SlewCandidate(ValveCandidate):
+    """A slew by its rate and the place of the stem at the start.
+
+    Attributes:
+        reach: how far off OP it may be at the start, %.
+    """
+
+    reach: float = 0.0
+
+    @classmethod
+    def within(cls, run: FreeRun, valve: int, axes: tuple[Axis, ...], reach: float) -> Self:
+        """Return the candidate at a valve by its index, its stem that near OP at the start."""
+        return dataclasses.replace(cls.at(run, valve, Slew, axes), reach=reach)
+
+    def rows(self, points: FloatArray) -> FloatArray:
+        return points[:, :1]
+
+    def lead(self, point: FloatArray) -> float:
+        return self.reach * float(point[1])
 
     def count(self, point: FloatArray) -> int:
         return 1
@@ -248,8 +285,8 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
         BacklashCandidate.at(
             run, j, Backlash, (Axis(0.02 * span, 1.8 * span, 24, logarithmic=True), start)
         ),
-        ValveCandidate.at(
-            run, j, Slew, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True),)
+        SlewCandidate.within(
+            run, j, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True), start), span
         ),
         LagCandidate.at(
             run, j, Lag, (lag_axis(run), Axis(-2.0 * span, 2.0 * span, 1, linear=True))

@@ -95,7 +95,7 @@ class LoadCandidate(WaveCandidate):
         return cls.of(f"load:{tag}", valve, wave, ((f"valve:{tag}", same),) if same else ())
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
-        waves = self.wave.columns(run, points)
+        waves = self.wave.entering(run, points)
         count, size, factors = waves.shape
         entering = run.stems[:, self.index, None] + SMALL * waves.reshape(count, -1)
         sizes = {}

@@ -49,6 +49,10 @@ class Wave(ABC):
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
         """Return the waves of size one, shape (N, G, factors), for points (G, axes)."""
 
+    def entering(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return what of the waves enters a process, as :meth:`columns` returns them."""
+        return self.columns(run, points)
+
     @abstractmethod
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         """Return the disturbance with these figures."""
@@ -148,7 +152,14 @@ class SineWave(LineWave):
         return _near(self.lines, self.width)[:, None]
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
-        angle = _TURN * (run.runs.time[:, None] / self.sample_time) * points[:, 0]
+        return self._at(run.runs.time / self.sample_time, points)
+
+    def entering(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return the waves amid each sample, next to their means."""
+        return self._at(run.runs.time / self.sample_time + 0.5, points)
+
+    def _at(self, time: FloatArray, points: FloatArray) -> FloatArray:
+        angle = _TURN * time[:, None] * points[:, 0]
         return np.stack([np.sin(angle), np.cos(angle)], axis=2)
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
@@ -199,9 +210,16 @@ class ShapedWave(LineWave):
         return np.stack([each.ravel() for each in meshed], axis=1)
 
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        return self.kind.wave(self._angles(run, points))[:, :, None]
+
+    def entering(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        """Return the means over each sample: a square changes sides between samples, too."""
+        held = self.kind.held(self._angles(run, points), _TURN * points[None, :, 0])
+        return held[:, :, None]
+
+    def _angles(self, run: FreeRun, points: FloatArray) -> FloatArray:
         at = run.runs.time[:, None] / self.sample_time - self.middle
-        turns = at * points[:, 0] + points[:, 1]
-        return self.kind.wave(_TURN * turns)[:, :, None]
+        return np.asarray(_TURN * (at * points[:, 0] + points[:, 1]))
 
     def behaviour(self, point: FloatArray, factors: FloatArray) -> Behaviour:
         size = float(factors[0])

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
+from stiction_ros.discrepancy.data.scans import Scans, scanned_twice
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
@@ -16,6 +17,7 @@ from stiction_ros.loop import LoopModel, PiTuning
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
+ONCE = 1e-3  # of the moves of OP, that a law leaves which scans once
 ROUNDED = 1.2  # times what rounding of the signals leaves
 COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem smaller
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
@@ -51,12 +53,15 @@ class ControllerCheck:
         finding: another tuning or a time shift.
         left: share of the moves of OP that the best PI law leaves, 0 to 1.
         clock_known: whether the record's clock of PV against OP is shown to be right.
+        scans: of a controller that scans twice in a sample of the record; None of one that does
+            not, or whose OP between the samples is not told.
     """
 
     status: ControllerStatus
     finding: DataFinding | None
     left: float
     clock_known: bool
+    scans: Scans | None = None
 
 
 def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], ...]:
@@ -67,14 +72,15 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
     chose are what they are, unless they lie finer than anybody chooses them. A controller that
     scans again between two samples holds another OP for half of them, which lies off the mean of
     its neighbours as far as a recorded one does off that of its own; that is asked only where no
-    PI law gives the recorded OP.
+    PI law gives the recorded OP, or SP is not recorded.
 
     Args:
         runs: the records.
         check: of the controller.
     """
-    given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER)
-    asked = not given and check.left > EXACT
+    untold = any(record.sp is None for record in runs.records)
+    given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
+    asked = not given and check.left > EXACT and check.scans is None
     found = []
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
@@ -115,6 +121,9 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
     if not single or any(record.sp is None for record in runs.records):
         return ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
     laws = [_fit(model, runs, shift) for shift in range(LONGEST_SHIFT + 1)]
+    scans = _scans(model, runs, laws[0])
+    if scans is not None:
+        return ControllerCheck(ControllerStatus.SAME, None, laws[0].left, False, scans)
     best = min(range(len(laws)), key=lambda shift: laws[shift].left * (1.0 + 1e-3 * shift))
     recorded = model.controller
     own = math.inf if recorded is None else _left(model, runs, recorded, 0)
@@ -154,11 +163,18 @@ class _Law:
     usual: float = 0.0
 
 
-def _alike(recorded: PiTuning, law: _Law) -> bool:
-    """Tell whether two tunings differ by less than matters.
+def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:
+    """Return the law of a controller that scans twice, where one scan does not give OP."""
+    if law.left <= max(ROUNDED * _rounding(runs, law), ONCE):
+        return None
+    found = scanned_twice(model, runs)
+    if found is None or model.controller is None or _alike(model.controller, found):
+        return found
+    return None
 
-    A controller that scans more often than the record seems to have a slightly different one.
-    """
+
+def _alike(recorded: PiTuning, law: _Law | Scans) -> bool:
+    """Tell whether two tunings differ by less than matters."""
     ratios = law.gain / recorded.gain, law.integral_time / recorded.integral_time
     return all(1.0 / (1.0 + MATTERS) < ratio < 1.0 + MATTERS for ratio in ratios)
 

@@ -20,7 +20,9 @@ LONGEST_REST = 12
 ENDS = 6
 MOST_CLIPPED = 0.5  # of the rows: what stands at its ends more often is no clipped measurement
 ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
-OFTEN_HELD = 0.2  # of the samples
+OFTEN = 0.05  # of the samples: held or interpolated values, from which on a record is thinned out
+FLOAT = 2e-7  # of the largest value: digits that a difference of three has by itself
+NEARLY = 5.0  # digits: noise is as often nearly nothing as that is wider than nothing
 LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
 ALONE = 8.0  # usual distances from the mean of both neighbours, beyond which one is a spike
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
@@ -51,7 +53,7 @@ class Gate:
     Attributes:
         usable: per output the rows whose PV is a measurement, shape (p, N).
         findings: frozen, clipped and rounded PVs, but for what the model has already.
-        thinned: per output whether values were held or interpolated.
+        thinned: per output the share of values that were held or interpolated; 0 where none were.
         quantum: per output the distance of PV's values; 0 where they are as good as continuous.
         rounding: the same, where it is coarse enough to matter; 0 elsewhere.
         set_point_moves: per output, over all records; None where SP is not recorded.
@@ -62,7 +64,7 @@ class Gate:
 
     usable: BoolArray
     findings: tuple[DataFinding, ...]
-    thinned: tuple[bool, ...]
+    thinned: tuple[float, ...]
     quantum: tuple[float, ...]
     rounding: tuple[float, ...]
     set_point_moves: tuple[int, ...] | None
@@ -112,15 +114,16 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                 usable[i, rows] &= ~alone
                 lonely[i] += int(alone.sum())
                 notes.append(f"{int(alone.sum())} samples of {name} stand alone and are not scored")
-            if _compressed(values):
+            if not rounded and _compressed(values, quantum):
                 notes.append(
                     f"{name} lies on straight lines: a historian has thinned it out, small "
                     "effects are lost"
                 )
         findings += rounded
         rounding.append(quantum if rounded else 0.0)
-        whole = [runs.pv[rows, i] for rows in runs.slices]
-        thinned.append(any(_compressed(v) or (not rounded and _held(v)) for v in whole))
+        whole = [(runs.pv[rows, i], usable[i, rows]) for rows in runs.slices]
+        shares = [max(_compressed(v, quantum), _held(v, quantum, u)) for v, u in whole]
+        thinned.append(0.0 if rounded else max(shares))
     findings = [finding for finding in findings if not known_already(model, runs, finding)]
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
@@ -266,29 +269,57 @@ def _surprise(runs: Runs, output: int) -> float:
     return float(np.std(whiten(values, autoregression(values, rows))[rows]))
 
 
-def _held(values: FloatArray) -> bool:
-    """Tell whether many values are exactly those before them: reported by exception."""
-    return float(np.mean(np.diff(values) == 0.0)) > OFTEN_HELD
+def _held(values: FloatArray, quantum: float, usable: BoolArray) -> float:
+    """Return the share of values that are exactly those before them: reported by exception.
+
+    Values that are frozen or clipped are not asked.
+    """
+    moves = np.abs(np.diff(values))[usable[1:] & usable[:-1]]
+    return _too_often(moves, 0.5 * quantum, values)
 
 
 def _alone(values: FloatArray) -> BoolArray:
-    """Return single samples far off both neighbours, which are near each other."""
+    """Return samples far off both neighbours, which are near each other: one, or two in a row."""
     found = np.zeros(len(values), dtype=bool)
-    if len(values) < 3:
+    if len(values) < 4:
         return found
     beside = 0.5 * (values[:-2] + values[2:])
-    away, apart = values[1:-1] - beside, np.abs(values[2:] - values[:-2])
-    usual = float(np.median(np.abs(away)))
-    scale = max(usual, LATTICE * float(np.ptp(values)))
-    found[1:-1] = (np.abs(away) > ALONE * scale) & (apart < 0.5 * np.abs(away))
+    away, apart = np.abs(values[1:-1] - beside), np.abs(values[2:] - values[:-2])
+    scale = max(float(np.median(away)), LATTICE * float(np.ptp(values)))
+    found[1:-1] = (away > ALONE * scale) & (apart < 0.5 * away)
+    beside, apart = 0.5 * (values[:-3] + values[3:]), np.abs(values[3:] - values[:-3])
+    away = np.minimum(np.abs(values[1:-2] - beside), np.abs(values[2:-1] - beside))
+    pairs = (away > ALONE * scale) & (apart < 0.5 * away)
+    found[1:-2] |= pairs
+    found[2:-1] |= pairs
     return found
 
 
-def _compressed(values: FloatArray) -> bool:
-    bends = np.abs(np.diff(values, 2))
-    scale = float(np.ptp(values))
-    straight = float(np.mean((bends <= 1e-9 * scale) & (np.abs(np.diff(values))[1:] > 0.0)))
-    return straight > 0.5
+def _compressed(values: FloatArray, quantum: float) -> float:
+    """Return the share of values on the straight line of their neighbours: drawn by lines."""
+    bends, moved = np.abs(np.diff(values, 2)), np.abs(np.diff(values))[1:] > 0.0
+    return _too_often(np.where(moved, bends, np.inf), 2.0 * quantum, values)
+
+
+def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> float:
+    """Return the share of sizes that are nothing, as far as digits tell.
+
+    0 where they are not so more often than they are small.
+
+    Args:
+        sizes: that would be spread about nothing smoothly by noise, shape (n,).
+        digits: that a size of nothing may seem to have by the rounding of the values.
+        values: of which they are the differences.
+    """
+    digits = max(digits, FLOAT * float(np.abs(values).max()))
+    nothing, small = sizes <= digits, sizes <= NEARLY * digits
+    share = float(np.mean(nothing)) if len(sizes) else 0.0
+    if share <= OFTEN or share <= float(np.mean(small)) - share:
+        return 0.0
+    others = sizes[~nothing & np.isfinite(sizes)]
+    if not len(others) or float(np.median(others)) <= NEARLY * digits:
+        return 0.0
+    return share
 
 
 def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:

@@ -80,7 +80,8 @@ def extend(
     effects = refit_together(bare, runs, [*added, new])
     worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
     after_base = base_with(bare, runs, worth)
-    trouble = _trouble(base, after_base, new.fit.candidate.dated) or _stem_trouble(base, after_base)
+    trouble = _trouble(base, after_base, new.fit.candidate.dated)
+    trouble = trouble or _stem_trouble(base, after_base, new.place)
     if trouble:
         return Extension(tuple(added), base, False, trouble)
     return Extension(tuple(worth), after_base, True, "")
@@ -215,9 +216,15 @@ def moved_away(base: Baseline, after_base: Baseline) -> bool:
     return float(total.mean()) > GROWN * float(total.std(ddof=1)) / math.sqrt(blocks_of_one)
 
 
-def _stem_trouble(base: Baseline, after_base: Baseline) -> str:
-    """Return where the measured stems contradict the effect; empty where they do not."""
+def _stem_trouble(base: Baseline, after_base: Baseline, place: str) -> str:
+    """Return where the measured stems contradict the effect; empty where they do not.
+
+    A stem speaks of what moves it: an effect elsewhere leaves it, but for the figures of others
+    that are fitted again.
+    """
     for j, valve in enumerate(base.run.model.valve_names):
+        if place != f"valve:{valve}":
+            continue
         old = stem_misfit(base.run, j, base.run.stems[:, j])
         if stem_misfit(base.run, j, after_base.run.stems[:, j]) > old:
             return f"the measured stem of {valve} is further from that effect than without it"

@@ -28,8 +28,10 @@ LEADERS = 4
 STARTS = 4
 MOMENTS = 241
 REACH = 4.0  # points of the first grid, wider than a held-out block
-SLOW = np.array([0.8])
+SLOW, SLOWER = np.array([0.8]), np.array([0.95])
 SHRINK = 0.4
+VALLEYS, WIDE = 3, 0.15  # of a needle, that are searched over their whole length; in logarithms
+ALONG = 2000  # points in each
 THROWS = 10
 THROWN = 400
 THROW_SHRINK = 0.7
@@ -215,9 +217,17 @@ class _Search:
         """Search scattered points in ever smaller boxes around the best point.
 
         The optimum of He's law is a needle in a valley: stems that differ in one slip differ
-        for long. Points of a lattice miss it however fine they are along the valley.
+        for long. Points of a lattice miss it however fine they are along the valley. It is looked
+        for over the whole length of the best valleys first, as far from it nothing leads there.
         """
         halton = halton_sequence(len(self.candidate.axes), seed=0)
+        for fit in self._valleys():
+            values = self.candidate.along(fit.point, 2.0 * halton.random(ALONG) - 1.0)
+            response = self.candidate.respond(self.base.run, values)
+            for ar in (NO_MEMORY, SLOWER, self.base.noise[0].ar):
+                squares = misfit(self.base, self.gap, response, dict.fromkeys(response.outputs, ar))
+                for k in np.argsort(squares)[:LEADERS].tolist():
+                    self.judge(values[k], response.pick(k))
         size = 1.0
         for _ in range(THROWS):
             leading = sorted(self.judged.values(), key=lambda fit: -fit.delta_bic)[:CENTRES]
@@ -234,6 +244,17 @@ class _Search:
             for ar in (np.zeros(0), SLOW):
                 self._judge_best(values, response, dict.fromkeys(response.outputs, ar))
             size *= THROW_SHRINK
+
+    def _valleys(self) -> list[CandidateFit]:
+        """Return the best fits so far, each in a valley of its own."""
+        found: list[CandidateFit] = []
+        for fit in sorted(self.judged.values(), key=lambda fit: -fit.delta_bic):
+            own = self.candidate.valley(fit.point)
+            if all(abs(own - self.candidate.valley(each.point)) > WIDE for each in found):
+                found.append(fit)
+            if len(found) == VALLEYS:
+                break
+        return found
 
     def best(self) -> CandidateFit:
         """Return the best fit that was seen."""

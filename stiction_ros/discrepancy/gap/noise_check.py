@@ -14,6 +14,7 @@ from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
 LAGS = 20
+SOME_STEPS = 3.0  # of the rounding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +65,17 @@ def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
             OutputNoise(name, declared.std, fit.innovation_std, fit.enlarged or larger, memory)
         )
     return tuple(found)
+
+
+def spans_steps(base: Baseline, output: int) -> bool:
+    """Tell whether what an answer leaves of an output spans some steps of its rounding.
+
+    Rounding of a slow signal is no white noise: within a few steps no law of the noise is told,
+    and none stands against an effect.
+    """
+    rows = base.blocks[output].train
+    left = float(np.std(base.noise[output].residual[rows]))
+    return left >= SOME_STEPS * base.run.runs.quanta[output]
 
 
 def _memory(base: Baseline, output: int) -> int:

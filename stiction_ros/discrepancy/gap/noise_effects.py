@@ -310,7 +310,10 @@ def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: _Law) -> 
     price = len(found) * math.log(rows) + ENLARGED
     first = np.eye(len(found))[0]  # is a size: σ is its unit
     behaviours = [law.behaviour(found + math.log(louder) * first)]
-    for k, end in enumerate(_ends(loss, found, law.range)):
+    ends = _ends(loss, found, law.range)
+    if not np.isfinite(ends).all():
+        return None  # an interval that holds nothing out is no name
+    for k, end in enumerate(ends):
         scale = math.log(_score(end, law, own, shown, blocks)[3])
         scale += SIDES[k % 2] * NORMAL / math.sqrt(2.0 * rows)
         behaviours.append(law.behaviour(end + scale * first))

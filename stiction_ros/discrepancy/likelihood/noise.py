@@ -85,7 +85,7 @@ class NoiseFit:
     @property
     def stationary_std(self) -> float:
         """Standard deviation of r under its own model; inf where that is not stationary."""
-        return self.innovation_std * math.sqrt(_gain_of_noise(self.ar))
+        return self.innovation_std * math.sqrt(gain_of_noise(self.ar))
 
     def bic(self, parameters: int) -> float:
         """Return −2 log likelihood, the price of φ and ``parameters`` log n."""
@@ -230,7 +230,7 @@ def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
 
 
-def _gain_of_noise(ar: FloatArray) -> float:
+def gain_of_noise(ar: FloatArray) -> float:
     """Return the variance of an autoregressive process of unit innovations."""
     order = len(ar)
     if not order:

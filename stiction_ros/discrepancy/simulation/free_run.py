@@ -12,14 +12,19 @@ from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks, BoolArr
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
+from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.processes import AlteredProcess
 from stiction_ros.records import Record
 
 HELD_SHARE = 4
 BLOCKS = 24
 PHASES = (0, 1, 3)  # of the held-out blocks, record by record
 SHORTEST_BLOCK = 20
+MOVE_ON = ("stiction", "backlash", "slew", "lag", "pole")
+"""Effects with which what enters a process goes on moving between two samples."""
+SMALL = 0.01  # %, of a move by which a process that is not linear is asked for its slope
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,9 +40,11 @@ class Runs:
         usable: per output the rows whose PV can be scored, shape (p, N).
         quanta: per output the step of a coarse rounding; 0 where there is none.
         lattices: per output the distance of PV's values, however fine; 0 where there is none.
-        thinned: per output whether values were held or interpolated, so that their noise is
-            no longer that of the loop.
+        thinned: per output the share of values that were held or interpolated, so that their
+            noise is no longer that of the loop; 0 where none were.
         unseen: per valve what may act beside the recorded OP; empty where nothing does.
+        between: per valve whether it is left open how late within a sample an effect that is added
+            moves its stem; empty where that is not asked.
     """
 
     records: tuple[Record, ...]
@@ -47,9 +54,10 @@ class Runs:
     slices: tuple[slice, ...]
     usable: BoolArray
     quanta: tuple[float, ...]
-    thinned: tuple[bool, ...]
+    thinned: tuple[float, ...]
     lattices: tuple[float, ...]
     unseen: tuple[tuple[Unseen, ...], ...] = ()
+    between: tuple[bool, ...] = ()
 
     @property
     def sample_time(self) -> float:
@@ -87,7 +95,7 @@ def join_records(
     time = np.concatenate([r.time for r in records])
     count = pv.shape[1]
     op = np.clip(op, low, high)
-    none = (0.0,) * count, (False,) * count, (0.0,) * count
+    none = (0.0,) * count, (0.0,) * count, (0.0,) * count
     return Runs(tuple(records), op, pv, time, slices, usable, *none)
 
 
@@ -120,7 +128,8 @@ class FreeRun:
     """The current model under the recorded OP, and what small changes of it would give.
 
     The state at the start, and a constant, of every record are left open: they are columns
-    that every fit projects out.
+    that every fit projects out. So is how late within a sample a sticky or slow stem moves: OP and
+    PV are held to samples, the stem is not.
 
     Attributes:
         model, runs: what runs, over what.
@@ -210,7 +219,20 @@ class FreeRun:
 
     def _free(self, output: int) -> FloatArray:
         blocks = [self.responses.free(output, self._inputs(rows)) for rows in self.runs.slices]
-        return np.asarray(block_diag(*blocks))
+        late = [
+            self._late(output, j)
+            for j, asked in enumerate(self.runs.between)
+            if asked and self.responses.reaches(output, j) and moves_on(self.model, output, j)
+        ]
+        return np.column_stack([block_diag(*blocks), *late])
+
+    def _late(self, output: int, valve: int) -> FloatArray:
+        """Return what an output lacks where a stem's moves come a sample late, shape (N,)."""
+        moves = np.zeros(len(self.runs))
+        for rows in self.runs.slices:
+            moves[rows][1:] = np.diff(self.stems[rows, valve])
+        moved = self.drive(output, valve, (self.stems[:, valve] + SMALL * moves)[:, None])[:, 0]
+        return np.asarray((moved - self.forced[:, output]) / SMALL)
 
     def _inputs(self, rows: slice) -> list[FloatArray]:
         """Return what enters the process in one record, per valve, each of shape (N, 1)."""
@@ -224,8 +246,8 @@ class FreeRun:
             if not disturbance.load:
                 continue
             for rows in self.runs.slices:
-                loads[rows, names.index(disturbance.place)] += disturbance.behaviour.simulate(
-                    np.zeros(rows.stop - rows.start), 0.0, self.runs.sample_time
+                loads[rows, names.index(disturbance.place)] += _entering(
+                    disturbance.behaviour, rows.stop - rows.start, self.runs.sample_time
                 )
         return loads
 
@@ -256,6 +278,21 @@ class FreeRun:
             if not effect.in_values:
                 shown = effect.simulate(shown, float(shown[0]), self.runs.sample_time)
         return np.asarray(shown - values)
+
+
+def moves_on(model: LoopModel, output: int, valve: int) -> bool:
+    """Tell whether what a valve does to an output goes on between two samples."""
+    process = model.process
+    slowed = process.effects[output] if isinstance(process, AlteredProcess) else ()
+    on_the_way = (*model.valves[valve].effects, *slowed, *model.sensors[output])
+    return any(effect.effect in MOVE_ON for effect in on_the_way)
+
+
+def _entering(load: Behaviour, count: int, sample_time: float) -> FloatArray:
+    """Return what a load adds to a stem in each sample: of a wave, which goes on, its mean."""
+    if isinstance(load, PeriodicDisturbance):
+        return load.entering(np.asarray(sample_time * np.arange(count)), sample_time)
+    return load.simulate(np.zeros(count), 0.0, sample_time)
 
 
 def seen_of(run: FreeRun, signal: FloatArray) -> Seen:

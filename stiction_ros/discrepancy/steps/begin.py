@@ -21,7 +21,7 @@ from stiction_ros.discrepancy.process.refit import (
     with_common_rows,
     without_noise,
 )
-from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, moves_on
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -50,7 +50,12 @@ def begin(
     controller = check_controller(model, runs)
     found = controller.finding
     data = (*((found,) if found else ()), *gate.findings)
-    runs = dataclasses.replace(corrected(runs, found), unseen=unseen_of(runs, controller))
+    runs = dataclasses.replace(
+        corrected(runs, found),
+        op=runs.op if controller.scans is None else controller.scans.op,
+        unseen=unseen_of(runs, controller),
+        between=() if options.free_process else _between(model),
+    )
     bare, longest = add_data_effects(model, data), 0
     if options.free_process:
         longest = longest_delay(model)
@@ -70,3 +75,12 @@ def begin(
     )
     base = Baseline.of(FreeRun(bare if options.free_process else model, runs))
     return task, State(given=bare, bare=bare, before=base, base=base)
+
+
+def _between(model: LoopModel) -> tuple[bool, ...]:
+    """Return per valve whether the model has nothing yet that moves its stem between samples.
+
+    When within a sample that happens is then a matter of the effect that is found.
+    """
+    outputs = range(len(model.outputs))
+    return tuple(not any(moves_on(model, i, j) for i in outputs) for j in range(len(model.valves)))

@@ -30,17 +30,25 @@ from stiction_ros.discrepancy.fit.uncertainty import (
     likelihood_intervals,
 )
 from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
-from stiction_ros.discrepancy.gap.noise_check import OutputNoise, check_noise, noise_sentences
+from stiction_ros.discrepancy.gap.noise_check import (
+    OutputNoise,
+    check_noise,
+    noise_sentences,
+    spans_steps,
+)
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
+from stiction_ros.discrepancy.likelihood.noise import gain_of_noise
 from stiction_ros.discrepancy.process.free_intervals import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
+from stiction_ros.discrepancy.steps.look import explained
+from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import from_mapping
 
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
-SOME_STEPS = 3.0  # of the rounding
+DROWNED = 4.0  # times the declared noise: more is none that thinned values add to it
 CLOSES = 0.2  # of the excess of the free run that an effect has to close by itself
 
 
@@ -52,13 +60,18 @@ def closing(task: Task, looked: State) -> Discrepancy:
         looked: what is believed after the last step.
     """
     state, found = _named(task, looked)
+    if not explained(state):
+        assert state.doubted is not None
+        looked = settle(task, state.doubted)
+        state, found = _named(task, looked)
     before, after = measure_gap(state.before), measure_gap(state.base)
     louder = _louder(task, state)
-    effects = [*(of_data(finding) for finding in task.data), *found, *louder]
-    verdict, alternatives = overall(effects, state.looks, state.testable)
+    shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
+    effects = [*shown, *answers]
+    verdict, alternatives = overall(shown, answers, state.looks, state.testable)
     model = state.bare
-    for shown, added in zip(found, state.added, strict=True):
-        model = model.with_effect(added.place, added.behaviour, **_provenance(task, shown))
+    for named, added in zip(found, state.added, strict=True):
+        model = model.with_effect(added.place, added.behaviour, **_provenance(task, named))
     for noise in louder:
         behaviour = from_mapping({"effect": noise.effect} | dict(noise.parameters))
         model = model.with_effect(noise.place, behaviour, **_provenance(task, noise))
@@ -74,8 +87,8 @@ def closing(task: Task, looked: State) -> Discrepancy:
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and (no_names or _noise_left(task, state, noises)):
         verdict = GapVerdict.UNKNOWN
-    named = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
-    named |= set(alternatives)
+    told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
+    told |= set(alternatives)
     task.report(1.0)
     return Discrepancy(
         verdict=verdict,
@@ -84,7 +97,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         experiment=experiment_for(verdict, effects, alternatives, state.testable),
         where=_where(task, state, no_names, verdict),
         untestable=tuple(
-            t for t in state.testable if not t.testable and (t.place, t.effect) not in named
+            t for t in state.testable if not t.testable and (t.place, t.effect) not in told
         ),
         noise=noises,
         process_changes=state.changes,
@@ -218,22 +231,32 @@ def _mended(state: State) -> bool:
 def _noise_left(task: Task, state: State, noises: tuple[OutputNoise, ...]) -> bool:
     """Tell whether noise is left that no law tells, and that is large enough to matter."""
     return any(
-        each.memory and (not state.changes or _matters(task, state, i))
+        (each.memory and (not state.changes or _matters(task, state, i))) or _drowned(state, i)
         for i, each in enumerate(noises)
     )
+
+
+def _drowned(state: State, output: int) -> bool:
+    """Tell whether values that were thinned out leave far more than the declared noise."""
+    run = state.base.run
+    declared = declared_noise(run.model)[output]
+    if declared is None or not run.runs.thinned[output]:
+        return False
+    rows = state.base.blocks[output].train
+    left = float(np.std(state.base.noise[output].residual[rows]))
+    return left > DROWNED * declared.std * math.sqrt(gain_of_noise(declared.ar))
 
 
 def _matters(task: Task, state: State, output: int) -> bool:
     """Tell whether what is left of an output is large enough to be an effect.
 
     A model of the field is never exact: beside a large effect it leaves a little of its own.
-    Rounding of a slow signal is no white noise: what is left has to span some steps.
     """
     rows = state.base.blocks[output].train
     before, after = (
         float(np.std(base.noise[output].residual[rows])) for base in (state.before, state.base)
     )
-    if after < SOME_STEPS * task.runs.quanta[output]:
+    if not spans_steps(state.base, output):
         return False
     return not (state.added or state.changes) or after > BESIDE * before
 

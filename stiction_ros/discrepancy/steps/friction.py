@@ -14,9 +14,16 @@ from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.effects import about
 
+MANY = 0.2  # of the values, that were held or interpolated
+
 
 def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
-    """Return what counts how often the stem of a fit leaves a rest."""
+    """Return what counts how often the stem of a fit leaves a rest, as far as PV shows it.
+
+    Where many values were thinned out, PV does not show how a stem leaves its rest.
+    """
+    if max(run.runs.thinned) > MANY:
+        return lambda fit: 0
     return lambda fit: departures(run, fit.candidate, fit.point)
 
 

@@ -29,10 +29,11 @@ from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 
 SCORED = 0.8  # of the time of a look
+MOST_THINNED = 0.95  # of the values
 
 
 @dataclasses.dataclass(frozen=True)
-class _Scored:
+class Scored:
     """What the scores of a look leave.
 
     Attributes:
@@ -49,12 +50,20 @@ class _Scored:
 
 
 def look_on(task: Task, state: State) -> State:
-    """Look until nothing more is found; what takes the free run away from PV is taken back."""
+    """Look until nothing more is found; what takes the free run away from PV is taken back.
+
+    An effect that is in doubt with others is added for a while: its rivals may be near only beside
+    what is not yet in the model. Where nothing more is found, or all together leaves more than the
+    declared noise, it is taken back.
+    """
     state = dataclasses.replace(state, testable=())
     for k in range(len(state.added), task.options.most_effects):
         state = look(task, state, k)
         if not state.looks[-1].kept:
             break
+    if not explained(state):
+        assert state.doubted is not None
+        state = state.doubted
     while state.added and state.earlier and moved_away(state.before, state.base):
         state = withdrawn(task, state)
     return state
@@ -62,20 +71,36 @@ def look_on(task: Task, state: State) -> State:
 
 def look(task: Task, state: State, k: int) -> State:
     """Look for one effect more: the k-th, from 0."""
-    scored = _scored(task, state, k)
+    scored = scored_by(task, state, k)
     state, scores = scored.state, scored.scores
     mended = process_first(task, state, scores)
     if mended is not None:
         return look(task, mended, k)
-    decision = _decided(task, state, scored)
+    decision = decided(task, state, scored)
     room, step = _extended(task, state, scored, decision)
     kept, reason = (step.kept, step.reason) if step else (False, decision.reason)
+    own = Look(scores, decision, locate(scores.base), kept, reason)
+    testable = testable_effects(scores.base, list(scored.candidates), task.options.margin)
+    doubted = state.doubted
+    if kept:
+        given_up = dataclasses.replace(own, kept=False, reason=decision.reason)
+        stays = dataclasses.replace(state, testable=testable, looks=(*state.looks, given_up))
+        doubted = doubted or (None if decision.inseparable else stays)
     seen = dataclasses.replace(
-        room if kept else state,
-        testable=testable_effects(scores.base, list(scored.candidates), task.options.margin),
-        looks=(*state.looks, Look(scores, decision, locate(scores.base), kept, reason)),
+        room if kept else state, testable=testable, looks=(*state.looks, own), doubted=doubted
     )
     return changed_again(task, _grown(seen, scored, decision, step)) if step and kept else seen
+
+
+def explained(state: State) -> bool:
+    """Tell whether more was found beside an effect in doubt, and both leave the declared noise."""
+    if state.doubted is None:
+        return True
+    declared = all(
+        forms and not fit.enlarged
+        for fit, forms in zip(state.base.noise, state.base.declared, strict=True)
+    )
+    return declared and len(state.added) > len(state.doubted.added) + 1
 
 
 def withdrawn(task: Task, state: State) -> State:
@@ -92,8 +117,14 @@ def withdrawn(task: Task, state: State) -> State:
     return before.with_added(task.runs, state.added[:-1])
 
 
-def _scored(task: Task, state: State, k: int) -> _Scored:
-    """Score every candidate against the model as it is now."""
+def scored_by(task: Task, state: State, k: int) -> Scored:
+    """Score every candidate against the model as it is now.
+
+    Args:
+        task: what the run was given.
+        state: what is believed.
+        k: how many looks there were, for the progress.
+    """
     free, share = task.options.free_process, 1.0 / (task.options.most_effects + 1)
     base = state.base if free else left_open(state.base, state.added)
     candidates = all_candidates(base, task.controller.clock_known)
@@ -104,25 +135,31 @@ def _scored(task: Task, state: State, k: int) -> _Scored:
     if not free:
         beside = left_open(state.base, state.added, state.slopes) if state.slopes else None
         scores = score_candidates(base, candidates, report, beside=beside)
-        return _Scored(state, candidates, scores, {})
+        return Scored(state, candidates, scores, {})
     found = score_with_free_process(base, candidates, task.longest, report)
     state = dataclasses.replace(state, base=found.scores.base)
     if not state.added:
         refitted = _with_process(state.bare, state.base.run.model)
         state = dataclasses.replace(state, before=state.base, bare=refitted)
     models = {key: _with_process(state.bare, model) for key, model in found.models.items()}
-    return _Scored(state, candidates, found.scores, models)
+    return Scored(state, candidates, found.scores, models)
 
 
-def _decided(task: Task, state: State, scored: _Scored) -> Decision:
-    """Return what the scores allow to say."""
-    base, margin = scored.scores.base, task.options.margin
+def decided(task: Task, state: State, scored: Scored) -> Decision:
+    """Return what the scores allow to say.
+
+    Values between those that were kept are none that were measured: all evidence counts by the
+    share of the others.
+    """
+    base = scored.scores.base
+    margin = task.options.margin / (1.0 - min(max(task.runs.thinned), MOST_THINNED))
     if task.options.quick:
         chance = stored_threshold(sum(each.inside for each in scored.candidates))
     else:
         chance = chance_threshold(base, scored.candidates, task.random)
     possible = not_contradicted(base.run, scored.scores.fits)
     allowed = [fit for fit in possible if not has_friction(state.added, fit)]
+    chance *= margin / task.options.margin
     decision = decide(allowed, margin, max(margin, chance), rests_left(base.run))
     if task.options.free_process:
         decision = in_doubt_of_place(base, decision)
@@ -130,14 +167,14 @@ def _decided(task: Task, state: State, scored: _Scored) -> Decision:
 
 
 def _extended(
-    task: Task, state: State, scored: _Scored, decision: Decision
+    task: Task, state: State, scored: Scored, decision: Decision
 ) -> tuple[State, Extension | None]:
     """Return the state behind which the chosen effect stands, and the model with it.
 
     None where none may be added.
     """
     chosen = decision.chosen
-    if chosen is None or not decision.inseparable:
+    if chosen is None or (task.options.free_process and not decision.inseparable):
         return state, None
     behaviour = chosen.behaviour(state.base.run)
     assert behaviour is not None
@@ -146,7 +183,7 @@ def _extended(
     return room, extend(bare, task.runs, room.added, new, state.base)
 
 
-def _grown(state: State, scored: _Scored, decision: Decision, step: Extension) -> State:
+def _grown(state: State, scored: Scored, decision: Decision, step: Extension) -> State:
     """Return the state with the effects of an extension."""
     assert decision.chosen is not None
     key = decision.chosen.candidate.key

@@ -6,6 +6,7 @@ import dataclasses
 
 from stiction_ros.discrepancy.decision.decide import confirmed
 from stiction_ros.discrepancy.decision.extend import refit_together
+from stiction_ros.discrepancy.steps.again import told_again
 from stiction_ros.discrepancy.steps.curve import slope_to_its_curve
 from stiction_ros.discrepancy.steps.friction import friction_told_again
 from stiction_ros.discrepancy.steps.look import look_on
@@ -23,6 +24,8 @@ def settle(task: Task, state: State) -> State:
     state = slope_to_its_curve(task, state)
     if len(state.added) > 1 or state.changes:
         state = friction_told_again(task, state)
+    if len(state.added) > 1:
+        state = told_again(task, state)
     return state
 
 

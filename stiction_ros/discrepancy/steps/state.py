@@ -64,6 +64,8 @@ class State:
         looks: the rounds so far.
         opened: the first look at the process as it is now.
         testable: what the last look could have seen.
+        doubted: what is believed without the first effect that was added in doubt; None where none
+            was.
     """
 
     given: LoopModel
@@ -78,6 +80,7 @@ class State:
     looks: tuple[Look, ...] = ()
     opened: int = 0
     testable: tuple[Testable, ...] = ()
+    doubted: State | None = None
 
     def others(self, k: int) -> tuple[AddedEffect, ...]:
         """Return all added effects but one."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from stiction_ros.discrepancy.decision.decide import on_the_way
 from stiction_ros.discrepancy.decision.extend import AddedEffect, base_with, refit_together
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.gap.noise_check import spans_steps
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.process.change import (
@@ -65,7 +66,7 @@ def with_laws(found: Whole) -> Whole:
     score = found.score
     declared = declared_noise(found.base.run.model)
     for i, (fit, own) in enumerate(zip(found.base.noise, declared, strict=True)):
-        if own is None or not fit.enlarged:
+        if own is None or not fit.enlarged or not spans_steps(found.base, i):
             continue
         laws = noise_effects(found.base, i, own)
         if laws:

@@ -29,6 +29,16 @@ class PeriodicDisturbance(Behaviour):
     def wave(angle: FloatArray) -> FloatArray:
         """Return the wave of height one at angles in rad, same shape."""
 
+    @classmethod
+    def held(cls, angle: FloatArray, turned: float | FloatArray) -> FloatArray:
+        """Return the mean of the wave of height one from each angle on, over so many rad."""
+        return cls.wave(angle + 0.5 * turned)
+
+    def entering(self, time: FloatArray, sample_time: float) -> FloatArray:
+        """Return the means over the samples that begin at some times: what a process takes up."""
+        angle = np.asarray(2.0 * math.pi * time / self.period + self.phase)
+        return self.amplitude * self.held(angle, 2.0 * math.pi * sample_time / self.period)
+
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
         angle = np.array(2.0 * math.pi * time / self.period + self.phase)
         return memory, value + self.amplitude * float(self.wave(angle))

@@ -25,3 +25,14 @@ class SquareDisturbance(PeriodicDisturbance):
         turn = angle / (2.0 * math.pi)
         turn -= np.floor(turn)
         return np.where(turn < 0.5, 1.0, -1.0)
+
+    @classmethod
+    def held(cls, angle: FloatArray, turned: float | FloatArray) -> FloatArray:
+        """Return the mean from each angle on: where it changes sides between, part of both."""
+        begins, ends = angle / (2.0 * math.pi), (angle + turned) / (2.0 * math.pi)
+        return np.asarray((_area(ends) - _area(begins)) / (ends - begins))
+
+
+def _area(turn: FloatArray) -> FloatArray:
+    """Return the integral of the wave of height one from the begin of its turn."""
+    return np.asarray(0.5 - np.abs(turn - np.floor(turn) - 0.5))

@@ -182,3 +182,39 @@ def test_samples_that_stand_alone_are_listed_as_not_searched() -> None:
         entry.effect
         for entry in find_discrepancy(loop(), [sound], GapOptions(quick=True)).not_considered
     }
+
+
+def thinned(values: np.ndarray[tuple[int], np.dtype[np.float64]], digits: float) -> bool:
+    """Tell whether the gate sees that values of a loop were thinned out."""
+    model, recorded = loop(), record(loop())
+    shown = np.round(values / digits) * digits
+    kept = dataclasses.replace(recorded, pv=shown[: len(recorded), None])
+    return look_at_data(model, join_records(model, [kept])).thinned[0] > 0.0
+
+
+@pytest.mark.parametrize("digits", [1e-12, 1e-4])
+def test_values_between_kept_ones_are_seen_by_the_digits_of_the_record(digits: float) -> None:
+    values = record(loop()).pv[:, 0]
+    at = np.arange(len(values))
+    keeping = np.random.default_rng(1).random(len(values)) < 0.6  # most lines span two samples
+    keeping[0] = keeping[-1] = True
+    drawn = np.interp(at, at[keeping], values[keeping])
+    held = values[np.maximum.accumulate(np.where(keeping, at, 0))]
+    assert not thinned(values, digits)
+    assert thinned(drawn, digits)
+    assert thinned(held, digits)
+
+
+def test_values_on_a_coarse_lattice_or_at_an_end_are_not_thinned_out() -> None:
+    values = record(loop()).pv[:, 0]
+    assert not thinned(values, 0.1)
+    assert not thinned(np.minimum(values, np.quantile(values, 0.8)), 1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_samples_that_stand_alone_are_not_scored(count: int) -> None:
+    model, recorded = loop(), record(loop())
+    pv = recorded.pv.copy()
+    pv[300 : 300 + count, 0] += 9.0
+    gate = look_at_data(model, join_records(model, [dataclasses.replace(recorded, pv=pv)]))
+    assert np.flatnonzero(~gate.usable[0]).tolist() == list(range(300, 300 + count))

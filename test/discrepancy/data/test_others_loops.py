@@ -218,3 +218,62 @@ def test_a_sine_is_found_beside_what_was_found_first(seed: int, first: str) -> N
 
 def test_a_step_that_held_out_rows_refuse_does_not_take_in_one_at_another_place() -> None:
     assert names(answered(101)) == [("valve:V1", "stiction")]
+
+
+def test_a_slew_of_a_stem_that_was_late_at_the_start_is_one_effect() -> None:
+    assert names(answered(61)) == [("valve:V1", "slew")]
+
+
+def test_the_rate_of_a_slew_is_no_slope_of_its_signal() -> None:
+    assert names(answered(596)) == [("valve:V1", "slew")]
+
+
+def test_how_late_within_a_sample_a_stem_slips_is_no_dead_time() -> None:
+    answer = answered(313, family="physics")
+    assert names(answer) == [("valve:V1", "stiction")]
+    assert not answer.noise[0].disagrees
+
+
+def test_a_square_load_that_changes_sides_between_samples_is_one() -> None:
+    assert names(answered(322, family="two")) == [("valve:V1", "stiction"), ("load:V1", "square")]
+
+
+def test_a_recorded_stem_refuses_no_load() -> None:
+    assert names(answered(321, family="two")) == [("valve:V1", "slew"), ("load:V1", "square")]
+
+
+def test_what_is_in_doubt_beside_another_effect_is_told_when_that_is_found() -> None:
+    answer = answered(351, family="two")  # a curve, or a gain; and a drift
+    assert names(answer)[1:] == [("valve:V1", "characteristic"), ("disturbance:PV1", "drift")]
+    assert answer.effects[1].alternatives == ()
+
+
+def test_a_noise_that_is_not_said_stands_against_no_effect() -> None:
+    answer = answered(315, family="two")  # a step of the load behind coarse rounding
+    assert ("load:V1", "step") in names(answer)
+
+
+def test_a_needle_is_looked_for_over_the_whole_length_of_its_valley() -> None:
+    answer = answered(561)  # the lattice and the boxes around its best points led to a walk
+    (found,) = answer.effects
+    assert (found.effect, found.alternatives) == ("stiction", ())
+    assert found.parameters["f_s"] == pytest.approx(7.862, rel=0.01)
+    assert found.parameters["f_d"] == pytest.approx(2.531, rel=0.02)
+
+
+def test_two_spikes_in_a_row_are_no_steps() -> None:
+    answer = answered(399, family="two")
+    assert names(answer) == [("valve:V1", "backlash"), ("disturbance:PV1", "sine")]
+
+
+def test_a_walk_behind_thinned_values_is_not_nothing() -> None:
+    assert answered(102).verdict is GapVerdict.UNKNOWN
+    assert answered(822).verdict is GapVerdict.NONE  # healthy
+
+
+def test_values_between_kept_ones_are_no_evidence() -> None:
+    kept = answered(315)  # a gain, three values of four between kept ones
+    assert names(kept) == [("process:PV1", "gain")]
+    (share,) = kept.gate.thinned
+    assert 0.6 < share < 0.8
+    assert answered(828).verdict is GapVerdict.NONE  # healthy

@@ -1,0 +1,136 @@
+"""A controller that scans again between two samples of the record: the OP that was not recorded."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop import LoopModel
+
+LIKE_PV = (0.15, 2.0)  # times the spread of PV about its neighbours; a quarter where it is smooth
+USUAL = 6.0  # times the usual change of the error, beyond which SP has moved
+ROWS = 50  # that are asked at least
+
+
+@dataclasses.dataclass(frozen=True)
+class Scans:
+    r"""What a PI law gives that scans twice in a sample, h = T_s / 2.
+
+    .. math::
+        u_{k+1/2} &= u_k + K [(e_{k+1/2} - e_k) + (h / T_i) e_{k+1/2}] \\
+        u_{k+1} &= u_{k+1/2} + K [(e_{k+1} - e_{k+1/2}) + (h / T_i) e_{k+1}]
+
+    Both together hold the error between two samples once: the record tells it, and with it the OP.
+
+    Attributes:
+        gain, integral_time: of the controller, by the recorded moves of OP.
+        op: mean of the OPs of each sample, %, shape (N, 1).
+    """
+
+    gain: float
+    integral_time: float
+    op: FloatArray
+
+
+def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
+    """Return the law of a controller that scans twice in a sample; None where none is seen.
+
+    Its error between two samples has to lie about those of its neighbours as PV itself does about
+    its own, by the recorded tuning or by the one that gives the moves of OP best. A law that scans
+    once leaves nothing there but rounding.
+
+    Args:
+        model: of a loop with one valve and one output.
+        runs: records with SP.
+    """
+    low, high = model.limits[0]
+    h = 0.5 * runs.sample_time
+    parts = [
+        _Part.of(runs.op[rows, 0], _error(model, runs, k), (low, high))
+        for k, rows in enumerate(runs.slices)
+    ]
+    if sum(int(np.isfinite(part.moves).sum()) for part in parts) < ROWS:
+        return None
+    laws = [_fitted(parts)]
+    if model.controller is not None:
+        recorded = model.controller
+        laws.insert(0, (recorded.gain, recorded.gain * h / recorded.integral_time))
+    usual = float(np.median(np.abs(np.concatenate([np.diff(p.error, 2) for p in parts])))) / 2.0
+    for gain, integral in laws:
+        if integral == 0.0 or gain / integral <= 0.0:
+            continue
+        away = [part.away(gain, integral) for part in parts]
+        between = float(np.nanmedian(np.abs(np.concatenate(away))))
+        if LIKE_PV[0] * usual < between < LIKE_PV[1] * usual:
+            mean = [
+                part.mean_op(a, gain, integral, (low, high))
+                for part, a in zip(parts, away, strict=True)
+            ]
+            return Scans(gain, gain * h / integral, np.concatenate(mean)[:, None])
+    return None
+
+
+def _fitted(parts: Sequence[_Part]) -> tuple[float, float]:
+    """Return K and K h / T_i by least squares, the error between two samples being their mean.
+
+    That it is not where SP has moved: such samples are not asked.
+    """
+    moves = np.concatenate([part.moves for part in parts])
+    change = np.concatenate([np.diff(part.error) for part in parts])
+    error = np.concatenate([1.5 * part.error[1:] + 0.5 * part.error[:-1] for part in parts])
+    usual = float(np.median(np.abs(change)))
+    asked = np.isfinite(moves) & (np.abs(change) <= USUAL * usual)
+    columns = np.column_stack([change, error])
+    gain, integral = np.linalg.lstsq(columns[asked], moves[asked], rcond=None)[0].tolist()
+    return gain, integral
+
+
+@dataclasses.dataclass(frozen=True)
+class _Part:
+    """One record.
+
+    Attributes:
+        op, error: shape (N,).
+        moves: of OP, NaN where it is at a limit, shape (N − 1,).
+    """
+
+    op: FloatArray
+    error: FloatArray
+    moves: FloatArray
+
+    @classmethod
+    def of(cls, op: FloatArray, error: FloatArray, limits: tuple[float, float]) -> _Part:
+        """Return a record, its moves between limits alone."""
+        inside = (op > limits[0]) & (op < limits[1])
+        return cls(op, error, np.where(inside[1:] & inside[:-1], np.diff(op), np.nan))
+
+    def away(self, gain: float, integral: float) -> FloatArray:
+        """Return how far each error between two samples lies off their mean, by K and K h / T_i."""
+        mean = 0.5 * (self.error[1:] + self.error[:-1])
+        left = self.moves - gain * np.diff(self.error) - integral * (self.error[1:] + mean)
+        return np.asarray(left / integral)
+
+    def mean_op(
+        self, away: FloatArray, gain: float, integral: float, limits: tuple[float, float]
+    ) -> FloatArray:
+        """Return the mean OP of each sample, shape (N,).
+
+        Where a limit hides how far the error lies off the mean, it is taken to lie on it.
+        """
+        middle = 0.5 * (self.error[1:] + self.error[:-1]) + np.nan_to_num(away)
+        later = self.op[:-1] + gain * (middle - self.error[:-1]) + integral * middle
+        mean = self.op.copy()
+        mean[:-1] = 0.5 * (self.op[:-1] + np.clip(later, *limits))
+        return mean
+
+
+def _error(model: LoopModel, runs: Runs, record: int) -> FloatArray:
+    """Return SP − PV of a record, shape (N,)."""
+    sp = runs.records[record].sp
+    assert sp is not None
+    column = runs.records[record].outputs.index(model.outputs[0])
+    return np.asarray(sp[:, column] - runs.pv[runs.slices[record], 0])

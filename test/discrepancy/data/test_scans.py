@@ -1,0 +1,61 @@
+"""A controller that scans twice in a sample of the record."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gap_loops import loop, record, without_controller
+
+from stiction_ros.discrepancy.data.controller_check import check_controller
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.data.scans import scanned_twice
+from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop import LoopModel, PiTuning
+
+EVERY = 2
+TUNING = PiTuning(gain=0.8, integral_time=24.0)
+
+
+def thinned() -> tuple[Runs, LoopModel, FloatArray]:
+    """Return every other sample of a loop, its model and the mean OP of each sample."""
+    document = without_controller(loop()).to_mapping()
+    document["controller"] = {"kind": "pi", "gain": 0.8, "integral_time": 24.0}
+    model = LoopModel.from_mapping(document)
+    whole = record(model, samples=1400)
+    assert whole.sp is not None
+    part = dataclasses.replace(
+        whole,
+        sample_time=float(EVERY),
+        op=whole.op[::EVERY],
+        pv=whole.pv[::EVERY],
+        sp=whole.sp[::EVERY],
+    )
+    slower = LoopModel.from_mapping(document | {"sample_time": float(EVERY)})
+    runs, _ = open_gate(slower, [part])
+    return runs, slower, whole.op[:, 0].reshape(-1, EVERY).mean(axis=1)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_the_op_between_two_samples_is_told_by_those_beside_it(known: bool) -> None:
+    runs, model, mean = thinned()
+    found = scanned_twice(model if known else without_controller(model), runs)
+    assert found is not None
+    assert found.gain == pytest.approx(0.8, rel=1e-6 if known else 0.03)
+    left = np.std(found.op[:-1, 0] - mean[:-1])
+    assert left < (1e-6 if known else 0.2) * np.std(runs.op[:-1, 0] - mean[:-1])
+
+
+def test_its_recorded_tuning_is_no_other_one() -> None:
+    runs, model, _ = thinned()
+    check = check_controller(model, runs)
+    assert check.finding is None
+    assert check.scans is not None
+
+
+def test_a_controller_that_scans_once_holds_its_op() -> None:
+    model = loop()
+    runs, _ = open_gate(model, [record(model)])
+    assert check_controller(model, runs).scans is None
