@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from made import entry
 
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.ranking import confidence, ranked
+from stiction_ros.survey.ranking import NOT_HELD, confidence, ranked
 
 SHARES = st.floats(0.0, 1.0)
 
@@ -87,6 +87,10 @@ def test_confidence_falls_with_what_is_not_known() -> None:
     assert confidence({**sure, "stability": half}, "valve", 10**6) == 0.5 * confidence(
         sure, "valve", 10**6
     )
+    held, loose = (
+        confidence({**sure, "evidence": {"held": one}}, "valve", 10**6) for one in (1.0, 0.0)
+    )
+    assert loose == pytest.approx(NOT_HELD * held)
     shown = {"gain_1": 1e6}
     open_verdict = {**sure, "verdict": "undecided", "evidence": shown}
     assert confidence(open_verdict, "valve", 10**6) < confidence(wide, "valve", 10**6)
