@@ -46,7 +46,7 @@ DISAGREES = 0.6
 
 NOT_HELD = 0.6
 """Factor where a rate speaks of a process that the controller would not hold: of the frictions that
-were found so in the field (seeds 0:399, 11000:11619) 19 of 25 are there, of the others 327 of 342."""
+were found so in the field (seeds 0:399, 11000:11619) 19 of 25 are true, else 327 of 342."""
 
 OPEN = 0.3
 """Confidence in a verdict that is open, at most, and where that in a friction begins."""
