@@ -261,16 +261,16 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
         return Agreement.alone(seen[0], valve)
-    say, pairs = _with_a_say(seen, valve), []
+    say, speak, pairs = _with_a_say(seen, valve), [look.speaks(valve) for look in seen], []
     for k, two in enumerate(itertools.pairwise(seen)):
-        held = [look.accepted[valve] for look in two]
-        low, high = max(one.band[0] for one in held), min(one.band[1] for one in held)
+        bands = [look.accepted[valve].band for look in two]
+        low, high = max(band[0] for band in bands), min(band[1] for band in bands)
         gains = [look.beyond_price(valve) for look in two]
         alike = low <= ALIKE * high and say[k] and say[k + 1]
         more = gains.index(max(gains))
         tied = two[1 - more] if max(gains) - min(gains) < TIED else None
-        speak = all(look.speaks(valve) for look in two)
-        pairs.append(Agreement(two[more], min(gains), alike, tied, speak))
+        held = speak[k] and speak[k + 1]
+        pairs.append(Agreement(two[more], min(gains), alike, tied, held))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
 
 

@@ -75,10 +75,15 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
     if any(look.accepted[valve].material_gain > look.price + SURE for look in speak):
         return False
     gains = [look.accepted[valve].material_gain for look in speak if look.carries_news]
-    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
+    lost = _lost(seen, valve)
     twice = sum(one >= REJECTED for one in lost) >= REJECTING
     surely = max(lost, default=0.0) >= SURELY
     return max(gains, default=PRICE) < NOTHING and (twice or surely)
+
+
+def _lost(seen: tuple[Look, ...], valve: int) -> list[float]:
+    """Return what the best friction that would matter loses at each rate that sees the process."""
+    return [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
 
 
 def confirms(found: Identification, valve: int) -> bool:
@@ -114,7 +119,7 @@ def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
         return False
     if all(kind in OWN for kind in causes):
         return gone < CAUSES
-    lost = [-look.accepted[valve].material_gain for look in seen if look.sees_process(valve)]
+    lost = _lost(seen, valve)
     return gone < HARDLY and max(lost, default=0.0) >= REJECTED
 
 
