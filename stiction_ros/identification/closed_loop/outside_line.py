@@ -99,9 +99,7 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
         frequency = 1.0 / period + shift / count
         if frequency <= 0.0:
             continue
-        line = waves_of(2 * np.pi * frequency * rows, harmonics)
-        line = _basis(line - plain @ (plain.T @ line))
-        taken = np.cumsum((line.T @ left) ** 2)[1::2]
+        taken = _taken(waves_of(2 * np.pi * frequency * rows, harmonics), plain, left)[1::2]
         rest = np.maximum(energy - taken, floor)
         gains = len(rows) * np.log(max(energy, floor) / rest) - price[: len(rest)]
         if len(gains):
@@ -136,13 +134,30 @@ def beside(signal: Predicted, period: float) -> tuple[FloatArray, FloatArray]:
 
 def waves_of(angle: FloatArray, harmonics: int) -> FloatArray:
     """Return sine and cosine of one harmonic after the other, shape (N, 2 H)."""
-    turns = np.outer(angle, np.arange(1, harmonics + 1))
-    return np.stack([np.sin(turns), np.cos(turns)], axis=2).reshape(len(angle), -1)
+    turns = np.cumprod(np.tile(np.exp(1j * angle), (harmonics, 1)), axis=0)
+    return np.stack([turns.imag, turns.real], axis=1).reshape(-1, len(angle)).T
 
 
-def _basis(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the columns, in their order."""
-    return np.asarray(np.linalg.qr(columns)[0])
+def _taken(lines: FloatArray, plain: FloatArray, left: FloatArray) -> FloatArray:
+    """Return the energy that the first k lines take of what a basis leaves, k from 1, (2 H,).
+
+    Args:
+        lines: shape (N, 2 H).
+        plain: orthonormal basis, shape (N, q).
+        left: that it leaves, shape (N,).
+    """
+    known, seen = plain.T @ lines, lines.T @ left
+    gram = lines.T @ lines
+    own = np.diag(gram).copy()
+    gram -= known.T @ known
+    taken = np.zeros(len(seen))
+    for k in range(len(seen)):
+        if gram[k, k] > DEPENDENT * own[k]:
+            by = gram[k, k:] / gram[k, k]
+            taken[k] = seen[k] ** 2 / gram[k, k]
+            seen[k + 1 :] -= by[1:] * seen[k]
+            gram[k + 1 :, k + 1 :] -= np.outer(by[1:], gram[k, k + 1 :])
+    return np.cumsum(taken)
 
 
 def independent(columns: FloatArray) -> FloatArray:
