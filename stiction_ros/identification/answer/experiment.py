@@ -11,6 +11,7 @@ from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.identification.closed_loop.explanation import (
     MATERIAL,
     beside_wave,
+    is_echoed,
     is_wave_itself,
 )
 from stiction_ros.identification.options import IdentificationOptions
@@ -81,6 +82,12 @@ def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float
             return (
                 f"By {size} the stem goes to and fro once in each turn of a wave from outside and "
                 "cannot be told from it: in manual the wave would go on while OP rests."
+            )
+        if is_echoed(told):
+            return (
+                f"The record speaks for {size}, but PV also repeats itself a turn later, which no "
+                "valve does, as beside another loop that cycles: in manual that would go on while "
+                "OP rests."
             )
         if not told.get("alike", 1.0):
             return (

@@ -52,6 +52,10 @@ PLAIN_LINE = 60.0
 """BIC gain from which on a line shows an oscillation that is too short or too faint to be regular
 by its autocorrelation."""
 
+ECHO = 25.0
+"""From which on what the friction-free fit leaves of PV repeats itself a turn later; where it is white
+the most of a thousand lags exceeds 20 in one record of 250."""
+
 PLAIN_SHARE = 0.5
 """Share of the variance from which on a line is an oscillation though it has too few cycles for a
 regularity."""
@@ -136,6 +140,15 @@ def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
 def beside_wave(told: Mapping[str, float]) -> bool:
     """Tell whether waves from outside were tried beside the friction of these figures."""
     return any(name.startswith("wave_") for name in told)
+
+
+def is_echoed(told: Mapping[str, float]) -> bool:
+    """Tell whether a wave comes from outside that keeps no exact time.
+
+    Args:
+        told: figures behind the verdict on a valve; without ``echo`` there is none.
+    """
+    return told.get("echo", 0.0) > ECHO and told.get("outside_line", 0.0) < PLAIN_LINE
 
 
 def is_wave_itself(told: Mapping[str, float], band_share: float) -> bool:

@@ -13,6 +13,7 @@ from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
+from stiction_ros.identification.evidence.echoes import echo
 from stiction_ros.identification.evidence.fit.output_fit import OutputFit
 from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.further import with_further
@@ -250,6 +251,7 @@ def _judged(
         if look.wave_gain is not None:
             figures[f"wave_{look.problem.rate}"] = look.wave_gain
         figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
+    figures["echo"] = max(echo(look.problem, look.found.without[valve]) for look in seen)
     verdict = verdict or verdict_of(figures, agreed, seen, valve, options)
     healthy = verdict is VerdictKind.HEALTHY
     unseen = Unseen(0.0, 0.0) if healthy else Unseen.of(span * problem.op[valve])

@@ -9,6 +9,7 @@ from stiction_ros.identification.closed_loop.explanation import (
     OPEN,
     RIVAL,
     SURE,
+    is_echoed,
     is_wave_itself,
 )
 from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
@@ -129,7 +130,8 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     A friction without which OP would move all the same is not what moves it, where the controller
     is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
     that comes from outside; neither can one beside which a line from outside gains, and alone about
-    as much, where its rates speak of processes that the controller would not hold. A band that is
+    as much, where its rates speak of processes that the controller would not hold; nor one that
+    moves in time with what repeats itself, where no line stands for that. A band that is
     wider than OP moves about its mean moves with its large moves alone, as those in manual are, and
     one that is a small share of them is none to speak of.
     """
@@ -143,7 +145,7 @@ def doubted(valve: ValveEstimate) -> ValveEstimate:
     small = 0.0 < valve.band_share < MATTERS
     line = told.get("outside_line", 0.0) > 0.0 and told.get("line_rivalry", 0.0) > RIVAL
     rival = line and not told.get("held", 1.0)
-    if not (idle or wide or small or rival or stem_is_wave(valve)):
+    if not (idle or wide or small or rival or is_echoed(told) or stem_is_wave(valve)):
         return valve
     return dataclasses.replace(
         valve,

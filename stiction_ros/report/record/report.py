@@ -52,6 +52,7 @@ _MEANING = {
     "controller_fit": "share of OP's moves that the recovered controller explains",
     "outside_line": "BIC gained by a wave that enters behind the valve",
     "line_rivalry": "BIC gained by a wave alone over that by friction",
+    "echo": "how strongly what is left without friction repeats itself; above 25 a wave does it",
     "rate": "samples that are one row where friction was judged",
     "alike": "1 where two neighbouring rates see the same band",
     "patterns": "switching patterns enumerated round the best",

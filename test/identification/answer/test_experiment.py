@@ -67,6 +67,7 @@ OPTIONS = IdentificationOptions()
         ({"moves": 3.0}, "the stem moves 3 times only"),
         ({"wave_1": 40.0}, "hardly matters"),
         ({"wave_1": 40.0, "delta_bic": 12.0}, "beside a wave from outside, but not clearly"),
+        ({"echo": 30.0}, "PV also repeats itself a turn later"),
         ({"alike": 0.0}, "no two rates that see all"),
         ({"half_1": -2.0}, "One half of the record only"),
         ({"loop_gone": 0.01}, "move nearly as much without f_S 1 %"),

@@ -83,6 +83,9 @@ def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
         ({"outside_line": 5.0, "line_rivalry": 0.4, "held": 1.0}, VerdictKind.STICKY),
         ({"outside_line": 5.0, "line_rivalry": 0.2, "held": 0.0}, VerdictKind.STICKY),
         ({"outside_line": -5.0, "line_rivalry": 0.4, "held": 0.0}, VerdictKind.STICKY),
+        ({"echo": 26.0}, VerdictKind.UNDECIDED),
+        ({"echo": 26.0, "outside_line": 70.0}, VerdictKind.STICKY),
+        ({"echo": 24.0}, VerdictKind.STICKY),
     ],
 )
 def test_the_loop_takes_back_what_is_a_wave_itself_or_idle(

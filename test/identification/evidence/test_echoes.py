@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from evidence_loops import FloatArray, pi_loop
+
+from stiction_ros.identification.closed_loop.explanation import ECHO, PLAIN_LINE, is_echoed
+from stiction_ros.identification.evidence.candidate import Candidate, ideal
+from stiction_ros.identification.evidence.echoes import SHORTEST, echo
+from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.records import Record
+
+SAMPLES = 1200
+
+
+def irregular(samples: int, *, seed: int, length: int = 60) -> FloatArray:
+    """Return a square wave whose half turns last three samples more or less."""
+    random = np.random.default_rng(seed)
+    halves = np.rint(random.normal(0.5 * length, 1.5, 9 + 2 * samples // length)).astype(int)
+    signs = np.where(np.arange(len(halves)) % 2, 1.0, -1.0)
+    return np.repeat(signs, np.maximum(halves, 1))[:samples]
+
+
+def beside(record: Record, wave: FloatArray) -> Record:
+    """Return the record with a wave in PV that the controller has not answered."""
+    return dataclasses.replace(record, pv=record.pv + wave[:, None])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_white_noise_does_not_repeat_itself(seed: int) -> None:
+    problem = Problem.of(pi_loop(0.0, 0.0, seed=seed, samples=SAMPLES, noise=0.1))
+    assert echo(problem, ideal(problem)) < ECHO
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_valve_that_sticks_leaves_nothing_that_repeats_itself(seed: int) -> None:
+    record = pi_loop(3.0, 1.0, seed=seed, samples=SAMPLES, noise=0.1)
+    problem = Problem.of(record)
+    assert echo(problem, ideal(problem)) < ECHO
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("length", [24, 60, 110])
+def test_a_wave_that_keeps_no_exact_time_does(seed: int, length: int) -> None:
+    wave = 0.4 * irregular(SAMPLES, seed=seed, length=length)
+    record = beside(pi_loop(0.0, 0.0, seed=seed, samples=SAMPLES), wave)
+    problem = Problem.of(record)
+    assert echo(problem, ideal(problem)) > ECHO
+
+
+def test_the_strongest_of_all_outputs_counts() -> None:
+    problem = Problem.of(beside(pi_loop(0.0, 0.0), 0.4 * irregular(700, seed=1)))
+    one = ideal(problem)
+    quiet = dataclasses.replace(one.fits[0], rest=np.random.default_rng(0).normal(size=700))
+    both = dataclasses.replace(one, fits=(quiet, *one.fits))
+    assert echo(problem, both) == echo(problem, one)
+
+
+def test_a_record_without_room_for_a_turn_has_none() -> None:
+    record = pi_loop(0.0, 0.0, samples=4 * SHORTEST)
+    problem = Problem.of(record)
+    noise = np.ones(1)
+    fit = dataclasses.replace(ideal(problem).fits[0], noise=noise, rest=np.ones(len(record)))
+    nothing = np.zeros((1, 2))
+    candidate = Candidate(nothing, nothing[:, 0], problem.ideal_stems(), (fit,))
+    assert echo(problem, candidate) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        ({}, False),
+        ({"echo": 0.9 * ECHO}, False),
+        ({"echo": 1.1 * ECHO}, True),
+        ({"echo": 1.1 * ECHO, "outside_line": 0.9 * PLAIN_LINE}, True),
+        ({"echo": 1.1 * ECHO, "outside_line": 1.1 * PLAIN_LINE}, False),
+    ],
+)
+def test_a_line_that_stands_for_the_wave_leaves_no_doubt(
+    told: dict[str, float], expected: bool
+) -> None:
+    assert is_echoed(told) is expected
