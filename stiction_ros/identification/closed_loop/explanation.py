@@ -53,8 +53,8 @@ PLAIN_LINE = 60.0
 by its autocorrelation."""
 
 ECHO = 25.0
-"""From which on what the friction-free fit leaves of PV repeats itself a turn later; where it is white
-the most of a thousand lags exceeds 20 in one record of 250."""
+"""From which on what the friction-free fit leaves of PV repeats itself a turn later; where it is
+white the most of a thousand lags exceeds 20 in one record of 250."""
 
 PLAIN_SHARE = 0.5
 """Share of the variance from which on a line is an oscillation though it has too few cycles for a
