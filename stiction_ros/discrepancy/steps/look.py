@@ -93,14 +93,17 @@ def look(task: Task, state: State, k: int) -> State:
 
 
 def explained(state: State) -> bool:
-    """Tell whether more was found beside an effect in doubt, and both leave the declared noise."""
+    """Tell whether an effect in doubt and another one leave the declared noise together.
+
+    Alone it may stand for what nobody has named yet.
+    """
     if state.doubted is None:
         return True
     declared = all(
         forms and not fit.enlarged
         for fit, forms in zip(state.base.noise, state.base.declared, strict=True)
     )
-    return declared and len(state.added) > len(state.doubted.added) + 1
+    return declared and len(state.added) > 1
 
 
 def withdrawn(task: Task, state: State) -> State:
