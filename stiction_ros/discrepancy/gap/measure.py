@@ -55,15 +55,16 @@ def measure_gap(
     for i, name in enumerate(base.run.model.outputs):
         noise, blocks = base.noise[i], base.blocks[i]
         residual, floor, held = noise.residual, noise.stationary_std, blocks.held
+        fitted = blocks.train
         if weights is not None and len(weights[i]):
             residual, floor = whiten(residual, weights[i]), np.inf
-            held = held | blocks.train if every else held
+            held = fitted = held | fitted if every else held
         found.append(
             OutputGap(
                 name,
                 _rms(residual[held]),
                 _rms(noise.innovations[held]),
-                min(floor, _rms(residual[blocks.train])),
+                min(floor, _rms(residual[fitted])),
                 noise.innovation_std,
             )
         )

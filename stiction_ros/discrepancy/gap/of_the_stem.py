@@ -13,6 +13,7 @@ from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import Block, Law
 from stiction_ros.discrepancy.gap.noise_score import best_figures, score_of, shown_of
+from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.effects import FloatArray
 
 PLAYS = (0.1, 0.25, 0.5)  # of the span of OP: bands whose strain is asked for
@@ -120,15 +121,21 @@ def _answers(base: Baseline, output: int, valve: int, signals: list[FloatArray])
 
 
 def _shares(base: Baseline, valve: int) -> list[FloatArray]:
-    """Return when a stem moves that also rests, shape (N,) each: every move, and by its size.
+    """Return when a stem moves that also rests, shape (N,) each.
 
-    A stem that moves within a sample moves on in the next one.
+    While it moves, by how much it does, and when it starts or stops. A stem that moves within a
+    sample moves on in the next one.
     """
     travel = np.abs(np.diff(base.run.stems[:, valve], prepend=base.run.stems[0, valve]))
-    moved = (travel > 0.0) | (np.roll(travel, 1) > 0.0)
+    moves = travel > 0.0
+    moved, turned = _and_next(moves), _and_next(moves != np.roll(moves, 1))
     if not 0.0 < float(moved.mean()) <= 1.0 - RESTS:
         return []
-    return [moved.astype(float), travel / float(travel.mean())]
+    return [moved.astype(float), turned.astype(float), travel / float(travel.mean())]
+
+
+def _and_next(marked: BoolArray) -> BoolArray:
+    return marked | np.roll(marked, 1)
 
 
 def _direction(signal: FloatArray) -> FloatArray:

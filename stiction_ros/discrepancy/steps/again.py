@@ -14,13 +14,11 @@ from stiction_ros.discrepancy.decision.measured_stem import not_contradicted
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.steps.look import scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import whole
+from stiction_ros.discrepancy.steps.wholes import Keys, whole
 from stiction_ros.effects import about
 
 NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
 RIVALS = 2  # that are tried in the place of an effect
-
-Keys = tuple[tuple[str, str], ...]
 
 
 def told_again(task: Task, state: State) -> State:
