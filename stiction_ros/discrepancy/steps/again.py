@@ -45,9 +45,9 @@ def _told(task: Task, state: State, k: int) -> State:
         added = (*state.added[:k], other, *state.added[k + 1 :])
         refitted = refit_together(state.bare, task.runs, added)
         tried.append((other, state.with_added(task.runs, refitted)))
-    if len(tried) == 1:
-        return state
-    scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
+    scores = [0.0]
+    if len(tried) > 1:
+        scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
     least = min(scores)
     best, kept = tried[scores.index(least)]
     near = [
