@@ -11,8 +11,9 @@ from stiction_ros.discrepancy.steps.curve import slope_to_its_curve
 from stiction_ros.discrepancy.steps.friction import friction_beside_others, friction_told_again
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.mending import mended, singles
+from stiction_ros.discrepancy.steps.outliers import without_outliers
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import best_whole, suspicious, without_outliers
+from stiction_ros.discrepancy.steps.wholes import best_whole, suspicious
 
 
 def settle(task: Task, state: State) -> State:

@@ -22,8 +22,6 @@ from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.loop import LoopModel
 
 LAWS = 100.0  # BIC that a law of the noise may gain over an autoregression
-APART = 5.0  # samples between a step and its opposite that are outliers together
-CANCEL = 0.25  # of the larger one, that such two may leave
 Keys = tuple[tuple[str, str], ...]
 SINGLES = 4  # effects of the first look that are tried alone against several together
 
@@ -141,32 +139,6 @@ def _as_well_as_noise(noise: Whole, near: Sequence[Whole], margin: float) -> Who
         return noise
     best = min(rivals, key=lambda each: each.worth(margin))
     return dataclasses.replace(best, effects=(_in_doubt(best.effects[0], [noise.laws]),))
-
-
-def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
-    """Return effects without steps that another one takes back a few samples later.
-
-    Rows that stand apart from all others look like a step and its opposite.
-    """
-    steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
-    gone: list[AddedEffect] = []
-    for one, other in itertools.combinations(steps, 2):
-        if (
-            one.place != other.place
-            or one.effect != other.effect
-            or _is_in(one, gone)
-            or _is_in(other, gone)
-        ):
-            continue
-        apart = abs(float(one.fit.point[0] - other.fit.point[0]))
-        sizes = float(one.fit.factors[0]), float(other.fit.factors[0])
-        if apart <= APART * sample_time and abs(sum(sizes)) <= CANCEL * max(map(abs, sizes)):
-            gone += [one, other]
-    return tuple(each for each in effects if not _is_in(each, gone))
-
-
-def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
-    return any(effect is each for each in others)
 
 
 def _in_doubt(effect: AddedEffect, rivals: Sequence[Keys]) -> AddedEffect:
