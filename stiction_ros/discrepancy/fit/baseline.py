@@ -123,6 +123,20 @@ class Baseline:
         """BIC of the current model, but for what every candidate shares with it."""
         return sum(fit.bic(0) for fit in self.noise)
 
+    @property
+    def score(self) -> float:
+        """−2 log likelihood of fitted and held-out rows, and the price of the noise."""
+        return self.bic + sum(fit.held_minus_two_log for fit in self.noise)
+
+    @property
+    def score_under_declared(self) -> float:
+        """The same under the declared noise, of every output whose model declares one."""
+        total = 0.0
+        for i, own in enumerate(self.noise):
+            fit = self.under_declared(i) if self.declared[i] and own.enlarged else own
+            total += fit.bic(0) + fit.held_minus_two_log
+        return total
+
     def held_gain(self, before: Baseline) -> float:
         """Return −2 log likelihood that it gains on the held-out rows against another model."""
         return sum(

@@ -55,15 +55,16 @@ def measure_gap(
     for i, name in enumerate(base.run.model.outputs):
         noise, blocks = base.noise[i], base.blocks[i]
         residual, floor, held = noise.residual, noise.stationary_std, blocks.held
+        fitted = blocks.train
         if weights is not None and len(weights[i]):
             residual, floor = whiten(residual, weights[i]), np.inf
-            held = held | blocks.train if every else held
+            held = fitted = held | fitted if every else held
         found.append(
             OutputGap(
                 name,
                 _rms(residual[held]),
                 _rms(noise.innovations[held]),
-                min(floor, _rms(residual[blocks.train])),
+                min(floor, _rms(residual[fitted])),
                 noise.innovation_std,
             )
         )
@@ -74,12 +75,13 @@ def closed_share(before: tuple[OutputGap, ...], after: tuple[OutputGap, ...]) ->
     """Return the share of the free-run excess over the noise floor that is gone.
 
     The floor is that of the model with its effects, since what the effect caused counts as
-    noise before. Outputs are weighted by their excess in units of their innovations. 0 where
-    there was no excess.
+    noise before; held-out rows that have less of it by chance have a lower one. Outputs are
+    weighted by their excess in units of their innovations. 0 where there was no excess.
     """
     excess, gone = 0.0, 0.0
     for old, new in zip(before, after, strict=True):
-        floor, unit = new.floor_free_run, max(new.floor_one_step, 1e-300)
+        floor = min(new.floor_free_run, new.free_run_rmse)
+        unit = max(new.floor_one_step, 1e-300)
         much = max(old.free_run_rmse - floor, 0.0) / unit
         left = max(new.free_run_rmse - floor, 0.0) / unit
         excess += much

@@ -51,6 +51,8 @@ def steady_gain(
 def innovations(
     a: FloatArray,
     q: FloatArray,
+    driven: FloatArray,
+    when: FloatArray,
     c: FloatArray,
     r: float,
     start: FloatArray,
@@ -66,6 +68,8 @@ def innovations(
 
     Args:
         a, q: of the states, shape (n, n).
+        driven: what ``when`` adds to q, shape (n, n).
+        when: share of it from each sample to the next, shape (N,).
         c: of the one output, shape (n,).
         r: its variance.
         start: covariance of the states at the first sample of a record, shape (n, n).
@@ -99,7 +103,7 @@ def innovations(
                     moved[i, j] += a[i, m] * p[m, j]
         for i in range(size):
             for j in range(i, size):
-                value = q[i, j] - gain[i] * gain[j] * total
+                value = q[i, j] + when[k] * driven[i, j] - gain[i] * gain[j] * total
                 for m in range(size):
                     value += moved[i, m] * a[j, m]
                 p[i, j] = p[j, i] = value

@@ -14,13 +14,11 @@ from stiction_ros.discrepancy.decision.measured_stem import not_contradicted
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.steps.look import scored_by
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import whole
+from stiction_ros.discrepancy.steps.wholes import Keys, whole
 from stiction_ros.effects import about
 
 NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
 RIVALS = 2  # that are tried in the place of an effect
-
-Keys = tuple[tuple[str, str], ...]
 
 
 def told_again(task: Task, state: State) -> State:
@@ -47,9 +45,9 @@ def _told(task: Task, state: State, k: int) -> State:
         added = (*state.added[:k], other, *state.added[k + 1 :])
         refitted = refit_together(state.bare, task.runs, added)
         tried.append((other, state.with_added(task.runs, refitted)))
-    if len(tried) == 1:
-        return state
-    scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
+    scores = [0.0]
+    if len(tried) > 1:
+        scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
     least = min(scores)
     best, kept = tried[scores.index(least)]
     near = [

@@ -44,6 +44,7 @@ from stiction_ros.discrepancy.process.refit import with_noise_of
 from stiction_ros.discrepancy.steps.look import explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.discrepancy.steps.wholes import whole, with_laws
 from stiction_ros.effects import from_mapping
 
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
@@ -65,7 +66,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         looked = settle(task, state.doubted)
         state, found = _named(task, looked)
     before, after = measure_gap(state.before), measure_gap(state.base)
-    louder = _louder(task, state)
+    louder = [] if _explained_by_no_name(task, looked, state) else _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
     verdict, alternatives = overall(shown, answers, state.looks, state.testable)
@@ -182,6 +183,16 @@ def _share(task: Task, state: State, k: int) -> Callable[[float], None]:
     done = task.options.most_effects / (task.options.most_effects + 1)
     part = (1.0 - done) / len(state.added)
     return lambda share: task.report(done + (k + share) * part)
+
+
+def _explained_by_no_name(task: Task, looked: State, state: State) -> bool:
+    """Tell whether effects that are no names explain as much as a noise does in their stead."""
+    if len(looked.added) == len(state.added):
+        return False
+    margin = task.options.margin
+    with_them = whole(looked.bare, task.runs, looked.added)
+    instead = with_laws(whole(state.bare, task.runs, state.added))
+    return with_them.worth(margin) < instead.worth(margin) + margin
 
 
 def _louder(task: Task, state: State) -> list[FoundEffect]:

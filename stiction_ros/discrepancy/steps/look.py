@@ -93,14 +93,17 @@ def look(task: Task, state: State, k: int) -> State:
 
 
 def explained(state: State) -> bool:
-    """Tell whether more was found beside an effect in doubt, and both leave the declared noise."""
+    """Tell whether an effect in doubt, with another one, explains more than it leaves.
+
+    What is left is what any noise would still gain over the declared one. Alone, or where most is
+    left, it may stand for what nobody has named yet.
+    """
     if state.doubted is None:
         return True
-    declared = all(
-        forms and not fit.enlarged
-        for fit, forms in zip(state.base.noise, state.base.declared, strict=True)
-    )
-    return declared and len(state.added) > len(state.doubted.added) + 1
+    if len(state.added) < 2 or max(state.base.run.runs.thinned) > 0.0:
+        return False
+    gained = state.doubted.base.score - state.base.score
+    return gained > max(state.base.score_under_declared - state.base.score, 0.0)
 
 
 def withdrawn(task: Task, state: State) -> State:

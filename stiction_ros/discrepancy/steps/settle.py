@@ -8,15 +8,22 @@ from stiction_ros.discrepancy.decision.decide import confirmed
 from stiction_ros.discrepancy.decision.extend import refit_together
 from stiction_ros.discrepancy.steps.again import told_again
 from stiction_ros.discrepancy.steps.curve import slope_to_its_curve
-from stiction_ros.discrepancy.steps.friction import friction_told_again
+from stiction_ros.discrepancy.steps.friction import friction_beside_others, friction_told_again
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.mending import mended, singles
+from stiction_ros.discrepancy.steps.outliers import without_outliers
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import best_whole, without_outliers
+from stiction_ros.discrepancy.steps.wholes import best_whole, suspicious
 
 
 def settle(task: Task, state: State) -> State:
-    """Keep the best whole explanation, the given process mended where that explains more."""
+    """Keep the best whole explanation, the given process mended where that explains more.
+
+    Which friction it is was told beside nothing; where more than the declared noise is left, it is
+    told again before any effect is given up.
+    """
+    if len(state.added) > 1 and suspicious(state.base):
+        state = friction_beside_others(task, state)
     state = best_of_wholes(task, state)
     other = mended(task, state)
     if other is not None:

@@ -22,8 +22,7 @@ from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.loop import LoopModel
 
 LAWS = 100.0  # BIC that a law of the noise may gain over an autoregression
-APART = 5.0  # samples between a step and its opposite that are outliers together
-CANCEL = 0.25  # of the larger one, that such two may leave
+Keys = tuple[tuple[str, str], ...]
 SINGLES = 4  # effects of the first look that are tried alone against several together
 
 
@@ -35,11 +34,13 @@ class Whole:
         effects: fitted together.
         base: of the model with them.
         score: −2 log likelihood of fitted and held-out rows, and the price of all figures.
+        laws: places and effects by which its larger noise is told, where that is better.
     """
 
     effects: tuple[AddedEffect, ...]
     base: Baseline
     score: float
+    laws: Keys = ()
 
     def worth(self, margin: float) -> float:
         """Return what is to be least: an effect more must gain the margin."""
@@ -63,15 +64,16 @@ def whole(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Whole:
 
 def with_laws(found: Whole) -> Whole:
     """Return the explanation with its larger noise told by a law, where that is better."""
-    score = found.score
+    score, names = found.score, list(found.laws)
     declared = declared_noise(found.base.run.model)
     for i, (fit, own) in enumerate(zip(found.base.noise, declared, strict=True)):
         if own is None or not fit.enlarged or not spans_steps(found.base, i):
             continue
         laws = noise_effects(found.base, i, own)
-        if laws:
-            score += min(laws[0].score - fit.bic(0) - fit.held_minus_two_log, 0.0)
-    return dataclasses.replace(found, score=score)
+        if laws and (gained := laws[0].score - fit.bic(0) - fit.held_minus_two_log) < 0.0:
+            score += gained
+            names.append((laws[0].place, laws[0].behaviour.effect))
+    return dataclasses.replace(found, score=score, laws=tuple(names))
 
 
 def best_whole(
@@ -108,6 +110,8 @@ def best_whole(
         if each.worth(margin) < least + LAWS or (loads and not each.effects)
     ]
     best = min(near, key=lambda each: each.worth(margin))
+    if not best.effects and best.laws:
+        return _as_well_as_noise(best, near, margin)
     if len(best.effects) != 1 or len(added) < 2:
         return best
     close = [
@@ -118,33 +122,26 @@ def best_whole(
     return dataclasses.replace(best, effects=(_in_doubt(best.effects[0], close),))
 
 
-def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
-    """Return effects without steps that another one takes back a few samples later.
+def _as_well_as_noise(noise: Whole, near: Sequence[Whole], margin: float) -> Whole:
+    """Return one effect, in doubt with a noise that explains as much; the noise where none does.
 
-    Rows that stand apart from all others look like a step and its opposite.
+    A noise bends as it has to; an effect of few figures that leaves no more is not taken back
+    for it.
     """
-    steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
-    gone: list[AddedEffect] = []
-    for one, other in itertools.combinations(steps, 2):
-        if (
-            one.place != other.place
-            or one.effect != other.effect
-            or _is_in(one, gone)
-            or _is_in(other, gone)
-        ):
-            continue
-        apart = abs(float(one.fit.point[0] - other.fit.point[0]))
-        sizes = float(one.fit.factors[0]), float(other.fit.factors[0])
-        if apart <= APART * sample_time and abs(sum(sizes)) <= CANCEL * max(map(abs, sizes)):
-            gone += [one, other]
-    return tuple(each for each in effects if not _is_in(each, gone))
+    rivals = [
+        each
+        for each in near
+        if len(each.effects) == 1
+        and not any(fit.enlarged for fit in each.base.noise)
+        and each.worth(margin) < noise.worth(margin) + margin
+    ]
+    if not rivals:
+        return noise
+    best = min(rivals, key=lambda each: each.worth(margin))
+    return dataclasses.replace(best, effects=(_in_doubt(best.effects[0], [noise.laws]),))
 
 
-def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
-    return any(effect is each for each in others)
-
-
-def _in_doubt(effect: AddedEffect, rivals: Sequence[tuple[tuple[str, str], ...]]) -> AddedEffect:
+def _in_doubt(effect: AddedEffect, rivals: Sequence[Keys]) -> AddedEffect:
     """Return an effect with the rivals that explain as much alone."""
     names = [*effect.alternatives, *(name for keys in rivals for name in keys)]
     own = (effect.place, effect.effect)

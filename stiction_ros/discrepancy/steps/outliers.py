@@ -1,0 +1,53 @@
+"""Steps that another one takes back: rows that stand apart, or a stem that stood elsewhere."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from stiction_ros.discrepancy.candidate.base import figures_of
+from stiction_ros.discrepancy.decision.decide import FRICTION
+from stiction_ros.discrepancy.decision.extend import AddedEffect
+from stiction_ros.effects import Backlash, about
+
+APART = 5.0  # samples between a step and its opposite that are outliers together
+CANCEL = 0.25  # of the larger one, that such two may leave
+
+
+def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
+    """Return effects without steps that another one takes back.
+
+    A few samples later, both are rows that stand apart from all others. Beside a friction, both
+    no larger than its band, they are a stem that slipped elsewhere, or not at all, and slipped
+    again.
+
+    Args:
+        effects: those of an explanation.
+        sample_time: of the records, s.
+    """
+    steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
+    bands = {each.place: band_of(each) for each in effects if about(each.effect).family == FRICTION}
+    gone: list[AddedEffect] = []
+    for one, other in itertools.combinations(steps, 2):
+        if one.fit.candidate.key != other.fit.candidate.key or _is_in(one, gone):
+            continue
+        apart = abs(float(one.fit.point[0] - other.fit.point[0]))
+        sizes = float(one.fit.factors[0]), float(other.fit.factors[0])
+        largest = max(map(abs, sizes))
+        band = bands.get(one.place.replace("load:", "valve:"), 0.0)
+        near = apart <= APART * sample_time or largest <= band
+        if near and not _is_in(other, gone) and abs(sum(sizes)) <= CANCEL * largest:
+            gone += [one, other]
+    return tuple(each for each in effects if not _is_in(each, gone))
+
+
+def band_of(friction: AddedEffect) -> float:
+    """Return how far apart a stem may rest under the same OP, %."""
+    figures = figures_of(friction.behaviour)
+    if friction.effect == Backlash.effect:
+        return figures["band"]
+    return figures["f_s"] + figures["f_d"]
+
+
+def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
+    return any(effect is each for each in others)
