@@ -14,6 +14,7 @@ from stiction_ros.identification.closed_loop.explanation import (
     is_echoed,
     is_wave_itself,
 )
+from stiction_ros.identification.inference.verdict import price_of_few
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
@@ -75,7 +76,8 @@ def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float
         return "This method does not weigh friction against none."
     size = f"f_S {estimate.static_friction:.2g} %"
     if short < 0.0:
-        if told["moves"] < least_moves:
+        few = -short < price_of_few(told["moves"], least_moves)
+        if few or told["moves"] < least_moves:
             return f"By {size} the stem moves {told['moves']:.0f} times only."
         band = estimate.static_friction + estimate.dynamic_friction
         if is_wave_itself(told, band / span):

@@ -143,12 +143,17 @@ def beside_wave(told: Mapping[str, float]) -> bool:
 
 
 def is_echoed(told: Mapping[str, float]) -> bool:
-    """Tell whether a wave comes from outside that keeps no exact time.
+    """Tell whether friction may be fitted to a wave from outside that keeps no exact time.
+
+    A valve that sticks makes its loop cycle, and without its friction the cycle is left over, which
+    repeats itself as well; but then the friction gains far more than that.
 
     Args:
-        told: figures behind the verdict on a valve; without ``echo`` there is none.
+        told: figures behind the verdict on a valve; without ``echo`` there is no such wave.
     """
-    return told.get("echo", 0.0) > ECHO and told.get("outside_line", 0.0) < PLAIN_LINE
+    echo = told.get("echo", 0.0)
+    rival = echo > RIVAL * told.get("delta_bic", 0.0)
+    return echo > ECHO and rival and told.get("outside_line", 0.0) < PLAIN_LINE
 
 
 def is_wave_itself(told: Mapping[str, float], band_share: float) -> bool:

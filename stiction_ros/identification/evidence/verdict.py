@@ -13,7 +13,7 @@ from stiction_ros.identification.closed_loop.explanation import (
     is_wave_itself,
 )
 from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
-from stiction_ros.identification.inference.verdict import kind_of
+from stiction_ros.identification.inference.verdict import kind_of, price_of_few
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import (
@@ -49,6 +49,9 @@ def verdict_of(
 ) -> VerdictKind:
     """Return the verdict on one valve by what its rates show.
 
+    What rates find beside a process that the controller would not hold is nothing where two that
+    see the process reject it.
+
     Args:
         figures: the evidence of ``agreed``.
         agreed: the rates that agree best on its friction.
@@ -60,8 +63,10 @@ def verdict_of(
     slips = figures["moves"] >= options.min_moves
     if figures["delta_bic"] > 0.0 and agreed.alike and held.band[0] > MATERIAL:
         both = min(figures["half_1"], figures["half_2"]) > 0.0
+        enough = figures["delta_bic"] > price_of_few(figures["moves"], options.min_moves)
+        shown = both and slips and enough and (agreed.held or not _rejected(seen, valve))
         kind = kind_of(held.deadband_loss, held.static, held.dynamic)
-        return kind if both and slips else VerdictKind.UNDECIDED
+        return kind if shown else VerdictKind.UNDECIDED
     return VerdictKind.HEALTHY if slips and _harmless(seen, valve) else VerdictKind.UNDECIDED
 
 
@@ -76,10 +81,13 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
     if any(look.accepted[valve].material_gain > look.price + SURE for look in speak):
         return False
     gains = [look.accepted[valve].material_gain for look in speak if look.carries_news]
-    lost = _lost(seen, valve)
-    twice = sum(one >= REJECTED for one in lost) >= REJECTING
-    surely = max(lost, default=0.0) >= SURELY
-    return max(gains, default=PRICE) < NOTHING and (twice or surely)
+    surely = max(_lost(seen, valve), default=0.0) >= SURELY
+    return max(gains, default=PRICE) < NOTHING and (surely or _rejected(seen, valve))
+
+
+def _rejected(seen: tuple[Look, ...], valve: int) -> bool:
+    """Tell whether all bands that would matter are rejected at two rates that see the process."""
+    return sum(one >= REJECTED for one in _lost(seen, valve)) >= REJECTING
 
 
 def _lost(seen: tuple[Look, ...], valve: int) -> list[float]:

@@ -15,6 +15,7 @@ Evidence, all under the noise model:
   the largest band f_S + f_D that this does not reject, %.
 - ``alike``, ``held``: 1 where two rates agree on the band, and where both speak of processes that
   the controller would hold.
+- ``echo``: how strongly what is left without friction repeats itself a turn later.
 - ``by_loop``: 1 where the loop closed again is a witness to the verdict beside the rates.
 - ``patterns``, ``patterns_closed``: switching patterns enumerated round the best, and whether
   all at the edge were rejected.
@@ -40,6 +41,23 @@ one parameter that it has less."""
 SMALL_JUMP = 0.25
 """Jump, as a share of f_S + f_D, up to which friction is a deadband: a stem that is moved by the
 controller's own kicks tells f_S + f_D alone, and any jump may go with it."""
+
+SCARCE = 2.0
+"""Times the least number of moves below which a stem moves so seldom that many frictions give the
+same few moves, one of which may meet a load by chance."""
+OF_FEW = 10.0
+"""−2 log likelihood that such a friction must gain more: halves of records in which nothing sticks
+showed frictions of six to eight moves that gained up to 4 beyond the price."""
+
+
+def price_of_few(moves: float, least: int) -> float:
+    """Return what a friction by which a stem moves seldom must gain more.
+
+    Args:
+        moves: of the stem over the record.
+        least: fewest that a friction is judged by.
+    """
+    return OF_FEW if moves < SCARCE * least else 0.0
 
 
 def evidence(
