@@ -65,6 +65,7 @@ OPTIONS = IdentificationOptions()
     ("evidence", "said"),
     [
         ({"moves": 3.0}, "the stem moves 3 times only"),
+        ({"moves": 8.0, "delta_bic": 25.0}, "the stem moves 8 times only"),
         ({"wave_1": 40.0}, "hardly matters"),
         ({"wave_1": 40.0, "delta_bic": 12.0}, "beside a wave from outside, but not clearly"),
         ({"echo": 30.0}, "PV also repeats itself a turn later"),

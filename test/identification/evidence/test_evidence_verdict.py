@@ -21,7 +21,7 @@ from stiction_ros.identification.evidence.verdict import (
     SURELY,
     verdict_of,
 )
-from stiction_ros.identification.inference.verdict import DEADBAND
+from stiction_ros.identification.inference.verdict import DEADBAND, OF_FEW
 
 STICKY, BACKLASH, HEALTHY, UNDECIDED = VerdictKind
 FIGURES = {"delta_bic": 60.0, "half_1": 30.0, "half_2": 30.0, "moves": 40.0}
@@ -81,6 +81,9 @@ def agreed(blank: Look, *rates: Accepted, alike: bool = True) -> tuple[Agreement
         ({"half_1": -1.0}, held(75.0, (0.2, 0.3)), True, UNDECIDED),
         ({"half_2": 0.0}, held(75.0, (0.2, 0.3), 0.0), True, UNDECIDED),
         ({"moves": 5.0}, held(75.0, (0.2, 0.3)), True, UNDECIDED),
+        ({"moves": 11.0, "delta_bic": OF_FEW + 0.1}, held(75.0, (0.2, 0.3)), True, STICKY),
+        ({"moves": 11.0, "delta_bic": OF_FEW - 0.1}, held(75.0, (0.2, 0.3)), True, UNDECIDED),
+        ({"moves": 12.0, "delta_bic": OF_FEW - 0.1}, held(75.0, (0.2, 0.3)), True, STICKY),
         ({"delta_bic": -1.0}, held(PRICE - 1.0, (0.2, 0.3)), True, UNDECIDED),
         ({}, held(75.0, (0.9 * MATERIAL, 0.3)), True, UNDECIDED),
         ({"delta_bic": -13.0}, rejected(SURELY + 0.1), True, HEALTHY),
@@ -94,6 +97,22 @@ def test_the_verdict_follows_from_what_the_rates_say(
 ) -> None:
     found, seen = agreed(blank, rate, alike=alike)
     assert verdict_of(FIGURES | changes, found, seen, 0, IdentificationOptions()) is verdict
+
+
+@pytest.mark.parametrize(
+    ("others", "is_held", "verdict"),
+    [
+        ([rejected(REJECTED + 0.1)] * 2, False, UNDECIDED),
+        ([rejected(REJECTED + 0.1)] * 2, True, STICKY),
+        ([rejected(REJECTED + 0.1), rejected(REJECTED - 0.1)], False, STICKY),
+    ],
+)
+def test_friction_beside_another_process_is_none_where_two_rates_that_see_it_reject_it(
+    blank: Look, others: list[Accepted], is_held: bool, verdict: VerdictKind
+) -> None:
+    found, seen = agreed(blank, held(75.0, (0.2, 0.3)), *others)
+    found = dataclasses.replace(found, held=is_held)
+    assert verdict_of(FIGURES, found, seen, 0, IdentificationOptions()) is verdict
 
 
 @pytest.mark.parametrize(
