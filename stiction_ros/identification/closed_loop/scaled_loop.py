@@ -16,7 +16,7 @@ from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.result.identification import OutputModel
 from stiction_ros.records.record import Record
 
-DIGITS = 9
+DIGITS = 7
 """Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bit of
 a unit would make another run of it."""
 

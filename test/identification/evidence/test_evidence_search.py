@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from stiction_ros.identification.evidence.accepted import accepted
 from stiction_ros.identification.evidence.fit.problem import Problem
 from stiction_ros.identification.evidence.search import Found, search
+from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.records.record import Record
 
@@ -84,19 +85,23 @@ def test_units_leave_no_trace_in_what_is_searched(seed: int) -> None:
     op, pv = (np.cumsum(random.standard_normal((750, 1))).round(2)[:, None] for _ in range(2))
     record = Record("kept", 10.0, ("V1",), ("PV1",), 50.0 + op, 3.0 + pv)
     other = dataclasses.replace(record, op=20.0 * record.op + 50.0, pv=1e-3 * record.pv + 7.0)
-    one, two = Problem.of(record), Problem.of(other)
-    assert np.array_equal(one.op, two.op)
-    assert np.array_equal(one.pv, two.pv)
+    for rate in (1, 4):
+        one, two = (Problem.of(each, rate=rate) for each in (record, other))
+        assert np.array_equal(one.op, two.op)
+        assert np.array_equal(one.pv, two.pv)
+        assert np.array_equal(one.shrunk, two.shrunk)
 
 
 def test_what_is_accepted_holds_the_truth_and_grows_with_the_level(
     problem: Problem, found: Found
 ) -> None:
     wide, narrow = (accepted(problem, found, 0, level) for level in (0.999, 0.9))
+    unseen = Unseen.of(problem.span[0] * problem.op[0])
     for shares in (wide, narrow):
         held = shares.times(float(problem.span[0]))
-        assert held.static[0] <= STATIC <= held.static[1]
-        assert held.dynamic[0] <= DYNAMIC <= held.dynamic[1]
+        ends = unseen.static(held.static), unseen.dynamic(held.dynamic)
+        assert ends[0][0] <= STATIC <= ends[0][1]
+        assert ends[1][0] <= DYNAMIC <= ends[1][1]
         assert not held.none
     assert wide.band[0] <= narrow.band[0] <= narrow.band[1] <= wide.band[1]
     assert min(loss for _, loss in narrow.profile) == pytest.approx(0.0, abs=1e-6)
