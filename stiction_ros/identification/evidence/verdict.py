@@ -30,7 +30,7 @@ REJECTED = 3.0
 """−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
 likelihood of none at both together."""
 REJECTING = 2  # rates that do
-SURELY = 10.0  # what they must lose where one rate alone rejects them
+SURELY = 10.0  # what they must lose where one rate alone rejects them and none gains
 NOTHING = 8.0
 """What they may gain at any rate with news: about as much as the best of many does on noise."""
 CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
@@ -75,13 +75,16 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
 
     A rate that takes something else for the process rejects nothing, as neither do rows that are
     drawn between reports; and what such rows say for friction is not believed before it is sure.
-    Where that is beside a process that the controller would not hold, it is nothing.
+    Where that is beside a process that the controller would not hold, it is nothing. Where a rate
+    finds friction, be it a small one, there is some; and one rejects alone only where none that
+    sees the process gains by what would matter.
     """
     speak = [look for look in seen if look.speaks(valve)]
-    if any(look.accepted[valve].material_gain > look.price + SURE for look in speak):
+    if any(look.beyond_price(valve) > (0.0 if look.carries_news else SURE) for look in speak):
         return False
     gains = [look.accepted[valve].material_gain for look in speak if look.carries_news]
-    surely = max(_lost(seen, valve), default=0.0) >= SURELY
+    lost = _lost(seen, valve)
+    surely = max(lost, default=0.0) >= SURELY and min(lost) >= 0.0
     return max(gains, default=PRICE) < NOTHING and (surely or _rejected(seen, valve))
 
 

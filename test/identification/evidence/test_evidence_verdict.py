@@ -118,8 +118,8 @@ def test_friction_beside_another_process_is_none_where_two_rates_that_see_it_rej
 @pytest.mark.parametrize(
     ("rates", "verdict"),
     [
-        ([rejected(SURELY + 1.0), held(NOTHING - 1.0, (0.1, 0.2))], HEALTHY),
-        ([rejected(SURELY + 1.0), held(NOTHING + 1.0, (0.1, 0.2))], UNDECIDED),
+        ([rejected(SURELY + 1.0), rejected(0.1)], HEALTHY),
+        ([rejected(SURELY + 1.0), rejected(-0.1)], UNDECIDED),
         ([rejected(REJECTED + 0.1)], UNDECIDED),
         ([rejected(REJECTED + 0.1)] * 2, HEALTHY),
         ([rejected(REJECTED + 0.1), rejected(REJECTED - 0.1)], UNDECIDED),
@@ -153,10 +153,18 @@ def test_what_gains_beside_a_process_that_no_controller_holds_is_nothing(
     blank: Look, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     figures, options = FIGURES | {"delta_bic": -13.0}, IdentificationOptions()
-    found, seen = agreed(blank, rejected(30.0), held(PRICE + SURE + 1.0, (0.1, 0.2)))
+    found, seen = agreed(blank, *[rejected(30.0)] * 2, held(PRICE + SURE + 1.0, (0.1, 0.2)))
     assert verdict_of(figures, found, seen, 0, options) is UNDECIDED
-    monkeypatch.setattr(Look, "speaks", lambda look, valve: look.problem.rate == 1)
+    monkeypatch.setattr(Look, "speaks", lambda look, valve: look.problem.rate != 4)
     assert verdict_of(figures, found, seen, 0, options) is HEALTHY
+
+
+def test_where_a_rate_finds_a_small_friction_a_valve_is_not_healthy(blank: Look) -> None:
+    figures, options = FIGURES | {"delta_bic": -13.0}, IdentificationOptions()
+    for gain, verdict in ((PRICE - 1.0, HEALTHY), (PRICE + 1.0, UNDECIDED)):
+        small = dataclasses.replace(rejected(30.0), gain=gain)
+        found, seen = agreed(blank, small, *[rejected(30.0)] * 2)
+        assert verdict_of(figures, found, seen, 0, options) is verdict
 
 
 def test_stability_tells_which_rates_and_halves_agree_on_friction(blank: Look) -> None:
