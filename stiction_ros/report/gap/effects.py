@@ -53,17 +53,20 @@ def effect_drawings(found: Discrepancy) -> list[Drawing]:
 
 def _effect(found: Discrepancy, effect: FoundEffect, k: int) -> Drawing:
     assert effect.moves is not None
-    i = int(np.argmax(np.std(effect.moves, axis=0)))
-    rows = _liveliest(effect.moves[:, i])
-    base, name = found.base_after, found.model_before.outputs[i]
+    base = found.base_after
+    # At the start of a record nothing is scored, and the fitted state may run anywhere.
+    scored = np.column_stack([blocks.train | blocks.held for blocks in base.blocks])
+    moves = np.where(scored, effect.moves, np.nan)
+    i = int(np.argmax(np.nanstd(moves, axis=0)))
+    rows, name = _liveliest(moves[:, i]), found.model_before.outputs[i]
     pv = base.run.runs.pv[rows, i]
-    with_it = pv - base.noise[i].residual[rows]
+    with_it = np.where(scored[rows, i], pv - base.noise[i].residual[rows], np.nan)
     seconds = np.arange(rows.start, rows.stop) * found.runs.sample_time
     axis_of_time = TimeAxis.spanning(float(seconds[-1]))
     figure, axes = panels(1, 3.4)
     axis, at = axes[0, 0], axis_of_time(seconds)
-    axis.plot(at, pv, color=GREY, linewidth=0.8, label=f"{name} measured")
-    axis.plot(at, with_it - effect.moves[rows, i], color=ORANGE, label="free run without it")
+    axis.plot(at, pv, color=GREY, linewidth=4.0, alpha=0.5, label=f"{name} measured")
+    axis.plot(at, with_it - moves[rows, i], color=ORANGE, label="free run without it")
     axis.plot(at, with_it, color=BLUE, label="free run with it")
     axis.set_ylabel(name)
     axis.set_xlabel(axis_of_time.label)
@@ -77,8 +80,9 @@ def _effect(found: Discrepancy, effect: FoundEffect, k: int) -> Drawing:
 
 
 def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
+    """Return where a signal, NaN where it does not count, is farthest from its mean."""
     count = min(WINDOW, len(moves))
-    squares = np.concatenate([[0.0], np.cumsum((moves - moves.mean()) ** 2)])
+    squares = np.concatenate([[0.0], np.nancumsum((moves - np.nanmean(moves)) ** 2)])
     inside = squares[count:] - squares[:-count]
     first = int(np.argmax(inside))
     return slice(first, first + count)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect
@@ -10,6 +11,7 @@ from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.effects import behaviours
 from stiction_ros.report.page import number
 
+DIGITS = 3  # of a figure without an interval
 CONTROLLER = {
     ControllerStatus.SAME: "OP recomputed from PV and SP is the recorded one",
     ControllerStatus.OTHER: "OP recomputed from PV and SP is another than the recorded one",
@@ -80,12 +82,22 @@ def figures_with_units(effect: FoundEffect) -> list[str]:
         unit = effect.units.get(key, "")
         shown = "" if unit in ("", "1") else f" {unit}"
         ends = effect.intervals.get(key)
-        between = ""
+        between, digits = "", DIGITS
         if ends is not None:
-            between = f", 95 % between {number(ends[0])} and {number(ends[1])}"
+            digits = _digits(value, ends)
+            between = f", 95 % between {number(ends[0], digits)} and {number(ends[1], digits)}"
+        said = f"{key} = {number(value, digits)}{shown}{between}"
         meaning = meanings.get(key, "")
-        lines.append(f"{key} = {number(value)}{shown}{between}" + (f": {meaning}" * bool(meaning)))
+        lines.append(said + (f": {meaning}" * bool(meaning)))
     return lines
+
+
+def _digits(value: float, ends: tuple[float, float]) -> int:
+    """Return how many digits of a figure show two of the width of its interval."""
+    width = ends[1] - ends[0]
+    if not (math.isfinite(width) and width > 0.0) or value == 0.0:
+        return DIGITS
+    return max(DIGITS, math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2)
 
 
 def candidate_of(fit: CandidateFit) -> str:

@@ -9,10 +9,18 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
+from stiction_ros.discrepancy import (
+    Discrepancy,
+    FoundEffect,
+    GapOptions,
+    GapVerdict,
+    find_discrepancy,
+)
 from stiction_ros.effects import from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
+from stiction_ros.report.gap.effects import WINDOW, _liveliest
 from stiction_ros.report.gap.report import report_gap
+from stiction_ros.report.gap.words import figures_with_units
 
 
 def discrepancy(place: str, **effect: object) -> Discrepancy:
@@ -43,6 +51,33 @@ def test_every_figure_has_a_name_and_a_unit(said: str, lagging: Discrepancy) -> 
     for effect in lagging.effects:
         for key in effect.parameters:
             assert re.search(rf"{key} = [-\d.e]+ s, 95 % between", said)
+
+
+def test_a_figure_has_the_digits_that_its_interval_tells() -> None:
+    effect = FoundEffect(
+        "valve:V1",
+        "stiction",
+        None,
+        {"f_s": 5.8874, "f_d": 3.5},
+        {"f_s": "%", "f_d": "%"},
+        {"f_s": (5.868, 5.8929), "f_d": (1.0, 4.0)},
+        delta_bic=1470.0,
+        closed=1.0,
+        verdict=GapVerdict.NAMED,
+    )
+    static, dynamic = figures_with_units(effect)
+    assert "5.887 %, 95 % between 5.868 and 5.893" in static
+    assert "3.50 %, 95 % between 1 and 4" in dynamic
+
+
+def test_where_an_effect_moves_most_is_looked_for_where_samples_count() -> None:
+    moves = np.zeros(2000)
+    moves[:40], moves[900:960] = 1e3, 1.0
+    moves[:50] = np.nan
+    rows = _liveliest(moves)
+    assert rows.start <= 900
+    assert rows.stop >= 960
+    assert len(moves[rows]) == WINDOW
 
 
 def test_no_internal_words(said: str) -> None:
