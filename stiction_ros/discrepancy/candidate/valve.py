@@ -124,6 +124,10 @@ class StictionCandidate(ValveCandidate):
     def count(self, point: FloatArray) -> int:
         return 2
 
+    @property
+    def stepped(self) -> bool:
+        return True
+
     def leaps(self, point: FloatArray) -> bool:
         return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])
 
