@@ -55,7 +55,7 @@ def test_what_another_effect_may_do_otherwise_makes_a_size_less_sure() -> None:
     low, high = likelihood_intervals(base, fit)["size"]
     ramp = np.clip((np.arange(900.0) - 300.0) / 200.0, 0.0, 1.0)[:, None]
     less = likelihood_intervals(base, fit, [ramp])["size"]
-    assert less[0] < low and high < less[1]
+    assert less[0] < low < high < less[1]
     assert less[1] - less[0] > 1.5 * (high - low)
 
 
