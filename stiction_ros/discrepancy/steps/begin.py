@@ -53,6 +53,7 @@ def begin(
     runs = dataclasses.replace(
         corrected(runs, found),
         op=controller.op(runs),
+        scans=None if controller.scans is None else controller.scans.each(runs.op),
         unseen=unseen_of(runs, controller),
         between=() if options.free_process else _between(model),
     )
