@@ -236,6 +236,11 @@ class Candidate(ABC):
         """Whether the free run is smooth in its first figure, so that it can be followed."""
         return self.curved
 
+    @property
+    def stepped(self) -> bool:
+        """Whether its likelihood jumps: at a moment of the record, or where a stem slips."""
+        return self.dated or self.needle
+
     def at_bound(self, point: FloatArray) -> bool:
         """Tell whether a figure lies on the bound of its range: then it is no figure."""
         return any(axis.bounds(v) for axis, v in zip(self.axes, point.tolist(), strict=True))

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
     Backlash,
@@ -83,12 +83,13 @@ class ValveCandidate(Candidate):
         low, high = run.model.limits[self.valve]
         rows = self.rows(points)
         parts = []
-        for part in run.runs.slices:
-            values = run.stems[part, self.valve]
+        every = run.runs.sample_time / run.runs.scanned
+        for part in map(run.runs.at_scans, run.runs.slices):
+            values = run.scanned[part, self.valve]
             start = self.starts(points, float(values[0]))
-            parts.append(self.kind.simulate_grid(rows, values, start, run.runs.sample_time))
+            parts.append(self.kind.simulate_grid(rows, values, start, every))
         stems = end_to_end(parts)
-        return np.clip(stems, low, high, out=stems)
+        return over_samples(np.clip(stems, low, high, out=stems), run.runs)
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         """Return where the stems stand before the first sample, shape (G,), %."""
@@ -123,6 +124,10 @@ class StictionCandidate(ValveCandidate):
 
     def count(self, point: FloatArray) -> int:
         return 2
+
+    @property
+    def stepped(self) -> bool:
+        return True
 
     def leaps(self, point: FloatArray) -> bool:
         return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])

@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, scanned_twice
+from stiction_ros.discrepancy.data.unrounded import unrounded
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
@@ -55,6 +56,8 @@ class ControllerCheck:
         clock_known: whether the record's clock of PV against OP is shown to be right.
         scans: of a controller that scans twice in a sample of the record; None of one that does
             not, or whose OP between the samples is not told.
+        finer: the OP that its law gives within the steps of the recorded one, %, shape (N, 1); None
+            where OP is not rounded, or no law tells it.
     """
 
     status: ControllerStatus
@@ -62,6 +65,13 @@ class ControllerCheck:
     left: float
     clock_known: bool
     scans: Scans | None = None
+    finer: FloatArray | None = None
+
+    def op(self, runs: Runs) -> FloatArray:
+        """Return the OP of the records as the law tells it, %, shape (N, m)."""
+        if self.scans is not None:
+            return self.scans.op
+        return runs.op if self.finer is None else self.finer
 
 
 def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], ...]:
@@ -72,12 +82,15 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
     chose are what they are, unless they lie finer than anybody chooses them. A controller that
     scans again between two samples holds another OP for half of them, which lies off the mean of
     its neighbours as far as a recorded one does off that of its own; that is asked only where no
-    PI law gives the recorded OP, or SP is not recorded.
+    PI law gives the recorded OP, or SP is not recorded. Where a law tells a rounded OP finer,
+    nothing acts beside it.
 
     Args:
         runs: the records.
         check: of the controller.
     """
+    if check.finer is not None:
+        return tuple(() for _ in runs.op.T)
     untold = any(record.sp is None for record in runs.records)
     given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
     asked = not given and check.left > EXACT and check.scans is None
@@ -112,6 +125,37 @@ def _chosen(values: FloatArray) -> float:
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
+    """Compare OP with a PI law, and tell a rounded OP finer by it."""
+    check = _compared(model, runs)
+    if check.status is not ControllerStatus.SAME or check.scans is not None:
+        return check
+    recorded = model.controller
+    if recorded is None:
+        law = _fit(model, runs, 0)
+        recorded = PiTuning(law.gain, law.integral_time)
+    return dataclasses.replace(check, finer=_finer(model, runs, recorded))
+
+
+def _finer(model: LoopModel, runs: Runs, tuning: PiTuning) -> FloatArray | None:
+    """Return a rounded OP as a law tells it, shape (N, 1); None where it does not."""
+    found, quantum = [], quantum_of(runs.op[:, 0])
+    if quantum <= 0.0:
+        return None
+    low, high = model.limits[0].tolist()
+    share = runs.sample_time / tuning.integral_time
+    slack = abs(tuning.gain) * (1.0 + share) * runs.lattices[0]
+    for record, rows in zip(runs.records, runs.slices, strict=True):
+        assert record.sp is not None
+        error = record.sp[:, record.outputs.index(model.outputs[0])] - runs.pv[rows, 0]
+        moves = tuning.gain * (np.diff(error) + share * error[1:])
+        finer = unrounded(runs.op[rows, 0], moves, slack, quantum, (low, high))
+        if finer is None:
+            return None
+        found.append(finer)
+    return np.concatenate(found)[:, None]
+
+
+def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     r"""Compare the moves of OP with :math:`K [(e_k - e_{k-1}) + (T_s/T_i) e_k]`.
 
     Without a recorded tuning, gain and integral time are fitted: then only the clock can be

@@ -35,6 +35,11 @@ class Scans:
     integral_time: float
     op: FloatArray
 
+    def each(self, recorded: FloatArray) -> FloatArray:
+        """Return the OPs of both scans of each sample, shape (2 N, 1), the recorded one first."""
+        both = np.stack([recorded, 2.0 * self.op - recorded], axis=1)
+        return np.asarray(both.reshape(-1, recorded.shape[1]))
+
 
 def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
     """Return the law of a controller that scans twice in a sample; None where none is seen.

@@ -11,6 +11,7 @@ import numpy as np
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.evolution import evolved
 from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.fit.settled import settled
 from stiction_ros.discrepancy.fit.shared_factors import shared_factors
@@ -32,10 +33,13 @@ SLOW, SLOWER = np.array([0.8]), np.array([0.95])
 SHRINK = 0.4
 VALLEYS, WIDE = 3, 0.15  # of a needle, that are searched over their whole length; in logarithms
 ALONG = 2000  # points in each
-THROWS = 10
+THROWS = 2
 THROWN = 400
 THROW_SHRINK = 0.7
 CENTRES = 5
+BOXES = (0.02, 0.1, 0.3, 1.0)  # in which a crowd begins, of the largest box
+IN_A_BOX = 1000
+CROWD, EVOLUTION, CROWDS = 250, 40, 2  # points, and rounds in which they move
 ROUNDS = 5
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
@@ -98,6 +102,8 @@ def fit_candidate(
             search.refine(centre, 0.7, ar)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
         search.scatter()
+        for _ in range(CROWDS):
+            search.evolve()
     if candidate.dated:
         if len(candidate.axes) > 1:
             search.polish()
@@ -244,6 +250,27 @@ class _Search:
             for ar in (np.zeros(0), SLOW):
                 self._judge_best(values, response, dict.fromkeys(response.outputs, ar))
             size *= THROW_SHRINK
+
+    def evolve(self) -> None:
+        """Let a crowd around the best point move on; what it ends in is judged."""
+        candidate, best = self.candidate, self.best()
+        ar = {i: noise.ar for i, noise in best.noise.items()}
+        halton = halton_sequence(len(candidate.axes), seed=0)
+        thrown = [
+            candidate.scattered(best.point, 2.0 * halton.random(IN_A_BOX) - 1.0, size)
+            for size in BOXES
+        ]
+        values = np.vstack([best.point[None, :], *thrown])
+        begun = np.array([candidate.coordinates(each) for each in values])
+        ends = np.array([[a.inner(a.low), a.inner(a.high)] for a in candidate.axes])
+
+        def loss(points: FloatArray) -> FloatArray:
+            response = candidate.respond(self.base.run, candidate.values(points))
+            return misfit(self.base, self.gap, response, ar)
+
+        points, losses = evolved(loss, begun, ends, CROWD, EVOLUTION)
+        for k in candidate.apart(points, losses, LEADERS):
+            self._try(points[k : k + 1])
 
     def _valleys(self) -> list[CandidateFit]:
         """Return the best fits so far, each in a valley of its own."""

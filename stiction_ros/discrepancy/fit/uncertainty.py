@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.fit.misfit_kernels import whitened_shifts
+from stiction_ros.discrepancy.fit.region import SMOOTH, Region
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.fit.settled import PROBE, settled
+from stiction_ros.discrepancy.fit.settled import PROBE
 from stiction_ros.discrepancy.fit.shared_factors import information, shared_factors
 from stiction_ros.discrepancy.likelihood.noise import (
     coloured,
@@ -24,40 +26,66 @@ from stiction_ros.discrepancy.likelihood.noise import (
 )
 from stiction_ros.effects import FloatArray
 
-CHI_SQUARE = 3.84  # 95 % of one degree of freedom
-NORMAL = 1.96
 TINY = 1e-300
-FIRST_BOX = 0.05  # of a step of the first grid
-BOXES = 10
-SCATTERED = 300
-SHOWN = 20
+AROUND = 16  # points of an ellipse
 BLOCK = 25
 DRAWS = 200
 
 Intervals = dict[str, tuple[float, float]]
 
 
-def likelihood_intervals(base: Baseline, fit: CandidateFit) -> Intervals:
+def likelihood_intervals(
+    base: Baseline, fit: CandidateFit, beside: Sequence[FloatArray] = ()
+) -> Intervals:
     """Return 95 % of each parameter by the likelihood, noise held at its best.
 
-    The region within 3.84 of the least −2 log likelihood is searched in boxes that grow or
-    shrink to it; factors of least squares add 1.96 standard errors, and so do figures in which
-    the response is a straight line, all others held.
+    What leaves −2 log likelihood within 3.84 of the least one is inside, factors of least squares
+    and searched figures together; the region of the searched ones is found by :class:`Region`.
+    Figures in which the response is a straight line have the ends of their parabola, all others
+    held.
+
+    Args:
+        base: of the model without the effect.
+        fit: the effect.
+        beside: per output what other effects may do otherwise, shape (N, q): their figures are
+            as little known as its own; empty where there are none.
     """
-    found: list[tuple[FloatArray, FloatArray]] = []
-    error = _factor_errors(base, fit)
-    for point in _region(base, fit):
-        factors = fit.factors
-        if len(fit.point) and len(factors):
-            factors = _factors_at(base, fit, point)
-        found.append((point, factors))
+    if len(beside):
+        columns = tuple(np.hstack(pair) for pair in zip(base.columns, beside, strict=True))
+        base = dataclasses.replace(base, columns=columns)
+    found: list[tuple[FloatArray, FloatArray]] = [(fit.point, fit.factors)]
+    region = Region.around(base, fit).shown()
+    for point, excess in zip(region.points, region.excess.tolist(), strict=True):
+        if not len(fit.factors) or excess > SMOOTH:
+            found.append((point, fit.factors))
+            continue
+        factors = _factors_at(base, fit, point) if len(point) or len(beside) else fit.factors
+        sides = math.sqrt(SMOOTH - excess) * _factor_sides(base, fit, point)
+        found += [(point, factors + side) for side in sides]
     found += [(point, fit.factors) for point in _linear_ends(base, fit)]
-    for sign in (-1.0, 1.0):
-        for d in range(len(error)):
-            moved = fit.factors.copy()
-            moved[d] += sign * NORMAL * error[d]
-            found.append((fit.point, moved))
     return _ends(base, fit.candidate, found)
+
+
+def otherwise(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
+    """Return per output what an effect would do by other figures, shape (N, q).
+
+    The ends of its region are such figures; those of least squares are columns already.
+
+    Args:
+        base: of the model without the effect.
+        fit: the effect.
+    """
+    columns = [np.zeros((len(base.run.runs), 0)) for _ in base.columns]
+    region = Region.around(base, fit)
+    if not fit.point.size or len(region.points) < 2:
+        return columns
+    ends = np.concatenate([region.points.argmin(axis=0), region.points.argmax(axis=0)])
+    points = np.vstack([fit.point[None, :], region.points[np.unique(ends)]])
+    response = fit.candidate.respond(base.run, points)
+    for i in response.outputs:
+        own = response.shifts[i] if i in response.shifts else response.sizes[i] @ fit.factors
+        columns[i] = own[:, 1:] - own[:, :1]
+    return columns
 
 
 def bootstrap_intervals(
@@ -66,6 +94,7 @@ def bootstrap_intervals(
     resamples: int,
     random: np.random.Generator,
     progress: Callable[[float], None] | None = None,
+    beside: Sequence[FloatArray] = (),
 ) -> Intervals:
     """Return 95 % of each parameter by resampled blocks of innovations.
 
@@ -87,7 +116,7 @@ def bootstrap_intervals(
         if progress is not None:
             progress((b + 1) / resamples)
     values = [_parameters(base, fit.candidate, *each) for each in found]
-    sure = likelihood_intervals(base, fit)
+    sure = likelihood_intervals(base, fit, beside)
     ends: Intervals = {}
     for key in values[0]:
         low, high = np.quantile([v[key] for v in values], [0.025, 0.975])
@@ -163,34 +192,6 @@ def _chance_gain(
     return np.asarray(len(drawn) * np.log(total / np.maximum(left, 1e-300)))
 
 
-def _region(base: Baseline, fit: CandidateFit) -> FloatArray:
-    """Return searched points that the likelihood does not reject, shape (K, axes).
-
-    Points are scattered in boxes that follow what is not rejected, as the likelihood of stems
-    that rest and slip has many narrow peaks.
-    """
-    axes = fit.candidate.axes
-    if not axes:
-        return np.zeros((1, 0))
-    centre = fit.candidate.coordinates(fit.point)
-    free = [d for d, a in enumerate(axes) if a.step > 0.0 and not a.linear]
-    if not free:
-        return fit.candidate.values(centre[None, :])
-    least = np.array([1.0 if axes[d].whole else 0.0 for d in free])
-    width = np.maximum([FIRST_BOX * axes[d].step for d in free], least)
-    halton = halton_sequence(len(free), seed=0)
-    points, scores = np.zeros((0, len(axes))), np.zeros(0)
-    for _ in range(BOXES):
-        thrown = np.tile(centre, (SCATTERED + 1, 1))
-        thrown[1:, free] += width * (2.0 * halton.random(SCATTERED) - 1.0)
-        tried = _scored(base, fit, thrown)
-        points, scores = np.vstack([points, tried[0]]), np.concatenate([scores, tried[1]])
-        kept = points[scores - scores.min() <= CHI_SQUARE]
-        reach = np.abs(kept[:, free] - centre[free]).max(axis=0, initial=0.0)
-        width = np.maximum(np.clip(1.5 * reach, 0.3 * width, 3.0 * width), least)
-    return fit.candidate.values(np.vstack([centre, _spread(kept)]))
-
-
 def _linear_ends(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
     """Return the ends of every linear figure, all others held, from its parabola of squares."""
     ends: list[FloatArray] = []
@@ -205,7 +206,7 @@ def _linear_ends(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
         scores = misfit(base, base.run.gap, fit.candidate.respond(base.run, tried), ar)
         low, middle, high = np.exp(np.clip((scores - scores[1]) / max(rows, 1), None, 500.0))
         bend = 0.5 * (low - 2.0 * middle + high)  # of the squares, as a share of the least
-        width = reach * np.sqrt(np.expm1(CHI_SQUARE / max(rows, 1)) / max(bend, TINY))
+        width = reach * np.sqrt(np.expm1(SMOOTH / max(rows, 1)) / max(bend, TINY))
         for side in (-width, width):
             end = fit.point.copy()
             end[d] = np.clip(end[d] + side, axis.low, axis.high)
@@ -214,34 +215,24 @@ def _linear_ends(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
     return ends
 
 
-def _scored(
-    base: Baseline, fit: CandidateFit, coordinates: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates, linear figures at their best, and the misfit there."""
-    ar = {i: noise.ar for i, noise in fit.noise.items()}
-    points = settled(base, base.run.gap, fit.candidate, coordinates, ar)
-    response = fit.candidate.respond(base.run, fit.candidate.values(points))
-    return points, misfit(base, base.run.gap, response, ar)
+def _factor_sides(base: Baseline, fit: CandidateFit, point: FloatArray) -> FloatArray:
+    """Return how far the factors are sure to one standard deviation, all around, shape (K, s).
 
-
-def _spread(points: FloatArray) -> FloatArray:
-    """Return the points that are extreme in one coordinate, and some between."""
-    ends = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
-    between = np.linspace(0, len(points) - 1, SHOWN).astype(int)
-    return np.asarray(points[np.unique(np.concatenate([ends, between]))])
-
-
-def _factor_errors(base: Baseline, fit: CandidateFit) -> FloatArray:
-    """Return the standard errors of the factors, shape (s,)."""
-    if not len(fit.factors):
-        return np.zeros(0)
-    response = fit.candidate.respond(base.run, fit.point[None, :])
+    Of two, as of a sine and its cosine, the whole ellipse: its size lies across both.
+    """
+    response = fit.candidate.respond(base.run, point[None, :])
     known = [
         information(sizes[:, 0], base.columns[i], fit.noise[i], base.blocks[i])
         for i, sizes in response.sizes.items()
     ]
-    inverse = np.linalg.pinv(np.sum(known, axis=0))
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)))
+    values, axes = np.linalg.eigh(np.linalg.pinv(np.sum(known, axis=0)))
+    root = axes * np.sqrt(np.maximum(values, 0.0))
+    if len(values) == 2:
+        turns = 2.0 * np.pi * np.arange(AROUND) / AROUND
+        return np.asarray(np.column_stack([np.cos(turns), np.sin(turns)]) @ root.T)
+    spread = np.sqrt(np.maximum(np.sum(root**2, axis=1), 0.0))
+    ends = (root @ root.T) / np.where(spread > 0.0, spread, 1.0)
+    return np.vstack([ends, -ends])
 
 
 def _factors_at(base: Baseline, fit: CandidateFit, point: FloatArray) -> FloatArray:

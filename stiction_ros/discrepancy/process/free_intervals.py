@@ -7,8 +7,9 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.region import SMOOTH
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.fit.uncertainty import CHI_SQUARE, Intervals
+from stiction_ros.discrepancy.fit.uncertainty import Intervals
 from stiction_ros.discrepancy.process.free_search import FreeSearch
 from stiction_ros.effects import FloatArray
 
@@ -57,4 +58,4 @@ def _region(
     boxes = [centre + scale * steps * mesh for scale in SCALES]
     grid = np.vstack([centre[None, :], *boxes])
     loss = FreeSearch(base, candidate, longest).loss_near(grid, fit.noise)
-    return candidate.values(grid[loss <= loss.min() + CHI_SQUARE])
+    return candidate.values(grid[loss <= loss.min() + SMOOTH])

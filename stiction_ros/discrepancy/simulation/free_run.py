@@ -45,6 +45,8 @@ class Runs:
         unseen: per valve what may act beside the recorded OP; empty where nothing does.
         between: per valve whether it is left open how late within a sample an effect that is added
             moves its stem; empty where that is not asked.
+        scans: OP at the two scans of each sample, shape (2 N, m), %; a stem slips by either. None
+            where a sample holds one OP.
     """
 
     records: tuple[Record, ...]
@@ -58,6 +60,16 @@ class Runs:
     lattices: tuple[float, ...]
     unseen: tuple[tuple[Unseen, ...], ...] = ()
     between: tuple[bool, ...] = ()
+    scans: FloatArray | None = None
+
+    @property
+    def scanned(self) -> int:
+        """Scans of a sample, each of which holds an OP of its own."""
+        return 1 if self.scans is None else 2
+
+    def at_scans(self, rows: slice) -> slice:
+        """Return where the scans of some rows are."""
+        return slice(self.scanned * rows.start, self.scanned * rows.stop)
 
     @property
     def sample_time(self) -> float:
@@ -134,7 +146,8 @@ class FreeRun:
     Attributes:
         model, runs: what runs, over what.
         leads: of valves whose last effect starts with its stem that far from OP, %.
-        stems: positions of the current model, shape (N, m), %.
+        scanned: positions of the current model at every scan, shape (scans N, m), %.
+        stems: their means over each sample, shape (N, m), %.
         loads: what enters the process beside them, shape (N, m), %.
         forced: outputs of the process, shape (N, p), but for the free columns.
         known: what disturbances and sensors of the current model add, shape (N, p).
@@ -157,9 +170,10 @@ class FreeRun:
         self.model, self.runs = model, runs
         self.leads = dict(leads or {})
         self.responses: Responses = responses_of(model.process, model.sample_time)
-        self.stems = np.column_stack(
+        self.scanned = np.column_stack(
             [self.valve_chain(j, valve.effects) for j, valve in enumerate(model.valves)]
         )
+        self.stems = over_samples(self.scanned, runs)
         self.loads = self._loads()
         self.forced = np.column_stack([self.drive(i)[:, 0] for i in range(len(model.outputs))])
         self.known = np.column_stack([self._known(i) for i in range(len(model.outputs))])
@@ -207,14 +221,15 @@ class FreeRun:
         return end_to_end(parts)
 
     def valve_chain(self, valve: int, effects: Sequence[Behaviour]) -> FloatArray:
-        """Return the stem of one valve, shape (N,), %, moved by the recorded OP."""
+        """Return the stem of one valve at every scan, %, moved by OP."""
         low, high = self.model.limits[valve]
-        stem = self.runs.op[:, valve].copy()
+        runs = self.runs
+        stem = (runs.op if runs.scans is None else runs.scans)[:, valve].copy()
         lead = self.leads.get(self.model.valves[valve].name, 0.0)
-        for rows in self.runs.slices:
+        for rows in map(runs.at_scans, runs.slices):
             for k, effect in enumerate(effects):
                 first = float(stem[rows.start]) + (lead if k == len(effects) - 1 else 0.0)
-                stem[rows] = effect.simulate(stem[rows], first, self.runs.sample_time)
+                stem[rows] = effect.simulate(stem[rows], first, runs.sample_time / runs.scanned)
         return np.asarray(np.clip(stem, low, high))
 
     def _free(self, output: int) -> FloatArray:
@@ -278,6 +293,13 @@ class FreeRun:
             if not effect.in_values:
                 shown = effect.simulate(shown, float(shown[0]), self.runs.sample_time)
         return np.asarray(shown - values)
+
+
+def over_samples(values: FloatArray, runs: Runs) -> FloatArray:
+    """Return the means over each sample, shape (N, G), of values at every scan."""
+    if runs.scans is None:
+        return values
+    return np.asarray(values.reshape(len(runs), runs.scanned, -1).mean(axis=1))
 
 
 def moves_on(model: LoopModel, output: int, valve: int) -> bool:

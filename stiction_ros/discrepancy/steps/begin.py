@@ -52,7 +52,8 @@ def begin(
     data = (*((found,) if found else ()), *gate.findings)
     runs = dataclasses.replace(
         corrected(runs, found),
-        op=runs.op if controller.scans is None else controller.scans.op,
+        op=controller.op(runs),
+        scans=None if controller.scans is None else controller.scans.each(runs.op),
         unseen=unseen_of(runs, controller),
         between=() if options.free_process else _between(model),
     )

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stiction_ros.discrepancy.answer.doubts import behind_slope, without_its_jump
 from stiction_ros.discrepancy.answer.found_effects import (
     FoundEffect,
     holds_nothing_out,
@@ -28,6 +29,7 @@ from stiction_ros.discrepancy.fit.uncertainty import (
     Intervals,
     bootstrap_intervals,
     likelihood_intervals,
+    otherwise,
 )
 from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
 from stiction_ros.discrepancy.gap.noise_check import (
@@ -45,7 +47,7 @@ from stiction_ros.discrepancy.steps.look import explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import whole, with_laws
-from stiction_ros.effects import from_mapping
+from stiction_ros.effects import FloatArray, from_mapping
 
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ
@@ -168,15 +170,42 @@ def _effect(task: Task, state: State, k: int, effect: AddedEffect) -> FoundEffec
 
 
 def _intervals(task: Task, state: State, k: int, effect: AddedEffect, base: Baseline) -> Intervals:
+    beside = _beside(task, state, k)
     if task.options.quick:
-        found = likelihood_intervals(base, effect.fit)
+        found = likelihood_intervals(base, effect.fit, beside)
     else:
+        share = _share(task, state, k)
         found = bootstrap_intervals(
-            base, effect.fit, task.options.resamples, task.random, _share(task, state, k)
+            base, effect.fit, task.options.resamples, task.random, share, beside
         )
+    found = without_its_jump(found, effect)
+    if effect.place.startswith("load"):
+        found = behind_slope(found, _slope(state))
     if not task.options.free_process:
         return found
     return with_free_process(found, base, effect.fit, task.longest)
+
+
+def _beside(task: Task, state: State, k: int) -> list[FloatArray]:
+    """Return per output what all else would do by other figures, shape (N, q).
+
+    That is all other effects, and what of the process was changed.
+    """
+    others = [
+        otherwise(state.beside(task.runs, j), each.fit)
+        for j, each in enumerate(state.added)
+        if j != k
+    ]
+    if state.slopes:
+        others.append(list(state.slopes))
+    return [np.hstack(columns) for columns in zip(*others, strict=True)]
+
+
+def _slope(state: State) -> float:
+    """Return the gain that stands beside the curve of a valve; 1 where there is no curve."""
+    curved = any(each.fit.candidate.curved for each in state.added)
+    gains = [each.value for each in state.changes if each.what == "gain"]
+    return gains[0] if curved and len(gains) == 1 else 1.0
 
 
 def _share(task: Task, state: State, k: int) -> Callable[[float], None]:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from gap_loops import loop, record, without_controller
 
+from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
 from stiction_ros.discrepancy.data.controller_check import check_controller
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.data.scans import scanned_twice
-from stiction_ros.discrepancy.simulation.free_run import Runs
-from stiction_ros.effects import FloatArray
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
+from stiction_ros.effects import FloatArray, HeStiction
 from stiction_ros.loop import LoopModel, PiTuning
 
 EVERY = 2
@@ -46,6 +47,26 @@ def test_the_op_between_two_samples_is_told_by_those_beside_it(known: bool) -> N
     assert found.gain == pytest.approx(0.8, rel=1e-6 if known else 0.03)
     left = np.std(found.op[:-1, 0] - mean[:-1])
     assert left < (1e-6 if known else 0.2) * np.std(runs.op[:-1, 0] - mean[:-1])
+
+
+def test_a_stem_slips_by_the_op_of_either_scan() -> None:
+    runs, model, _ = thinned()
+    found = scanned_twice(model, runs)
+    assert found is not None
+    runs = dataclasses.replace(runs, op=found.op, scans=found.each(runs.op))
+    assert runs.scans is not None
+    assert runs.scans.reshape(-1, 2).mean(axis=1) == pytest.approx(found.op[:, 0])
+    friction = HeStiction(1.0, 0.6)
+    moved = friction.simulate(runs.scans[:, 0]).reshape(-1, 2).mean(axis=1)
+    held = friction.simulate(runs.op[:, 0])
+    assert np.abs(moved - held).max() > 0.2
+    sticky = FreeRun(model.with_effect("valve:V1", friction), runs)
+    assert sticky.stems[:, 0] == pytest.approx(moved)
+    bare = FreeRun(model, runs)
+    assert bare.stems == pytest.approx(found.op)
+    candidate = next(c for c in valve_candidates(bare) if c.law == "he")
+    assert isinstance(candidate, ValveCandidate)
+    assert candidate.stems(bare, np.array([[1.0, 0.6, 0.0]]))[:, 0] == pytest.approx(moved)
 
 
 def test_its_recorded_tuning_is_no_other_one() -> None:

@@ -1,0 +1,80 @@
+"""How sure figures are: together, all around, and where the likelihood jumps."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from gap_loops import loop, record
+
+from stiction_ros.discrepancy.candidate.wave import DisturbanceCandidate
+from stiction_ros.discrepancy.candidate.waves import SineWave, StepWave
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.evolution import evolved
+from stiction_ros.discrepancy.fit.region import SMOOTH, STEPPED, Region
+from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
+from stiction_ros.discrepancy.fit.uncertainty import likelihood_intervals
+from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
+from stiction_ros.effects import FloatArray
+
+PERIOD = 40.0
+
+
+def base_beside(added: FloatArray) -> Baseline:
+    model = loop()
+    runs = join_records(model, [record(model)])
+    runs = dataclasses.replace(runs, pv=runs.pv + added[:, None])
+    return Baseline.of(FreeRun(model, runs))
+
+
+def sine(phase: float) -> tuple[Baseline, CandidateFit]:
+    time = np.arange(900.0)
+    base = base_beside(0.3 * np.sin(2.0 * math.pi * time / PERIOD + phase))
+    wave = SineWave.of(base.run, np.array([1.0 / PERIOD]))
+    return base, fit_candidate(base, base.run.gap, DisturbanceCandidate.on(base.run, 0, wave))
+
+
+def step() -> tuple[Baseline, CandidateFit]:
+    base = base_beside(np.where(np.arange(900) >= 400, 0.3, 0.0))
+    candidate = DisturbanceCandidate.on(base.run, 0, StepWave.of(base.run, np.array([400.0])))
+    return base, fit_candidate(base, base.run.gap, candidate)
+
+
+def test_the_size_of_a_sine_is_as_sure_at_any_phase() -> None:
+    widths = []
+    for phase in (0.0, 0.25 * math.pi, 0.5 * math.pi):
+        base, fit = sine(phase)
+        low, high = likelihood_intervals(base, fit)["amplitude"]
+        assert low < 0.3 < high
+        widths.append(high - low)
+    assert widths == pytest.approx([widths[0]] * 3, rel=0.15)
+
+
+def test_what_another_effect_may_do_otherwise_makes_a_size_less_sure() -> None:
+    base, fit = step()
+    low, high = likelihood_intervals(base, fit)["size"]
+    ramp = np.clip((np.arange(900.0) - 300.0) / 200.0, 0.0, 1.0)[:, None]
+    less = likelihood_intervals(base, fit, [ramp])["size"]
+    assert less[0] < low < high < less[1]
+    assert less[1] - less[0] > 1.5 * (high - low)
+
+
+def test_the_bound_of_a_moment_is_that_of_a_step() -> None:
+    base, fit = step()
+    assert SMOOTH < Region.around(base, fit).excess.max() <= STEPPED
+    base, fit = sine(0.0)
+    assert 0.5 * SMOOTH < Region.around(base, fit).excess.max() <= SMOOTH
+
+
+def test_a_crowd_finds_a_needle_behind_a_good_point() -> None:
+    def loss(points: FloatArray) -> FloatArray:
+        across, along = points[:, 0] - points[:, 1], points[:, 0] - 0.7
+        valley = 5.0 + 4000.0 * np.abs(across) + 100.0 * np.abs(along)
+        lone = 50.0 + 1e5 * np.abs(points - 0.2).max(axis=1)  # found first, and no better one near
+        return np.minimum(valley, lone)
+
+    begun = np.vstack([[[0.2, 0.2]], np.random.default_rng(1).random((400, 2))])
+    ends = np.array([[0.0, 1.0], [0.0, 1.0]])
+    points, losses = evolved(loss, begun, ends, 100, 40)
+    assert losses == pytest.approx(loss(points))
+    assert points[np.argmin(losses)] == pytest.approx(0.7, abs=0.01)
