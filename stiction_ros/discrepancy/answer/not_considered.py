@@ -16,7 +16,7 @@ ALONE = (
 )
 ABSORBED = "the process is fitted anew, which does as well"
 NO_ROOM = (
-    "these records cannot show it: no signal moves where it acts, or no size of it is possible there"
+    "these records cannot show it: no signal moves where it acts, or no size of it is possible"
 )
 
 

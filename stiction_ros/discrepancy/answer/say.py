@@ -108,6 +108,8 @@ def reason_for(effect: AddedEffect, looks: Sequence[Look]) -> str:
     if second.evidence <= 0.0:
         return f"{gained}; no other effect gains anything"
     rival = called(second.candidate.place, second.candidate.effect, second.candidate.law)
+    if second.evidence > own.evidence:  # it came in when others were known
+        return f"{gained}; {rival} gained more before the other effects were in the model"
     return f"{gained}, the next best ({rival}) {second.evidence:.0f}"
 
 

@@ -108,6 +108,11 @@ def test_no_jump_is_backlash() -> None:
     assert (answer.verdict, answer.chosen.candidate.effect) == (GapVerdict.NAMED, "backlash")
 
 
+def test_a_jump_that_gains_more_than_chance_is_not_absent() -> None:
+    answer = said(fit("valve:V1", "stiction", 86.0), fit("valve:V1", "backlash", 90.0))
+    assert answer.alternatives == (("valve:V1", "stiction"),)
+
+
 def test_a_doubtful_jump_names_the_family() -> None:
     answer = said(fit("valve:V1", "stiction", 90.0), fit("valve:V1", "backlash", 89.0))
     assert answer.alternatives == (("valve:V1", "backlash"),)

@@ -1,0 +1,60 @@
+"""Why an effect was chosen, in one sentence."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from stiction_ros.discrepancy.answer.say import reason_for
+from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.effects import Behaviour, FloatArray
+
+
+class Named(Candidate):
+    """A candidate that is only a name."""
+
+    def respond(self, run: FreeRun, points: FloatArray) -> Response:
+        raise NotImplementedError
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour | None:
+        raise NotImplementedError
+
+
+def fit(effect: str, delta_bic: float) -> CandidateFit:
+    candidate = Named(place="valve:V1", effect=effect, axes=())
+    return CandidateFit(candidate, np.zeros(0), np.zeros(0), {}, delta_bic, 0.0)
+
+
+def look(chosen: CandidateFit, *others: CandidateFit) -> Any:
+    """Return what a sentence needs of a look."""
+    fits = (chosen, *others)
+
+    def of(place: str, effect: str) -> CandidateFit | None:
+        return next((f for f in fits if f.candidate.key == (place, effect)), None)
+
+    return SimpleNamespace(
+        scores=SimpleNamespace(fits=fits, of=of), decision=SimpleNamespace(chosen=chosen)
+    )
+
+
+@pytest.mark.parametrize(
+    ("rival", "said"),
+    [
+        (60.0, "It gains 80 BIC over no effect, the next best (lag of valve V1) 60"),
+        (-1.0, "It gains 80 BIC over no effect; no other effect gains anything"),
+        (
+            95.0,
+            "It gains 80 BIC over no effect; lag of valve V1 gained more before the other effects "
+            "were in the model",
+        ),
+    ],
+)
+def test_a_rival_is_the_next_best_or_gained_more_before(rival: float, said: str) -> None:
+    own, other = fit("slew", 80.0), fit("lag", rival)
+    added = cast("Any", SimpleNamespace(fit=own, alternatives=()))
+    assert reason_for(added, [look(own, other)]) == said
