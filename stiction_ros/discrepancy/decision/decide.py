@@ -55,6 +55,8 @@ class Decision:
         inseparable: whether the alternatives are its twins or its family, so that adding it
             serves for all of them.
         reason: one sentence.
+        lent: of an unknown gap, the candidate that gains most and that the held-out rows refuse:
+            what is not yet in the model may be why. None where there is none.
     """
 
     verdict: GapVerdict
@@ -62,6 +64,12 @@ class Decision:
     alternatives: tuple[tuple[str, str], ...]
     inseparable: bool
     reason: str
+    lent: CandidateFit | None = None
+
+    @property
+    def tried(self) -> CandidateFit | None:
+        """The candidate that is added to the model, for good or for a while."""
+        return self.chosen or self.lent
 
 
 def decide(
@@ -85,16 +93,19 @@ def decide(
     kept = [f for f in passed if confirmed(f)]
     outside = [f for f in ranked if not f.candidate.inside and confirmed(f)]
     stranger = outside[0] if outside else None
+    sure = bool(passed) and passed[0].evidence >= threshold + SURE
+    refused = passed[0] if sure and not confirmed(passed[0]) else None
+    lent = refused if stranger is None or _beats(refused, stranger) else None
     if not kept:
         if stranger is not None and stranger.evidence >= threshold + margin:
-            return _unknown(stranger, "nothing in the catalogue explains the gap")
-        if passed and passed[0].evidence >= threshold + SURE:
-            return _unknown(passed[0], "the held-out rows do not confirm it")
+            return _unknown(stranger, "nothing in the catalogue explains the gap", lent)
+        if refused is not None:
+            return _unknown(refused, "the held-out rows do not confirm it", lent)
         reason = "the held-out rows do not confirm it" if passed else "nothing beats no effect"
         return Decision(GapVerdict.NONE, None, (), False, reason)
     best = kept[0]
     if stranger is not None and stranger.evidence > best.evidence and not _part(best, stranger):
-        return _unknown(stranger, f"{best.candidate.name} explains less of the gap")
+        return _unknown(stranger, f"{best.candidate.name} explains less of the gap", lent)
     best, family = friction_kind(best, ranked, departures)
     rivals = [
         f
@@ -149,14 +160,19 @@ def on_the_way(place: str, effect: str) -> bool:
     )
 
 
-def _unknown(stranger: CandidateFit, reason: str) -> Decision:
+def _unknown(stranger: CandidateFit, reason: str, lent: CandidateFit | None) -> Decision:
     return Decision(
         GapVerdict.UNKNOWN,
         None,
         (),
         False,
         f"{stranger.candidate.name} would explain the gap by {stranger.evidence:.0f}; {reason}",
+        lent,
     )
+
+
+def _beats(fit: CandidateFit | None, other: CandidateFit) -> bool:
+    return fit is not None and fit.evidence > other.evidence
 
 
 def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:

@@ -66,7 +66,13 @@ class Extension:
 
 
 def extend(
-    bare: LoopModel, runs: Runs, added: Sequence[AddedEffect], new: AddedEffect, base: Baseline
+    bare: LoopModel,
+    runs: Runs,
+    added: Sequence[AddedEffect],
+    new: AddedEffect,
+    base: Baseline,
+    *,
+    lent: bool = False,
 ) -> Extension:
     """Add an effect, fit all added effects together, and see whether the gap has shrunk.
 
@@ -76,11 +82,12 @@ def extend(
         added: effects of earlier looks.
         new: the one to be added.
         base: of the model with ``added``.
+        lent: whether it is added for a while, though the held-out rows refuse it.
     """
     effects = refit_together(bare, runs, [*added, new])
     worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
     after_base = base_with(bare, runs, worth)
-    trouble = _trouble(base, after_base, new.fit.candidate.dated)
+    trouble = "" if lent else _trouble(base, after_base, new.fit.candidate.dated)
     trouble = trouble or _stem_trouble(base, after_base, new.place)
     if trouble:
         return Extension(tuple(added), base, False, trouble)

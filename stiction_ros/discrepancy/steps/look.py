@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.decision.chance import stored_threshold
-from stiction_ros.discrepancy.decision.decide import Decision, decide
+from stiction_ros.discrepancy.decision.decide import Decision, borne_out, decide
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
@@ -20,6 +20,7 @@ from stiction_ros.discrepancy.decision.extend import (
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
 from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
 from stiction_ros.discrepancy.decision.testable import testable_effects
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import chance_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
@@ -53,8 +54,9 @@ def look_on(task: Task, state: State) -> State:
     """Look until nothing more is found; what takes the free run away from PV is taken back.
 
     An effect that is in doubt with others is added for a while: its rivals may be near only beside
-    what is not yet in the model. Where nothing more is found, or all together leaves more than the
-    declared noise, it is taken back.
+    what is not yet in the model. So is one that gains most and that the held-out rows refuse: what
+    is not yet in the model may be why. Where nothing more is found, or all together leaves more
+    than the declared noise, it is taken back.
     """
     state = dataclasses.replace(state, testable=())
     for k in range(len(state.added), task.options.most_effects):
@@ -102,8 +104,14 @@ def explained(state: State) -> bool:
         return True
     if len(state.added) < 2 or max(state.base.run.runs.thinned) > 0.0:
         return False
+    if state.doubted.looks[-1].decision.lent and not _borne_out(state.doubted.base, state.base):
+        return False
     gained = state.doubted.base.score - state.base.score
     return gained > max(state.base.score_under_declared - state.base.score, 0.0)
+
+
+def _borne_out(base: Baseline, after_base: Baseline) -> bool:
+    return borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated=False)
 
 
 def withdrawn(task: Task, state: State) -> State:
@@ -177,20 +185,23 @@ def _extended(
     None where none may be added.
     """
     chosen = decision.chosen
+    lent = chosen is None and state.doubted is None and not task.options.free_process
+    if lent:
+        chosen = decision.lent
     if chosen is None or (task.options.free_process and not decision.inseparable):
         return state, None
     behaviour = chosen.behaviour(state.base.run)
     assert behaviour is not None
     room, new = made_room(task, state, AddedEffect(chosen, behaviour, decision.alternatives))
     bare = scored.models.get(chosen.candidate.key, room.bare)
-    return room, extend(bare, task.runs, room.added, new, state.base)
+    return room, extend(bare, task.runs, room.added, new, state.base, lent=lent)
 
 
 def _grown(state: State, scored: Scored, decision: Decision, step: Extension) -> State:
     """Return the state with the effects of an extension."""
-    assert decision.chosen is not None
-    key = decision.chosen.candidate.key
-    gained = {key: decision.chosen.delta_bic} if scored.models else {}
+    assert decision.tried is not None
+    key = decision.tried.candidate.key
+    gained = {key: decision.tried.delta_bic} if scored.models else {}
     return dataclasses.replace(
         state,
         bare=scored.models.get(key, state.bare),

@@ -21,6 +21,9 @@ from stiction_ros.discrepancy.process.change import (
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.loop import LoopModel
 
+INEXACT = 0.01
+"""Share of what all effects gain that each has to gain beside the margin: no plant obeys a law to
+the letter, and what the law misses weighs the more the more it explains."""
 LAWS = 100.0  # BIC that a law of the noise may gain over an autoregression
 Keys = tuple[tuple[str, str], ...]
 SINGLES = 4  # effects of the first look that are tried alone against several together
@@ -90,26 +93,27 @@ def best_whole(
         runs: the records.
         added: what was found, one after the other.
         singles: effects of the first look that may explain alone what took several.
-        margin: that every further effect has to gain.
+        margin: that every further effect has to gain, beside a share of what all gain.
     """
-    tried = [whole(bare, runs, added)]
+    tried, price = [whole(bare, runs, added)], margin
     if added:
         tried.append(whole(bare, runs, ()))
     if len(added) > 1:
+        price += INEXACT * max(tried[1].score - tried[0].score, 0.0)
         for count in range(1, len(added)):
             for part in itertools.combinations(added, count):
                 tried.append(whole(bare, runs, refit_together(bare, runs, part)))
         known = {each.fit.candidate.key for each in added}
         others = [each for each in singles if each.fit.candidate.key not in known][:SINGLES]
         tried += [whole(bare, runs, [alone]) for alone in others]
-    least = min(each.worth(margin) for each in tried)
+    least = min(each.worth(price) for each in tried)
     loads = not any(on_the_way(each.place, each.effect) for each in added)
     near = [
         with_laws(each)
         for each in tried
-        if each.worth(margin) < least + LAWS or (loads and not each.effects)
+        if each.worth(price) < least + LAWS or (loads and not each.effects)
     ]
-    best = min(near, key=lambda each: each.worth(margin))
+    best = min(near, key=lambda each: each.worth(price))
     if not best.effects and best.laws:
         return _as_well_as_noise(best, near, margin)
     if len(best.effects) != 1 or len(added) < 2:

@@ -277,3 +277,15 @@ def test_values_between_kept_ones_are_no_evidence() -> None:
     (share,) = kept.gate.thinned
     assert 0.6 < share < 0.8
     assert answered(828).verdict is GapVerdict.NONE  # healthy
+
+
+def test_an_effect_that_held_out_rows_refuse_is_right_beside_what_was_missing() -> None:
+    answer = answered(510002, family="two")  # a step of the load moves the rows that are held out
+    assert names(answer) == [("valve:V1", "characteristic"), ("load:V1", "step")]
+    assert not answer.looks[0].decision.chosen
+    assert answer.looks[0].kept
+
+
+def test_a_hundredth_of_what_a_law_explains_is_no_second_effect() -> None:
+    answer = answered(400115)  # a slew between samples; a square makes up for what is left of it
+    assert names(answer) == [("valve:V1", "slew")]

@@ -96,6 +96,21 @@ def test_a_better_rival_outside_the_catalogue_is_unknown() -> None:
     assert answer.verdict is GapVerdict.UNKNOWN
 
 
+def test_what_gains_most_and_held_out_rows_refuse_is_lent() -> None:
+    refused = fit("process:PV1", "gain", 120.0, held=-5.0)
+    answer = said(refused)
+    assert (answer.verdict, answer.chosen, answer.tried) == (GapVerdict.UNKNOWN, None, refused)
+
+
+def test_what_a_rival_outside_the_catalogue_beats_is_not_lent() -> None:
+    refused = fit("process:PV1", "gain", 120.0, held=-5.0)
+    stranger = fit("process:PV1", "gain that changes", 140.0, inside=False)
+    step = fit("load:V1", "step", 30.0)
+    assert said(refused, stranger, step).tried is None
+    less = dataclasses.replace(stranger, delta_bic=100.0)
+    assert said(refused, less, step).tried is refused
+
+
 def test_a_clear_jump_is_stiction() -> None:
     answer = said(fit("valve:V1", "stiction", 91.0), fit("valve:V1", "backlash", 80.0))
     assert answer.chosen is not None
