@@ -287,5 +287,6 @@ def test_an_effect_that_held_out_rows_refuse_is_right_beside_what_was_missing() 
 
 
 def test_a_hundredth_of_what_a_law_explains_is_no_second_effect() -> None:
-    answer = answered(400115)  # a slew between samples; a square makes up for what is left of it
-    assert names(answer) == [("valve:V1", "slew")]
+    answer = answered(500443)  # OP is rounded; a square makes up for what is left of a triangle
+    assert names(answer) == [("disturbance:PV1", "triangle")]
+    assert not answer.effects[0].alternatives
