@@ -21,6 +21,7 @@ WIDEST = 10.0  # times the range of its signal that an interval of a size may be
 WHOLE = 0.95  # of a range of search: an interval that wide holds nothing out
 NO_MEMORY = np.zeros(0)
 SIZES = ("size", "rate", "amplitude")
+FACTOR = "factor"  # of a gain, 1 where it is the model's
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,6 +166,8 @@ def holds_nothing_out(
     span = float(np.ptp(signal))
     lasts = float(run.runs.time.max())
     for key, (low, high) in intervals.items():
+        if key == FACTOR and low <= 1.0 <= high:
+            return True
         if key in SIZES and candidate.factors:  # of a wave or a walk; a slew has a rate of its own
             reach = span / lasts if key == "rate" else span
             if low <= 0.0 <= high:
