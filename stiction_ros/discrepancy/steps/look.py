@@ -104,9 +104,12 @@ def explained(state: State) -> bool:
         return True
     if len(state.added) < 2 or max(state.base.run.runs.thinned) > 0.0:
         return False
-    if state.doubted.looks[-1].decision.lent and not _borne_out(state.doubted.base, state.base):
-        return False
     gained = state.doubted.base.score - state.base.score
+    refused = state.doubted.looks[-1]
+    if refused.decision.lent is not None:
+        rivals = [fit.evidence for fit in refused.scores.fits if not fit.candidate.inside]
+        if gained < max(rivals, default=0.0) or not _borne_out(state.doubted.base, state.base):
+            return False
     return gained > max(state.base.score_under_declared - state.base.score, 0.0)
 
 
