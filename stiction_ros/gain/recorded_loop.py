@@ -36,6 +36,7 @@ from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.repeated_runs import controllers_of, period_of
 from stiction_ros.identification.closed_loop.scaled_loop import (
+    EXACT,
     ScaledLoop,
     free_run,
     scaled,
@@ -98,7 +99,7 @@ class RecordedLoop:
         """
         if found.status is not FitStatus.OK:
             raise InputError(f"there is no model to simulate: {found.reason}", where=record.name)
-        loop = scaled(record, found.stem)
+        loop = scaled(record, found.stem, EXACT)
         if loop is None:
             raise InputError("OP or PV does not move in automatic", where=record.name)
         chosen = _chosen(found, valve, record)

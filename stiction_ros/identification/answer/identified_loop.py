@@ -11,7 +11,12 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.closed_loop.scaled_loop import free_run, scaled, scaled_process
+from stiction_ros.identification.closed_loop.scaled_loop import (
+    EXACT,
+    free_run,
+    scaled,
+    scaled_process,
+)
 from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
@@ -148,7 +153,7 @@ def _output(model: OutputModel, bias: float, white: float) -> dict[str, Any]:
 
 def _rests(record: Record, found: Identification) -> FloatArray:
     """Return what the process, driven by the estimated stems, leaves of PV, shape (N, p)."""
-    loop = scaled(record, found.stem)
+    loop = scaled(record, found.stem, EXACT)
     if loop is None:
         raise InputError("OP or PV does not move in automatic", where=record.name)
     run = free_run(scaled_process(found.outputs, record.valves, loop), loop, loop.stem)

@@ -16,7 +16,7 @@ from stiction_ros.identification.closed_loop.oscillation import (
     oscillation,
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.closed_loop.scaled_loop import DIGITS, ScaledLoop, free_run
+from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
 from stiction_ros.identification.result.identification import ValveEstimate
 
 STARTS = (0.2, 0.5, 0.8)
@@ -98,7 +98,7 @@ class Repeated:
         return cls(
             loop,
             process,
-            np.round(frictions / loop.op_scale[:, None, None], DIGITS),
+            np.round(frictions / loop.op_scale[:, None, None], loop.digits),
             pairs,
             tuple(periods),
             simulated,

@@ -17,8 +17,10 @@ from stiction_ros.identification.result.identification import OutputModel
 from stiction_ros.records.record import Record
 
 DIGITS = 7
-"""Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bit of
-a unit would make another run of it."""
+"""Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bits of
+a unit would make another run of it, and with it another verdict."""
+EXACT = 9
+"""Decimals where a run has to repeat the record: frictions lie as close to what OP passes."""
 
 LONGEST = 20_000
 """Samples of a record that are looked at: thousands of cycles say no more than hundreds."""
@@ -35,6 +37,7 @@ class ScaledLoop:
         stretches: first sample of each stretch in automatic and the one behind its last.
         op_mean, op_scale: shape (m,), %.
         pv_mean, pv_scale: shape (p,), engineering units.
+        digits: decimals that are kept of what is scaled alike.
     """
 
     op: FloatArray
@@ -46,6 +49,7 @@ class ScaledLoop:
     op_scale: FloatArray
     pv_mean: FloatArray
     pv_scale: FloatArray
+    digits: int = DIGITS
 
     @property
     def longest(self) -> tuple[int, int]:
@@ -53,11 +57,12 @@ class ScaledLoop:
         return max(self.stretches, key=lambda stretch: stretch[1] - stretch[0])
 
 
-def scaled(record: Record, stem: FloatArray) -> ScaledLoop | None:
+def scaled(record: Record, stem: FloatArray, digits: int = DIGITS) -> ScaledLoop | None:
     """Return the usable samples, the last ``LONGEST`` of a longer record.
 
     Args:
         stem: estimated stems, shape (N, m), %.
+        digits: decimals that are kept.
 
     Returns:
         None when nothing is usable, or a signal does not move at all.
@@ -73,15 +78,16 @@ def scaled(record: Record, stem: FloatArray) -> ScaledLoop | None:
     if min(op_scale.min(), pv_scale.min()) <= 0.0:
         return None
     return ScaledLoop(
-        np.round((part.op - op_mean) / op_scale, DIGITS),
-        np.round((stem[first:] - op_mean) / op_scale, DIGITS),
-        np.round((part.pv - pv_mean) / pv_scale, DIGITS),
-        None if part.sp is None else np.round((part.sp - pv_mean) / pv_scale, DIGITS),
+        np.round((part.op - op_mean) / op_scale, digits),
+        np.round((stem[first:] - op_mean) / op_scale, digits),
+        np.round((part.pv - pv_mean) / pv_scale, digits),
+        None if part.sp is None else np.round((part.sp - pv_mean) / pv_scale, digits),
         stretches,
         op_mean,
         op_scale,
         pv_mean,
         pv_scale,
+        digits,
     )
 
 
@@ -103,7 +109,7 @@ def scaled_process(
             bias[i] += b[i, j].sum() * loop.op_mean[j]
         b[i] *= loop.op_scale[:, None] / loop.pv_scale[i]
         bias[i] /= loop.pv_scale[i]
-    return Process(a, np.round(b, DIGITS + 3), delay, np.round(bias, DIGITS))
+    return Process(a, np.round(b, loop.digits + 3), delay, np.round(bias, loop.digits))
 
 
 def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray:
