@@ -15,6 +15,7 @@ from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
+from stiction_ros.records import Record
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
@@ -127,7 +128,8 @@ def _chosen(values: FloatArray) -> float:
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
     """Compare OP with a PI law, and tell a rounded OP finer by it."""
     check = _compared(model, runs)
-    if check.status is not ControllerStatus.SAME or check.scans is not None:
+    same = check.status is ControllerStatus.SAME and check.scans is None
+    if not same or quantum_of(runs.op[:, 0]) <= 0.0:
         return check
     recorded = model.controller
     if recorded is None:
@@ -139,15 +141,11 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
 def _finer(model: LoopModel, runs: Runs, tuning: PiTuning) -> FloatArray | None:
     """Return a rounded OP as a law tells it, shape (N, 1); None where it does not."""
     found, quantum = [], quantum_of(runs.op[:, 0])
-    if quantum <= 0.0:
-        return None
     low, high = model.limits[0].tolist()
-    share = runs.sample_time / tuning.integral_time
-    slack = abs(tuning.gain) * (1.0 + share) * runs.lattices[0]
+    slack = abs(tuning.gain) * (1.0 + runs.sample_time / tuning.integral_time) * runs.lattices[0]
+    law = np.array([tuning.gain, tuning.gain / tuning.integral_time])
     for record, rows in zip(runs.records, runs.slices, strict=True):
-        assert record.sp is not None
-        error = record.sp[:, record.outputs.index(model.outputs[0])] - runs.pv[rows, 0]
-        moves = tuning.gain * (np.diff(error) + share * error[1:])
+        moves = _terms(model, runs, record, rows) @ law
         finer = unrounded(runs.op[rows, 0], moves, slack, quantum, (low, high))
         if finer is None:
             return None
@@ -237,16 +235,21 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
     low, high = model.limits[0]
     moves, columns = [], []
     for record, rows in zip(runs.records, runs.slices, strict=True):
-        assert record.sp is not None
         op = runs.op[rows, 0]
         count = len(op) - shift
-        sp = record.sp[:count, record.outputs.index(model.outputs[0])]
-        error = sp - runs.pv[rows, 0][shift:]
         inside = (op[1:count] > low) & (op[1:count] < high)
-        part = np.column_stack([np.diff(error), runs.sample_time * error[1:]])
         moves.append(np.diff(op[:count])[inside])
-        columns.append(part[inside])
+        columns.append(_terms(model, runs, record, rows, shift)[inside])
     return np.concatenate(moves), np.vstack(columns)
+
+
+def _terms(model: LoopModel, runs: Runs, record: Record, rows: slice, shift: int = 0) -> FloatArray:
+    """Return (e_k − e_{k−1}, T_s e_k) of one record from its second sample on, shape (n, 2)."""
+    assert record.sp is not None
+    pv = runs.pv[rows, 0]
+    sp = record.sp[: len(pv) - shift, record.outputs.index(model.outputs[0])]
+    error = sp - pv[shift:]
+    return np.column_stack([np.diff(error), runs.sample_time * error[1:]])
 
 
 def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:

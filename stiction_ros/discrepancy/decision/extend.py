@@ -87,7 +87,9 @@ def extend(
     effects = refit_together(bare, runs, [*added, new])
     worth = [e for e in effects if e is effects[-1] or e.fit.delta_bic >= WORTH]
     after_base = base_with(bare, runs, worth)
-    trouble = "" if lent else _trouble(base, after_base, new.fit.candidate.dated)
+    trouble = ""
+    if not (lent or held_rows_bear_out(base, after_base, dated=new.fit.candidate.dated)):
+        trouble = "the innovations of the held-out rows do not become smaller"
     trouble = trouble or _stem_trouble(base, after_base, new.place)
     if trouble:
         return Extension(tuple(added), base, False, trouble)
@@ -194,11 +196,9 @@ def same_candidate(candidates: Sequence[Candidate], wanted: Candidate) -> Candid
     return next((each for each in candidates if each.identity == wanted.identity), None)
 
 
-def _trouble(base: Baseline, after_base: Baseline, dated: bool) -> str:
-    """Return why the effect must go again; empty when the held-out rows bear it out."""
-    if not borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated):
-        return "the innovations of the held-out rows do not become smaller"
-    return ""
+def held_rows_bear_out(base: Baseline, after_base: Baseline, *, dated: bool) -> bool:
+    """Tell whether the held-out rows bear out what lies between two models."""
+    return borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated)
 
 
 def moved_away(base: Baseline, after_base: Baseline) -> bool:

@@ -118,7 +118,7 @@ def _dated(search: _Search) -> CandidateFit:
     A moment within a held-out block leaves no other trace than before and after it.
     """
     base, found = search.base, search.best()
-    every = tuple(Blocks(b.train | b.held, np.zeros_like(b.held)) for b in base.blocks)
+    every = tuple(Blocks(b.scored, np.zeros_like(b.held)) for b in base.blocks)
     whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
     axis = search.candidate.axes[0]
     centre, reach = axis.inner(float(found.point[0])), REACH * axis.step

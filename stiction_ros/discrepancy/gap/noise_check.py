@@ -80,7 +80,7 @@ def spans_steps(base: Baseline, output: int) -> bool:
 
 def _memory(base: Baseline, output: int) -> int:
     """Return the lag at which what is left depends on itself most."""
-    rows = base.blocks[output].train | base.blocks[output].held
+    rows = base.blocks[output].scored
     values = np.where(rows, base.noise[output].residual, 0.0)
     values = values - values[rows].mean() * rows
     whole = float(values @ values)

@@ -75,7 +75,7 @@ def locate(base: Baseline) -> Where:
 def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
     """Return at which moments the innovations are larger than elsewhere."""
     noise = base.noise[output]
-    scored = base.blocks[output].train | base.blocks[output].held
+    scored = base.blocks[output].scored
     squares = noise.innovations**2
     usual = float(np.median(squares[scored])) if scored.any() else 0.0
     if usual <= 0.0:

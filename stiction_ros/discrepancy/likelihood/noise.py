@@ -43,6 +43,11 @@ class Blocks:
     train: BoolArray
     held: BoolArray
 
+    @property
+    def scored(self) -> BoolArray:
+        """Rows of either kind; none at the start of a record, where a state runs anywhere."""
+        return np.asarray(self.train | self.held)
+
 
 @dataclasses.dataclass(frozen=True)
 class NoiseFit:

@@ -140,7 +140,7 @@ def _where(task: Task, state: State, no_names: list[str], verdict: GapVerdict) -
 def _named(task: Task, state: State) -> tuple[State, list[FoundEffect]]:
     """Return what is left when effects that are no names are gone, and the names."""
     while True:
-        found = [_effect(task, state, k, effect) for k, effect in enumerate(state.added)]
+        found = _found(task, state)
         no_name = [
             k
             for k, (shown, effect) in enumerate(zip(found, state.added, strict=True))
@@ -151,15 +151,48 @@ def _named(task: Task, state: State) -> tuple[State, list[FoundEffect]]:
         state = state.with_added(task.runs, state.others(no_name[-1]))
 
 
-def _effect(task: Task, state: State, k: int, effect: AddedEffect) -> FoundEffect:
-    without = state.beside(task.runs, k)
+def _found(task: Task, state: State) -> list[FoundEffect]:
+    """Return what is told of every effect."""
+    without = [state.beside(task.runs, k) for k in range(len(state.added))]
+    moved: list[list[FloatArray]] = []
+    if len(without) > 1:
+        pairs = zip(without, state.added, strict=True)
+        moved = [otherwise(base, effect.fit) for base, effect in pairs]
+    slopes = [list(state.slopes)] if state.slopes else []
+    found = []
+    for k, effect in enumerate(state.added):
+        others = [*moved[:k], *moved[k + 1 :], *slopes]
+        beside = [np.hstack(columns) for columns in zip(*others, strict=True)]
+        found.append(_effect(task, state, k, effect, without[k], beside))
+    return found
+
+
+def _effect(
+    task: Task,
+    state: State,
+    k: int,
+    effect: AddedEffect,
+    without: Baseline,
+    beside: list[FloatArray],
+) -> FoundEffect:
+    """Return what is told of the k-th effect.
+
+    Args:
+        task: what the run was given.
+        state: what is believed.
+        k: which effect.
+        effect: the same.
+        without: the model with all others.
+        beside: per output what all others, and what of the process was changed, would do by other
+            figures, shape (N, q).
+    """
     return FoundEffect(
         effect.place,
         effect.effect,
         effect.behaviour.law,
         figures_of(effect.behaviour),
         units_of(effect.behaviour, effect.place),
-        _intervals(task, state, k, effect, without),
+        _intervals(task, state, k, effect, without, beside),
         state.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
         own_closed(without, state.base, effect.fit.candidate.dated),
         GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
@@ -169,8 +202,14 @@ def _effect(task: Task, state: State, k: int, effect: AddedEffect) -> FoundEffec
     )
 
 
-def _intervals(task: Task, state: State, k: int, effect: AddedEffect, base: Baseline) -> Intervals:
-    beside = _beside(task, state, k)
+def _intervals(
+    task: Task,
+    state: State,
+    k: int,
+    effect: AddedEffect,
+    base: Baseline,
+    beside: list[FloatArray],
+) -> Intervals:
     if task.options.quick:
         found = likelihood_intervals(base, effect.fit, beside)
     else:
@@ -184,21 +223,6 @@ def _intervals(task: Task, state: State, k: int, effect: AddedEffect, base: Base
     if not task.options.free_process:
         return found
     return with_free_process(found, base, effect.fit, task.longest)
-
-
-def _beside(task: Task, state: State, k: int) -> list[FloatArray]:
-    """Return per output what all else would do by other figures, shape (N, q).
-
-    That is all other effects, and what of the process was changed.
-    """
-    others = [
-        otherwise(state.beside(task.runs, j), each.fit)
-        for j, each in enumerate(state.added)
-        if j != k
-    ]
-    if state.slopes:
-        others.append(list(state.slopes))
-    return [np.hstack(columns) for columns in zip(*others, strict=True)]
 
 
 def _slope(state: State) -> float:

@@ -8,19 +8,19 @@ from collections.abc import Mapping
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.decision.chance import stored_threshold
-from stiction_ros.discrepancy.decision.decide import Decision, borne_out, decide
+from stiction_ros.discrepancy.decision.decide import Decision, decide
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
     extend,
     has_friction,
+    held_rows_bear_out,
     left_open,
     moved_away,
 )
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
 from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
 from stiction_ros.discrepancy.decision.testable import testable_effects
-from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import chance_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
@@ -108,13 +108,11 @@ def explained(state: State) -> bool:
     refused = state.doubted.looks[-1]
     if refused.decision.lent is not None:
         rivals = [fit.evidence for fit in refused.scores.fits if not fit.candidate.inside]
-        if gained < max(rivals, default=0.0) or not _borne_out(state.doubted.base, state.base):
+        if gained < max(rivals, default=0.0):
+            return False
+        if not held_rows_bear_out(state.doubted.base, state.base, dated=False):
             return False
     return gained > max(state.base.score_under_declared - state.base.score, 0.0)
-
-
-def _borne_out(base: Baseline, after_base: Baseline) -> bool:
-    return borne_out(base.bic - after_base.bic, after_base.held_gain(base), dated=False)
 
 
 def withdrawn(task: Task, state: State) -> State:

@@ -161,8 +161,7 @@ def look_at(
 
 def _rows(run: FreeRun, output: int) -> BoolArray:
     """Return the rows that can be scored, held-out ones included, shape (N,)."""
-    blocks = run.blocks(output)
-    return np.asarray(blocks.train | blocks.held)
+    return run.blocks(output).scored
 
 
 def _output_baseline(run: FreeRun, output: int) -> OutputBaseline:

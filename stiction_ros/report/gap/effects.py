@@ -54,8 +54,7 @@ def effect_drawings(found: Discrepancy) -> list[Drawing]:
 def _effect(found: Discrepancy, effect: FoundEffect, k: int) -> Drawing:
     assert effect.moves is not None
     base = found.base_after
-    # At the start of a record nothing is scored, and the fitted state may run anywhere.
-    scored = np.column_stack([blocks.train | blocks.held for blocks in base.blocks])
+    scored = np.column_stack([blocks.scored for blocks in base.blocks])
     moves = np.where(scored, effect.moves, np.nan)
     i = int(np.argmax(np.nanstd(moves, axis=0)))
     rows, name = _liveliest(moves[:, i]), found.model_before.outputs[i]

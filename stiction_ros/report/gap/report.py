@@ -206,8 +206,7 @@ def _before_and_after(found: Discrepancy) -> Drawing:
     figure, axes = panels(2 * len(names), 0.8 + 3.6 * len(names), sharex=True)
     at, axis_of_time = _time(found)
     for i, name in enumerate(names):
-        # At the start of a record nothing is scored, and the fitted state may run anywhere.
-        scored = found.base_before.blocks[i].train | found.base_before.blocks[i].held
+        scored = found.base_before.blocks[i].scored
         old, new = (
             np.where(scored, base.noise[i].residual, np.nan)
             for base in (found.base_before, found.base_after)
