@@ -13,6 +13,7 @@ import hashlib
 import inspect
 import re
 import shutil
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -23,6 +24,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 IMPORTS = re.compile(rb"^(?:from|import) ([\w.]+)", re.MULTILINE)
 HERE = __name__.encode()
+ONE_AT_A_TIME = threading.RLock()  # numba's settings are those of the process, threads import
 DIGITS = 12  # of what stands for a content
 
 
@@ -39,14 +41,15 @@ def compiled_fused(function: Function) -> Function:
 def _compiled(function: Function, **options: Any) -> Function:
     options |= {"error_model": "numpy", "nogil": True}
     config: Any = numba.config
-    before = config.CACHE_DIR
-    config.CACHE_DIR = _folder(function, before)
-    try:
-        return cast(Function, numba.njit(function, cache=True, **options))
-    except RuntimeError:  # no directory for the cache can be written: compiled in every process
-        return cast(Function, numba.njit(function, **options))
-    finally:
-        config.CACHE_DIR = before
+    with ONE_AT_A_TIME:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = _folder(function, before)
+        try:
+            return cast(Function, numba.njit(function, cache=True, **options))
+        except RuntimeError:  # no directory for the cache can be written: compiled every time
+            return cast(Function, numba.njit(function, **options))
+        finally:
+            config.CACHE_DIR = before
 
 
 def _folder(function: Callable[..., object], given: str) -> str:

@@ -83,3 +83,29 @@ def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(
     nowhere.write_text("")
     (package / "__pycache__").write_text("")  # a file in its place
     assert result(package, NUMBA_CACHE_DIR=str(nowhere), HOME=str(nowhere)) == 7.0
+
+
+def test_threads_that_import_at_once_keep_machine_code_where_the_next_process_looks(
+    package: Path,
+) -> None:
+    names = [f"caller_{k}" for k in range(12)]
+    for name in names:
+        (package / f"{name}.py").write_text(CALLER)
+    code = (
+        "import importlib, sys, threading\n"
+        "import stiction_ros.compiled\n"
+        "sys.setswitchinterval(1e-5)\n"
+        f"names = {names}\n"
+        "start = threading.Barrier(len(names))\n"
+        "def load(name):\n"
+        "    start.wait()\n"
+        "    importlib.import_module('taken.' + name)\n"
+        "threads = [threading.Thread(target=load, args=(name,)) for name in names]\n"
+        "[thread.start() for thread in threads]\n"
+        "[thread.join() for thread in threads]\n"
+        "[sys.modules['taken.' + name].more(3.0) for name in names]\n"
+    )
+    path = {"PYTHONPATH": os.pathsep.join((str(package.parent), *sys.path))}
+    subprocess.run([sys.executable, "-c", code], env=os.environ | path, check=True)
+    made = {file.relative_to(package).parts[1] for file in package.rglob("*.more-*.nbi")}
+    assert sorted(folder.rpartition("-")[0] for folder in made) == sorted(names)
