@@ -16,6 +16,8 @@ from stiction_ros.field.hidden.simulation import LEAD
 from stiction_ros.field.kernels import FlagArray, FloatArray
 
 FLOOR = 1e-3  # of a variance: white noise beside what is held or drawn by lines
+SAME = 1e-12  # of a column's squares: what is left of it is rounding
+TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,8 +109,8 @@ class Likelihood:
 
     Args:
         form: of the noise.
-        free: columns that any explanation may use: a constant and what the plant does by
-            itself from another start, shape (N, m).
+        free: columns that any explanation may use: a constant, what the plant does by itself
+            from another start, and what an integrating one does about another OP, shape (N, m).
         seen: samples that count, shape (N,).
     """
 
@@ -151,14 +153,24 @@ class Likelihood:
             each: columns of a group, 1 or 2.
         """
         r = self.bare(residual[:, None])[:, 0]
-        bare = self.bare(columns)
-        first = bare[:, ::each]
-        norm = np.maximum((first**2).sum(axis=0), 1e-300)
-        along = first.T @ r
-        gained = along**2 / norm
+        white = self._white(columns)
+        bare = white - self._basis @ (self._basis.T @ white)
+        first, size = bare[:, ::each], (white[:, ::each] ** 2).sum(axis=0)
+        norm = (first**2).sum(axis=0)
+        gained = _gained(first.T @ r, norm, size)
         if each == 2:
-            second = bare[:, 1::2]
-            second = second - first * ((first * second).sum(axis=0) / norm)
-            size = (second**2).sum(axis=0)
-            gained = gained + np.where(size > 1e-12 * norm, (second.T @ r) ** 2 / size, 0.0)
+            second, size = bare[:, 1::2], (white[:, 1::2] ** 2).sum(axis=0)
+            second = second - first * ((first * second).sum(axis=0) / np.maximum(norm, TINY))
+            gained = gained + _gained(second.T @ r, (second**2).sum(axis=0), size)
         return self.of_squares(float(r @ r) - gained)
+
+
+def _gained(along: FloatArray, norm: FloatArray, size: FloatArray) -> FloatArray:
+    """Return what columns explain; nothing where all but rounding is in the columns before them.
+
+    Args:
+        along: their products with the residual, shape (G,).
+        norm: their squares without the columns before them.
+        size: their squares.
+    """
+    return np.where(norm > SAME * size, along**2 / np.maximum(norm, TINY), 0.0)

@@ -79,10 +79,25 @@ def test_columns_gain_what_they_explain() -> None:
     assert gained > likelihood.of(left) + 100.0
 
 
-def found(cause: str, first: int = 700) -> HiddenLoop:
+def test_columns_that_are_free_gain_nothing_again() -> None:
+    rows, time = np.ones(ROWS, dtype=np.bool_), np.arange(ROWS, dtype=float)
+    free = np.column_stack([np.ones(ROWS), time])
+    likelihood = Likelihood(true_form(Noise(0.5), PLANT, 1.0, Kept(0.5)), free, rows)
+    values = residual(Noise(0.5))
+    again = np.column_stack([3.0 * time - 2.0, np.cos(time), np.sin(time)])
+    (gained,) = likelihood.with_columns(values, again[:, :1], 1)
+    assert gained == likelihood.of(values)
+    (twice,) = likelihood.with_columns(values, again[:, [1, 1]], 2)
+    (once,) = likelihood.with_columns(values, again[:, [1]], 1)
+    assert twice == pytest.approx(once)
+
+
+def found(cause: str, first: int = 700, integrating: bool | None = None) -> HiddenLoop:
     """Return the next loop in which this is hidden at full size."""
     for seed in range(first, 1000):
         loop = hidden_loop(seed)
+        if integrating not in (None, loop.base.plant.integrating):
+            continue
         if loop.cause == cause and not loop.surroundings.half:
             return loop
     raise AssertionError(cause)
@@ -102,6 +117,16 @@ def test_what_is_not_there_gains_nothing() -> None:
     absent = dataclasses.replace(loop, hidden=(Effect(PROCESS, "gain", {"factor": 1.1}),))
     (gain,) = oracle(absent)
     assert gain.over_none < 12.0
+
+
+def test_an_output_of_a_level_that_drifts_is_a_level_about_another_op() -> None:
+    loop = found("none", integrating=True)
+    fits = Fits(loop, ())
+    time = np.arange(fits.count, dtype=float)[:, None]
+    drifting = fits.left + 5.0 * fits.left.std() * time[:, 0] / fits.count
+    none = fits.likelihood.of(drifting)
+    assert none == pytest.approx(fits.none, abs=1.0)
+    assert fits.likelihood.with_columns(drifting, time, 1)[0] == pytest.approx(none, abs=1.0)
 
 
 def test_a_healthy_loop_leaves_its_declared_noise_and_nothing_else() -> None:
