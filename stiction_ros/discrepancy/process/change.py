@@ -11,7 +11,8 @@ import numpy as np
 from stiction_ros.discrepancy.decision.extend import AddedEffect, open_columns, run_with
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import left_by, whiten
-from stiction_ros.discrepancy.process.refit import equations_of, with_equations
+from stiction_ros.discrepancy.process.free_equation import Equation
+from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
 from stiction_ros.discrepancy.process.slower import Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
@@ -195,19 +196,21 @@ class _Search:
 
     def slopes(self) -> FloatArray:
         """Return what a unit of every free figure moves, shape (N, figures)."""
-        return self._of_figures(self._run(self.values).gap[:, self.output])
+        run = self._run(self.values)
+        return self._of_figures(run, run.gap[:, self.output])
 
-    def _of_figures(self, gap: FloatArray) -> FloatArray:
-        moved = [
-            (self._run(self.values + self.probes * each).gap[:, self.output] - gap) / self.probes[k]
-            for k, each in enumerate(np.eye(len(self.free)))
-            if self.free[k]
-        ]
+    def _of_figures(self, run: FreeRun, gap: FloatArray) -> FloatArray:
+        moved = []
+        for k, each in enumerate(np.eye(len(self.free))):
+            if self.free[k]:
+                equations = self._equations(self.values + self.probes * each)
+                other = process_with(run.model.process, equations, run.model.sample_time)
+                moved.append((run.gap_behind(other, self.output) - gap) / self.probes[k])
         return np.column_stack(moved)
 
     def _slopes(self, run: FreeRun, gap: FloatArray) -> FloatArray:
         """Return what a unit of every free figure and smooth effect moves, shape (N, figures)."""
-        moved = [self._of_figures(gap)]
+        moved = [self._of_figures(run, gap)]
         model = run.model if not self.smooth else self.changed(self.values)
         for k in self.smooth:
             other = run_with(model, self.runs, self._with_stepped(run, k, PROBE))
@@ -223,9 +226,12 @@ class _Search:
 
     def changed(self, values: FloatArray) -> LoopModel:
         """Return the model with other figures of this output, shape (figures,)."""
+        return with_equations(self.model, self._equations(values))
+
+    def _equations(self, values: FloatArray) -> list[Equation]:
         equations = equations_of(self.model)
         equations[self.output] = self.equation.changed(values)
-        return with_equations(self.model, equations)
+        return equations
 
     def changes(self, name: str) -> list[ProcessChange]:
         """Return the figures that are another, by the tag of the output."""

@@ -18,7 +18,7 @@ from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import ArxProcess
+from stiction_ros.processes import AlteredProcess, ArxProcess, Process
 
 LATER = 1  # samples beyond the model's own delays that are tried
 ROUNDS = 8
@@ -61,6 +61,26 @@ def with_equations(model: LoopModel, equations: Sequence[Equation]) -> LoopModel
         entry["b"] = {v: b.tolist() for v, b, _ in each if len(b)}
         entry["delay"] = {v: d for v, b, d in each if len(b)}
     return LoopModel.from_mapping(document, model.name)
+
+
+def process_with(process: Process, equations: Sequence[Equation], sample_time: float) -> Process:
+    """Return an ARX process with other coefficients and delays, behind its effects if any.
+
+    Raises:
+        InputError: another kind of process.
+    """
+    if isinstance(process, AlteredProcess):
+        inner = process_with(process.inner, equations, sample_time)
+        return AlteredProcess(inner, process.effects, sample_time)
+    if not isinstance(process, ArxProcess):
+        raise InputError("the process is no arx process")
+    outputs = []
+    for known, own in zip(process.equations, equations, strict=True):
+        acting = [j for j, b in enumerate(own.b) if len(b)]
+        b = {process.valves[j]: tuple(own.b[j].tolist()) for j in acting}
+        delay = {process.valves[j]: own.delay[j] for j in acting}
+        outputs.append(dataclasses.replace(known, a=tuple(own.a.tolist()), b=b, delay=delay))
+    return ArxProcess(tuple(outputs), process.valves, process.model.stem0, process.model.pv0)
 
 
 def without_noise(model: LoopModel) -> LoopModel:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +16,7 @@ from stiction_ros.effects import Behaviour, FloatArray, Seen
 from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.processes import AlteredProcess
+from stiction_ros.processes import AlteredProcess, Process
 from stiction_ros.records import Record
 
 HELD_SHARE = 4
@@ -187,6 +188,14 @@ class FreeRun:
     def gap(self) -> FloatArray:
         """PV less the free run, shape (N, p), free columns not yet taken out."""
         return np.asarray(self.runs.pv - self.forced - self.known)
+
+    def gap_behind(self, process: Process, output: int) -> FloatArray:
+        """Return PV of one output less what another process makes of the same stems, shape (N,)."""
+        other = copy.copy(self)
+        other.responses = responses_of(process, self.model.sample_time)
+        other.forced = self.forced.copy()
+        other.forced[:, output] = other.drive(output)[:, 0]
+        return np.asarray(self.runs.pv[:, output] - other.forced[:, output] - other._known(output))
 
     def blocks(self, output: int) -> Blocks:
         """Return the rows that are fitted and those kept back, interleaved."""
