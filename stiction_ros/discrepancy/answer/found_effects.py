@@ -13,8 +13,9 @@ from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
+from stiction_ros.discrepancy.gap.measure import closed_share, gap_in_one_step, measure_gap
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
+from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.effects import Behaviour, FloatArray
 
 WIDEST = 10.0  # times the range of its signal that an interval of a size may be wide
@@ -131,8 +132,10 @@ def own_closed(without: Baseline, base: Baseline, dated: bool) -> float:
     """Return the share of the excess that is gone with an effect and not without it.
 
     Where an answer leaves the noise that the model declares, both free runs are whitened by that
-    noise: noise of the equation wanders farther than most effects move PV. What comes at one moment
-    shows there alone in whitened rows, which may be fitted ones.
+    noise: noise of the equation wanders farther than most effects move PV. Where it leaves more,
+    something else is missing: what is slow hides a quick effect in the free run, what is quick a
+    slow one in one step. The larger share counts. What comes at one moment shows there alone in
+    whitened rows, which may be fitted ones.
 
     Args:
         without: the model with all other effects.
@@ -143,8 +146,13 @@ def own_closed(without: Baseline, base: Baseline, dated: bool) -> float:
         fit.ar if forms and not fit.enlarged else NO_MEMORY
         for fit, forms in zip(base.noise, base.declared, strict=True)
     ]
-    gaps = [measure_gap(each, weights, dated) for each in (without, base)]
-    return closed_share(gaps[0], gaps[1])
+    closed = closed_share(*(measure_gap(each, weights, dated) for each in (without, base)))
+    floors = [
+        noise.std if noise is not None and fit.enlarged else math.nan
+        for fit, noise in zip(base.noise, declared_noise(base.run.model), strict=True)
+    ]
+    quick = closed_share(*(gap_in_one_step(each, floors, dated) for each in (without, base)))
+    return max(closed, quick)
 
 
 def moved_by(without: Baseline, base: Baseline) -> FloatArray:

@@ -21,6 +21,7 @@ from stiction_ros.loop import LoopModel
 ROUNDS = 2
 GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow
 WORTH = 10.0
+TANGENT = 0.25  # steps of a search, by which figures are varied to see what they would do
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,6 +174,30 @@ def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]
         if candidate.factors:
             for i, sizes in candidate.respond(run, point[None, :]).sizes.items():
                 columns[i] = np.hstack([columns[i], sizes[:, 0]])
+    return columns
+
+
+def tangents(bare: LoopModel, runs: Runs, added: Sequence[AddedEffect]) -> list[FloatArray]:
+    """Return per output what added effects would do by figures a little larger, shape (N, q).
+
+    What is not yet in the model has pulled them: what comes next is fitted together with them.
+    """
+    columns = [np.zeros((len(runs), 0)) for _ in bare.outputs]
+    for k, effect in enumerate(added):
+        candidate, point = effect.fit.candidate, effect.fit.point
+        if candidate.dated or not len(point):
+            continue
+        run = run_with(bare, runs, [*added[:k], *added[k + 1 :]])
+        own = candidate.coordinates(point)
+        steps = TANGENT * np.diag([axis.step for axis in candidate.axes])
+        points = candidate.values(np.vstack([own + steps, own - steps]))
+        response = candidate.respond(run, points)
+        for i in response.outputs:
+            moved = response.shifts.get(i)
+            if moved is None:
+                moved = response.sizes[i] @ effect.fit.factors
+            more, less = np.split(moved, 2, axis=1)
+            columns[i] = np.hstack([columns[i], more - less])
     return columns
 
 

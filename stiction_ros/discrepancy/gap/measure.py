@@ -71,6 +71,26 @@ def measure_gap(
     return tuple(found)
 
 
+def gap_in_one_step(
+    base: Baseline, floors: Sequence[float], every: bool = False
+) -> tuple[OutputGap, ...]:
+    """Return the gap of the innovations in the place of that of the free run.
+
+    Args:
+        base: the model.
+        floors: per output the standard deviation of innovations in which nothing is missing; an
+            output with NaN is left out.
+        every: whether the rows that figures were fitted to count as well.
+    """
+    found = []
+    for i, floor in enumerate(floors):
+        if not np.isnan(floor):
+            noise, blocks = base.noise[i], base.blocks[i]
+            left = _rms(noise.innovations[blocks.held | blocks.train if every else blocks.held])
+            found.append(OutputGap(base.run.model.outputs[i], left, left, floor, floor))
+    return tuple(found)
+
+
 def closed_share(before: tuple[OutputGap, ...], after: tuple[OutputGap, ...]) -> float:
     """Return the share of the free-run excess over the noise floor that is gone.
 

@@ -22,7 +22,7 @@ from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
 from stiction_ros.discrepancy.answer.stem_words import look_at_stems
 from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import GapVerdict
+from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.uncertainty import (
@@ -130,6 +130,9 @@ def _where(task: Task, state: State, no_names: list[str], verdict: GapVerdict) -
         found += [stem.sentence for stem in look_at_stems(state.before.run)]
         found += [sentence for look in state.looks[:1] for sentence in look.where.sentences]
     found += noise_sentences(check_noise(state.before), task.runs.sample_time)
+    if state.added:
+        left = noise_sentences(check_noise(state.base), task.runs.sample_time)
+        found += [f"beside what was found, {sentence}" for sentence in left]
     last = state.looks[-1].decision
     if last.verdict is GapVerdict.UNKNOWN:
         found.append(last.reason)
@@ -249,8 +252,14 @@ def _explained_by_no_name(task: Task, looked: State, state: State) -> bool:
 
 
 def _louder(task: Task, state: State) -> list[FoundEffect]:
-    """Return the noise beyond the declared one as effects."""
-    found = []
+    """Return the noise beyond the declared one as effects.
+
+    No valve and no plant obeys its law to the letter: beside an effect on the way from OP to PV
+    what a law misses wanders as a noise does, and is said without a name.
+    """
+    found: list[FoundEffect] = []
+    if any(on_the_way(each.place, each.effect) for each in state.added):
+        return found
     for i, declared in enumerate(declared_noise(state.base.run.model)):
         fit = state.base.noise[i]
         if declared is None or not fit.enlarged or _slowed(state, i):

@@ -17,6 +17,7 @@ from stiction_ros.discrepancy.decision.extend import (
     held_rows_bear_out,
     left_open,
     moved_away,
+    tangents,
 )
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
 from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
@@ -138,7 +139,9 @@ def scored_by(task: Task, state: State, k: int) -> Scored:
         k: how many looks there were, for the progress.
     """
     free, share = task.options.free_process, 1.0 / (task.options.most_effects + 1)
-    base = state.base if free else left_open(state.base, state.added)
+    base = state.base
+    if not free:
+        base = left_open(base, state.added, tangents(state.bare, task.runs, state.added))
     candidates = all_candidates(base, task.controller.clock_known)
 
     def report(done: float) -> None:

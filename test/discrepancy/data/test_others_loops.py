@@ -290,3 +290,25 @@ def test_a_hundredth_of_what_a_law_explains_is_no_second_effect() -> None:
     answer = answered(500443)  # OP is rounded; a square makes up for what is left of a triangle
     assert names(answer) == [("disturbance:PV1", "triangle")]
     assert not answer.effects[0].alternatives
+
+
+def test_what_held_out_rows_refuse_is_tried_before_less_is_named() -> None:
+    answer = answered(510123, family="two")  # an open loop, a step of the load in a held-out block
+    assert names(answer) == [("valve:V1", "characteristic"), ("load:V1", "step")]
+    truth = hidden_loop(510123, "two").hidden[0].figures["curve"]
+    assert answer.effects[0].parameters["curve"] == pytest.approx(truth, rel=1e-3)
+
+
+def test_what_comes_next_is_seen_beside_other_figures_of_what_was_found() -> None:
+    answer = answered(510067, family="two")  # stiction; a step pulled its figures at first
+    assert names(answer)[0] == ("valve:V1", "stiction")
+    (step,) = answer.effects[1:]
+    assert ("disturbance:PV1", "step") in {(step.place, step.effect), *step.alternatives}
+
+
+def test_friction_of_a_level_closes_what_it_closes_in_one_step() -> None:
+    answer = answered(550058, family="physics")  # slips that are a little off add up in a level
+    (found,) = answer.effects
+    assert (found.place, found.effect) == ("valve:V1", "stiction")
+    assert found.closed > 0.4
+    assert any(each.startswith("beside what was found") for each in answer.where)

@@ -102,6 +102,15 @@ def test_what_gains_most_and_held_out_rows_refuse_is_lent() -> None:
     assert (answer.verdict, answer.chosen, answer.tried) == (GapVerdict.UNKNOWN, None, refused)
 
 
+def test_what_is_refused_is_lent_before_less_is_named() -> None:
+    refused = fit("valve:V1", "characteristic", 400.0, held=-60.0)
+    less = fit("process:PV1", "gain", 200.0)
+    answer = said(refused, less)
+    assert (answer.verdict, answer.tried) == (GapVerdict.UNKNOWN, refused)
+    near = dataclasses.replace(less, delta_bic=330.0)
+    assert said(refused, near).chosen is near
+
+
 def test_what_a_rival_outside_the_catalogue_beats_is_not_lent() -> None:
     refused = fit("process:PV1", "gain", 120.0, held=-5.0)
     stranger = fit("process:PV1", "gain that changes", 140.0, inside=False)
