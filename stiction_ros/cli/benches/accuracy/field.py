@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,15 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.cli.benches.accuracy.answer import (
+    FOUND,
+    METHOD,
+    REFUSED,
+    VERDICTS,
+    Answer,
+    answer_of,
+)
+from stiction_ros.cli.benches.accuracy.share import Share, shares_table
 from stiction_ros.cli.options import choices
 from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import run_seeds
@@ -31,70 +39,10 @@ PUT_IN = 0.15
 """Band of the friction that is put into healthy loops, of OP's range before: with it OP moves
 farther, and a tenth, which matters, is left of its range."""
 
-METHOD = "evidence"
-"""Search when none is given."""
-
-FOUND = ("sticky", "backlash")
-"""Verdicts that find friction."""
-
 MANY_SLIPS = f"{choices.MANY} slips or more"
 FEW_SLIPS = "fewer slips"
 OTHERS = "no friction"
 GROUPS = (MANY_SLIPS, FEW_SLIPS, OTHERS)
-
-REFUSED = "refused"
-"""What stands for a verdict where identification refuses the record."""
-
-VERDICTS = ("sticky", "backlash", "healthy", "undecided", REFUSED)
-
-Interval = tuple[float, float]
-
-
-@dataclasses.dataclass(frozen=True)
-class Answer:
-    """What ``identify`` says of one valve, as its JSON says it.
-
-    Attributes:
-        verdict: one of :data:`VERDICTS`.
-        f_s, f_d, band: intervals, in the record's unit of OP; None where it refuses. The band's
-            is the sum of the other two where none is given.
-        cause: of the oscillation; None where none is given.
-        seconds: processor time.
-        reason: of a refusal.
-    """
-
-    verdict: str
-    f_s: Interval | None
-    f_d: Interval | None
-    band: Interval | None
-    cause: str | None
-    seconds: float
-    reason: str = ""
-
-
-def answer_of(record: Record, find: Callable[[Record], Mapping[str, Any]]) -> Answer:
-    """Return what is said of the first valve of a record.
-
-    Args:
-        record: its longest good part is looked at, as ``stiction identify`` does.
-        find: record to the mapping of ``identify --json``.
-    """
-    begun = time.process_time()
-    try:
-        document = find(longest_part([record]))
-    except InputError as error:
-        return Answer(REFUSED, None, None, None, None, time.process_time() - begun, str(error))
-    valve, output = document["valves"][0], document["outputs"][0]
-    f_s, f_d = _interval(valve["f_s_interval"]), _interval(valve["f_d_interval"])
-    band = _interval(valve.get("band_interval", [f_s[0] + f_d[0], f_s[1] + f_d[1]]))
-    cause = output.get("cause") or {}
-    seconds = time.process_time() - begun
-    return Answer(valve["verdict"], f_s, f_d, band, cause.get("kind"), seconds)
-
-
-def _interval(values: Sequence[float]) -> Interval:
-    low, high = values
-    return float(low), float(high)
 
 
 def identified(method: str, record: Record) -> Mapping[str, Any]:
@@ -220,21 +168,6 @@ def _shown(found: FieldLoop) -> float | None:
         return beyond_price(longest_part([loop.record]), loop.stem[first:last, 0])
     except InputError:
         return None
-
-
-@dataclasses.dataclass(frozen=True)
-class Share:
-    """How often something happened, and how often it should."""
-
-    name: str
-    count: int
-    total: int
-    wanted: str
-
-    @property
-    def share(self) -> float:
-        """Between 0 and 1; NaN of none."""
-        return self.count / self.total if self.total else float("nan")
 
 
 def shares(rows: Sequence[Judged]) -> list[Share]:
@@ -443,12 +376,3 @@ def misses(rows: Sequence[Judged]) -> dict[str, list[int]]:
             row.seed for row in rows if row.group == OTHERS and row.found
         ],
     }
-
-
-def shares_table(found: Iterable[Share]) -> Table:
-    """Return rates as a table, – for those of nothing."""
-    table = Table("rate", "count", "of", "share", "wanted")
-    for rate in found:
-        share = f"{100.0 * rate.share:.1f} %" if rate.total else "–"
-        table.add_row(rate.name, str(rate.count), str(rate.total), share, rate.wanted)
-    return table

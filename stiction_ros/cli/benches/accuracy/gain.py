@@ -11,7 +11,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.benches.accuracy.field import FIRST, FOUND, LAST
+from stiction_ros.cli.benches.accuracy.answer import FOUND
+from stiction_ros.cli.benches.accuracy.field import FIRST, LAST
 from stiction_ros.cli.output.as_json import write_json
 from stiction_ros.cli.runs.seeds import run_seeds
 from stiction_ros.effects.behaviour import FloatArray

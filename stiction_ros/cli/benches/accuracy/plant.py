@@ -12,7 +12,8 @@ from typing import Any
 
 from rich.console import Console
 
-from stiction_ros.cli.benches.accuracy.field import FOUND, Share, shares_table
+from stiction_ros.cli.benches.accuracy.answer import FOUND
+from stiction_ros.cli.benches.accuracy.share import Share, shares_table
 from stiction_ros.cli.options import choices
 from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.errors import InputError

@@ -15,15 +15,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.benches.accuracy.field import (
-    FOUND,
-    METHOD,
-    Answer,
-    Interval,
-    Share,
-    answer_of,
-    shares_table,
-)
+from stiction_ros.cli.benches.accuracy.answer import FOUND, METHOD, Answer, Interval, answer_of
+from stiction_ros.cli.benches.accuracy.share import Share, shares_table
 from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.runs.seeds import run_each
 from stiction_ros.errors import InputError

@@ -12,7 +12,8 @@ import pytest
 
 from stiction_ros import identification
 from stiction_ros.cli.benches.accuracy import field as bench_field
-from stiction_ros.cli.benches.accuracy.field import Answer, Judged, answer_of, shares, splits
+from stiction_ros.cli.benches.accuracy.answer import Answer, answer_of
+from stiction_ros.cli.benches.accuracy.field import Judged, shares, splits
 from stiction_ros.cli.benches.accuracy.stability import (
     BASE,
     VARIANTS,
