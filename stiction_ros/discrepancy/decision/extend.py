@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from stiction_ros.discrepancy.decision.measured_stem import stem_misfit
 from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
+from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
@@ -135,7 +136,7 @@ def run_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Fre
 
 def base_with(bare: LoopModel, runs: Runs, effects: Sequence[AddedEffect]) -> Baseline:
     """Return the baseline of a model with effects, its noise also begun at that of each fit."""
-    return Baseline.of(run_with(bare, runs, effects), like=[each.fit.noise for each in effects])
+    return Baseline.of(run_with(bare, runs, effects), like=_noises(effects))
 
 
 def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> Baseline:
@@ -145,7 +146,7 @@ def base_beside(bare: LoopModel, runs: Runs, others: Sequence[AddedEffect]) -> B
     a little wrong; what comes next is fitted together with it.
     """
     run = run_with(bare, runs, others)
-    return Baseline.of(run, columns=open_columns(run, others))
+    return Baseline.of(run, columns=open_columns(run, others), like=_noises(others))
 
 
 def left_open(
@@ -163,7 +164,11 @@ def left_open(
     columns = open_columns(base.run, added)
     if slopes:
         columns = [np.hstack(pair) for pair in zip(columns, slopes, strict=True)]
-    return Baseline.of(base.run, columns=columns)
+    return Baseline.of(base.run, columns=columns, like=_noises(added))
+
+
+def _noises(effects: Sequence[AddedEffect]) -> list[Mapping[int, NoiseFit]]:
+    return [each.fit.noise for each in effects]
 
 
 def open_columns(run: FreeRun, added: Sequence[AddedEffect]) -> list[FloatArray]:

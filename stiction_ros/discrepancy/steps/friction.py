@@ -67,14 +67,22 @@ def _better_beside_others(task: Task, state: State, k: int) -> State:
 
 
 def _kinds(task: Task, state: State, k: int) -> tuple[Baseline, list[CandidateFit]]:
-    """Return all frictions of the k-th effect's valve fitted behind all other effects."""
-    base, place = state.beside(task.runs, k), state.added[k].place
-    rivals = [
-        candidate
-        for candidate in all_candidates(base)
-        if candidate.place == place and candidate.about.family == FRICTION
-    ]
-    return base, [fit_candidate(base, base.run.gap, each) for each in rivals]
+    """Return all frictions of the k-th effect's valve fitted behind all other effects.
+
+    The one that is in the model is looked for about its figures too: a search of everything may
+    miss what is known.
+    """
+    base, own = state.beside(task.runs, k), state.added[k]
+    fits = []
+    for candidate in all_candidates(base):
+        if candidate.place != own.place or candidate.about.family != FRICTION:
+            continue
+        found = fit_candidate(base, base.run.gap, candidate)
+        if candidate.identity == own.fit.candidate.identity:
+            near = fit_candidate(base, base.run.gap, candidate, own.fit.point)
+            found = max(near, found, key=lambda fit: fit.delta_bic)
+        fits.append(found)
+    return base, fits
 
 
 def _told(task: Task, state: State, k: int) -> AddedEffect:

@@ -312,3 +312,10 @@ def test_friction_of_a_level_closes_what_it_closes_in_one_step() -> None:
     assert (found.place, found.effect) == ("valve:V1", "stiction")
     assert found.closed > 0.4
     assert any(each.startswith("beside what was found") for each in answer.where)
+
+
+def test_what_is_known_of_a_friction_is_not_lost_when_it_is_told_again() -> None:
+    answer = answered(610004, family="two")  # a search of everything misses the needle
+    assert names(answer)[0] == ("valve:V1", "stiction")
+    (sine,) = answer.effects[1:]
+    assert ("load:V1", "sine") in {(sine.place, sine.effect), *sine.alternatives}
