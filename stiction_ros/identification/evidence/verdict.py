@@ -31,8 +31,6 @@ REJECTED = 3.0
 likelihood of none at both together."""
 REJECTING = 2  # rates that do
 SURELY = 10.0  # what they must lose where one rate alone rejects them and none gains
-NOTHING = 8.0
-"""What they may gain at any rate with news: about as much as the best of many does on noise."""
 CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
 HARDLY = 0.05  # share of the movement that goes away, at most, with one that does not matter
 AS_RECORDED = 1.3  # factor within which its loop moves as recorded
@@ -76,8 +74,9 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
     A rate that takes something else for the process rejects nothing, as neither do rows that are
     drawn between reports; and what such rows say for friction is not believed before it is sure.
     Where that is beside a process that the controller would not hold, it is nothing. Where a rate
-    finds friction, be it a small one, there is some; and one rejects alone only where none that
-    sees the process gains by what would matter.
+    finds friction, be it a small one, there is some; where one with news gains by what would
+    matter, be it little, it is not rejected; and one rejects alone only where none that sees the
+    process gains by that.
     """
     speak = [look for look in seen if look.speaks(valve)]
     if any(look.beyond_price(valve) > (0.0 if look.carries_news else SURE) for look in speak):
@@ -85,7 +84,7 @@ def _harmless(seen: tuple[Look, ...], valve: int) -> bool:
     gains = [look.accepted[valve].material_gain for look in speak if look.carries_news]
     lost = _lost(seen, valve)
     surely = max(lost, default=0.0) >= SURELY and min(lost) >= 0.0
-    return max(gains, default=PRICE) < NOTHING and (surely or _rejected(seen, valve))
+    return max(gains, default=PRICE) <= 0.0 and (surely or _rejected(seen, valve))
 
 
 def _rejected(seen: tuple[Look, ...], valve: int) -> bool:

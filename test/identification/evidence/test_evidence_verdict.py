@@ -16,7 +16,6 @@ from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
 from stiction_ros.identification.evidence.search import Found, ideal
 from stiction_ros.identification.evidence.verdict import (
     MATERIAL,
-    NOTHING,
     REJECTED,
     SURELY,
     verdict_of,
@@ -123,8 +122,8 @@ def test_friction_beside_another_process_is_none_where_two_rates_that_see_it_rej
         ([rejected(REJECTED + 0.1)], UNDECIDED),
         ([rejected(REJECTED + 0.1)] * 2, HEALTHY),
         ([rejected(REJECTED + 0.1), rejected(REJECTED - 0.1)], UNDECIDED),
-        ([*[rejected(REJECTED + 0.1)] * 2, held(NOTHING - 1.0, (0.1, 0.2))], HEALTHY),
-        ([*[rejected(30.0)] * 3, held(NOTHING + 1.0, (0.1, 0.2))], UNDECIDED),
+        ([*[rejected(REJECTED + 0.1)] * 2, rejected(0.0)], HEALTHY),
+        ([*[rejected(30.0)] * 3, rejected(-0.1)], UNDECIDED),
     ],
 )
 def test_a_valve_is_healthy_where_rates_reject_all_that_matters_and_none_finds_it(
