@@ -22,7 +22,7 @@ from stiction_ros.identification.result.identification import (
     VerdictKind,
 )
 
-LEAST_GONE = 0.08  # share of OP's recorded movement that must go away with a friction
+LEAST_GONE = 0.1  # share of the movement that must go away with a friction
 WIDER = 2.0  # of OP's movement: a wider band is not what makes it
 MATTERS = 0.1  # of OP's movement about its mean: a smaller band hardly keeps anything from the stem
 MATERIAL = 0.03  # of the range of OP: a band up to this is none to speak of
@@ -31,9 +31,9 @@ REJECTED = 3.0
 likelihood of none at both together."""
 REJECTING = 2  # rates that do
 SURELY = 10.0  # what they must lose where one rate alone rejects them and none gains
-CONFIRMED = 0.1  # share of the movement that must go away with a friction that one rate shows
 HARDLY = 0.05  # share of the movement that goes away, at most, with one that does not matter
 AS_RECORDED = 1.3  # factor within which its loop moves as recorded
+ANOTHER = 2.0  # factor from which on a loop with its friction is not the one that was recorded
 OWN = (CauseKind.TUNING, CauseKind.SET_POINT)
 ELSEWHERE = (*OWN, CauseKind.DISTURBANCE)
 
@@ -108,7 +108,7 @@ def confirms(found: Identification, valve: int) -> bool:
     moved = told.get("moved_with", 0.0)
     known = told.get("controller_fit", 0.0) > OPEN
     as_recorded = 1.0 / AS_RECORDED < moved < AS_RECORDED
-    return known and as_recorded and told.get("loop_gone", 0.0) > CONFIRMED
+    return known and as_recorded and told.get("loop_gone", 0.0) > LEAST_GONE
 
 
 def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
@@ -137,25 +137,27 @@ def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
 def doubted(valve: ValveEstimate) -> ValveEstimate:
     """Return the estimate, no longer with friction where its loop says otherwise.
 
-    A friction without which OP would move all the same is not what moves it, where the controller
-    is known and the evidence not overwhelming. A stem that is a wave itself cannot be told from one
-    that comes from outside; neither can one beside which a line from outside gains, and alone about
-    as much, where its rates speak of processes that the controller would not hold; nor one that
-    moves in time with what repeats itself, where no line stands for that. A band that is
-    wider than OP moves about its mean moves with its large moves alone, as those in manual are, and
-    one that is a small share of them is none to speak of.
+    A friction without which OP would move all the same is not what moves it, and one with which it
+    would move otherwise than recorded is not its own, where the controller is known and the
+    evidence not overwhelming. A stem that is a wave itself cannot be told from one that comes from
+    outside; neither can one beside which a line from outside gains, and alone about as much, where
+    its rates speak of processes that the controller would not hold; nor one that moves in time with
+    what repeats itself, where no line stands for that. A band that is wider than OP moves about its
+    mean moves with its large moves alone, as those in manual are, and one that is a small share of
+    them is none to speak of.
     """
     if not valve.verdict.has_friction:
         return valve
     told = valve.evidence
     known = told.get("controller_fit", 0.0) > OPEN
     gone = told.get("loop_gone", 1.0) * min(told.get("moved_with", 1.0), 1.0)
-    idle = known and gone < LEAST_GONE and told.get("delta_bic", 0.0) < SURE
+    another = not 1.0 / ANOTHER < told.get("moved_with", 1.0) < ANOTHER
+    denied = known and (gone < LEAST_GONE or another) and told.get("delta_bic", 0.0) < SURE
     wide = valve.band_share > WIDER
     small = 0.0 < valve.band_share < MATTERS
     line = told.get("outside_line", 0.0) > 0.0 and told.get("line_rivalry", 0.0) > RIVAL
     rival = line and not told.get("held", 1.0)
-    if not (idle or wide or small or rival or is_echoed(told) or stem_is_wave(valve)):
+    if not (denied or wide or small or rival or is_echoed(told) or stem_is_wave(valve)):
         return valve
     return dataclasses.replace(
         valve,

@@ -12,9 +12,10 @@ from stiction_ros.identification.closed_loop.explanation import MATERIAL
 from stiction_ros.identification.evidence import engine
 from stiction_ros.identification.evidence.rates import PRICE, Look, looks
 from stiction_ros.identification.evidence.verdict import (
+    ANOTHER,
     AS_RECORDED,
-    CONFIRMED,
     HARDLY,
+    LEAST_GONE,
     MATTERS,
     REJECTED,
     WIDER,
@@ -79,6 +80,11 @@ def test_what_a_historian_held_shows_more_at_a_coarser_rate() -> None:
         ({"loop_gone": 0.01, "controller_fit": 0.99}, VerdictKind.UNDECIDED),
         ({"loop_gone": 0.01, "controller_fit": 0.5}, VerdictKind.STICKY),
         ({"loop_gone": 0.01, "delta_bic": 60.0}, VerdictKind.STICKY),
+        ({"moved_with": 1.1 * ANOTHER}, VerdictKind.UNDECIDED),
+        ({"moved_with": 0.9 / ANOTHER}, VerdictKind.UNDECIDED),
+        ({"moved_with": 0.9 * ANOTHER}, VerdictKind.STICKY),
+        ({"moved_with": 1.1 * ANOTHER, "controller_fit": 0.5}, VerdictKind.STICKY),
+        ({"moved_with": 1.1 * ANOTHER, "delta_bic": 60.0}, VerdictKind.STICKY),
         ({"outside_line": 5.0, "line_rivalry": 0.4, "held": 0.0}, VerdictKind.UNDECIDED),
         ({"outside_line": 5.0, "line_rivalry": 0.4, "held": 1.0}, VerdictKind.STICKY),
         ({"outside_line": 5.0, "line_rivalry": 0.2, "held": 0.0}, VerdictKind.STICKY),
@@ -150,7 +156,7 @@ def with_loop(
         ({}, True),
         ({"moved_with": 0.99 / AS_RECORDED}, False),
         ({"moved_with": 1.01 * AS_RECORDED}, False),
-        ({"loop_gone": 0.9 * CONFIRMED}, False),
+        ({"loop_gone": 0.9 * LEAST_GONE}, False),
         ({"controller_fit": 0.8}, False),
         ({"kind": CauseKind.UNKNOWN}, True),
         ({"kind": CauseKind.VALVE}, True),
