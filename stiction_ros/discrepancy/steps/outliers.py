@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.decision.decide import FRICTION
@@ -12,6 +12,7 @@ from stiction_ros.effects import Backlash, about
 
 APART = 5.0  # samples between a step and its opposite that are outliers together
 CANCEL = 0.25  # of the larger one, that such two may leave
+UNTOLD = 0.15  # of the band of a friction, by which a stem rests elsewhere than its law says
 
 
 def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
@@ -19,7 +20,7 @@ def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tupl
 
     A few samples later, both are rows that stand apart from all others. Beside a friction, both
     no larger than its band, they are a stem that slipped elsewhere, or not at all, and slipped
-    again.
+    again; one that is a small part of its band is what no law tells of where a stem rests.
 
     Args:
         effects: those of an explanation.
@@ -27,16 +28,15 @@ def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tupl
     """
     steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
     bands = {each.place: band_of(each) for each in effects if about(each.effect).family == FRICTION}
-    gone: list[AddedEffect] = []
+    gone = [step for step in steps if _size(step) <= UNTOLD * _band(step, bands)]
     for one, other in itertools.combinations(steps, 2):
         if one.fit.candidate.key != other.fit.candidate.key or _is_in(one, gone):
             continue
         apart = abs(float(one.fit.point[0] - other.fit.point[0]))
-        sizes = float(one.fit.factors[0]), float(other.fit.factors[0])
-        largest = max(map(abs, sizes))
-        band = bands.get(one.place.replace("load:", "valve:"), 0.0)
-        near = apart <= APART * sample_time or largest <= band
-        if near and not _is_in(other, gone) and abs(sum(sizes)) <= CANCEL * largest:
+        total = float(one.fit.factors[0] + other.fit.factors[0])
+        largest = max(_size(one), _size(other))
+        near = apart <= APART * sample_time or largest <= _band(one, bands)
+        if near and not _is_in(other, gone) and abs(total) <= CANCEL * largest:
             gone += [one, other]
     return tuple(each for each in effects if not _is_in(each, gone))
 
@@ -47,6 +47,15 @@ def band_of(friction: AddedEffect) -> float:
     if friction.effect == Backlash.effect:
         return figures["band"]
     return figures["f_s"] + figures["f_d"]
+
+
+def _size(step: AddedEffect) -> float:
+    return abs(float(step.fit.factors[0]))
+
+
+def _band(step: AddedEffect, bands: Mapping[str, float]) -> float:
+    """Return the band of the friction of the valve at which a load steps; 0 where there is none."""
+    return bands.get(step.place.replace("load:", "valve:"), 0.0)
 
 
 def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:

@@ -51,6 +51,14 @@ def test_larger_ones_than_its_band_stay_beside_a_friction() -> None:
     assert without_outliers(effects, 1.0) == effects
 
 
+def test_a_small_part_of_the_band_of_a_friction_is_where_its_stem_rests() -> None:
+    assert without_outliers([STICKY, step(100.0, -0.8)], 1.0) == (STICKY,)
+    larger = (STICKY, step(100.0, -0.9))
+    assert without_outliers(larger, 1.0) == larger
+    alone = (step(100.0, -0.8),)
+    assert without_outliers(alone, 1.0) == alone
+
+
 def test_the_band_of_a_play_is_its_own() -> None:
     assert band_of(added("valve:V1", Backlash(3.0), [3.0])) == 3.0
 
