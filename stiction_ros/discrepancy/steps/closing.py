@@ -22,9 +22,10 @@ from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
 from stiction_ros.discrepancy.answer.stem_words import look_at_stems
 from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import GapVerdict, on_the_way
+from stiction_ros.discrepancy.decision.decide import SURE, GapVerdict, on_the_way
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import (
     Intervals,
     bootstrap_intervals,
@@ -43,7 +44,7 @@ from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.likelihood.noise import gain_of_noise
 from stiction_ros.discrepancy.process.free_intervals import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
-from stiction_ros.discrepancy.steps.look import explained
+from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
 from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import whole, with_laws
@@ -88,7 +89,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
     if verdict is GapVerdict.UNKNOWN and state.changes and _mended(state):
         verdict = effects[0].verdict if effects else GapVerdict.NONE
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
-    if silent and (no_names or _noise_left(task, state, noises)):
+    if silent and (no_names or _taken_back(task, state) or _noise_left(task, state, noises)):
         verdict = GapVerdict.UNKNOWN
     told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
     told |= set(alternatives)
@@ -137,6 +138,9 @@ def _where(task: Task, state: State, no_names: list[str], verdict: GapVerdict) -
     if last.verdict is GapVerdict.UNKNOWN:
         found.append(last.reason)
     found += [f"{each} would fit, but its figures hold nothing out" for each in no_names]
+    if verdict is GapVerdict.UNKNOWN:
+        taken = [called(*fit.candidate.key) for fit in _taken_back(task, state)]
+        found += [f"{each} would fit, but {MOVED_AWAY} with it" for each in taken]
     return tuple(found)
 
 
@@ -307,6 +311,12 @@ def _noise_left(task: Task, state: State, noises: tuple[OutputNoise, ...]) -> bo
         (each.memory and (not state.changes or _matters(task, state, i))) or _drowned(state, i)
         for i, each in enumerate(noises)
     )
+
+
+def _taken_back(task: Task, state: State) -> list[CandidateFit]:
+    """Return what surely gains and was taken back: there is a gap, whatever it is."""
+    tried = [look.decision.tried for look in state.looks if look.reason == MOVED_AWAY]
+    return [fit for fit in tried if fit and fit.evidence >= task.options.margin + SURE]
 
 
 def _drowned(state: State, output: int) -> bool:

@@ -32,6 +32,8 @@ from stiction_ros.loop import LoopModel
 
 SCORED = 0.8  # of the time of a look
 MOST_THINNED = 0.95  # of the values
+MOVED_AWAY = "the free run of the held-out rows moves away from PV"
+"""Why an effect is taken back that the looks had kept."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,8 +121,7 @@ def explained(state: State) -> bool:
 def withdrawn(task: Task, state: State) -> State:
     """Take the last effect back: with it the free run is farther from PV than before."""
     last = max(k for k, each in enumerate(state.looks) if each.kept)
-    reason = "the free run of the held-out rows moves away from PV"
-    ended = dataclasses.replace(state.looks[last], kept=False, reason=reason)
+    ended = dataclasses.replace(state.looks[last], kept=False, reason=MOVED_AWAY)
     before = dataclasses.replace(
         state,
         bare=state.earlier[-1],

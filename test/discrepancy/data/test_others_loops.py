@@ -319,3 +319,9 @@ def test_what_is_known_of_a_friction_is_not_lost_when_it_is_told_again() -> None
     assert names(answer)[0] == ("valve:V1", "stiction")
     (sine,) = answer.effects[1:]
     assert ("load:V1", "sine") in {(sine.place, sine.effect), *sine.alternatives}
+
+
+def test_what_surely_gains_and_is_taken_back_leaves_a_gap() -> None:
+    answer = answered(650080, family="two")  # a level, whose free run drifts after any step
+    assert answer.verdict is GapVerdict.UNKNOWN
+    assert any("moves away from PV" in sentence for sentence in answer.where)
