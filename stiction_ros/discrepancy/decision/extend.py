@@ -157,7 +157,8 @@ def left_open(
     Args:
         base: of the model with the effects.
         added: the effects.
-        slopes: per output further columns, of a process that was changed, shape (N, q).
+        slopes: per output what else is left open, shape (N, q): other figures of the effects, or of
+            a process that was changed.
     """
     if not slopes and not any(effect.fit.candidate.factors for effect in added):
         return base

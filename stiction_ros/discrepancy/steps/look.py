@@ -141,7 +141,7 @@ def scored_by(task: Task, state: State, k: int) -> Scored:
     """
     free, share = task.options.free_process, 1.0 / (task.options.most_effects + 1)
     base = state.base
-    if not free:
+    if state.added and not free:
         base = left_open(base, state.added, tangents(state.bare, task.runs, state.added))
     candidates = all_candidates(base, task.controller.clock_known)
 
