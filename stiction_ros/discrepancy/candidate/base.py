@@ -39,6 +39,12 @@ class Response:
         """Indices of the outputs that it touches."""
         return tuple(sorted({*self.shifts, *self.sizes}))
 
+    def moves(self, output: int, factors: FloatArray) -> FloatArray:
+        """Return what is added to an output that it touches, with these factors, shape (N, G)."""
+        if output in self.shifts:
+            return self.shifts[output]
+        return np.asarray(self.sizes[output] @ factors)
+
     def pick(self, point: int) -> Response:
         """Return the response at one point of the grid."""
         return Response(

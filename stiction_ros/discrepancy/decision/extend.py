@@ -199,10 +199,7 @@ def tangents(bare: LoopModel, runs: Runs, added: Sequence[AddedEffect]) -> list[
         points = candidate.values(np.vstack([own + steps, own - steps]))
         response = candidate.respond(run, points)
         for i in response.outputs:
-            moved = response.shifts.get(i)
-            if moved is None:
-                moved = response.sizes[i] @ effect.fit.factors
-            more, less = np.split(moved, 2, axis=1)
+            more, less = np.split(response.moves(i, effect.fit.factors), 2, axis=1)
             columns[i] = np.hstack([columns[i], more - less])
     return columns
 

@@ -83,7 +83,7 @@ def otherwise(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
     points = np.vstack([fit.point[None, :], region.points[np.unique(ends)]])
     response = fit.candidate.respond(base.run, points)
     for i in response.outputs:
-        own = response.shifts[i] if i in response.shifts else response.sizes[i] @ fit.factors
+        own = response.moves(i, fit.factors)
         columns[i] = own[:, 1:] - own[:, :1]
     return columns
 

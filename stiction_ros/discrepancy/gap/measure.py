@@ -86,7 +86,7 @@ def gap_in_one_step(
     for i, floor in enumerate(floors):
         if not np.isnan(floor):
             noise, blocks = base.noise[i], base.blocks[i]
-            left = _rms(noise.innovations[blocks.held | blocks.train if every else blocks.held])
+            left = _rms(noise.innovations[blocks.scored if every else blocks.held])
             found.append(OutputGap(base.run.model.outputs[i], left, left, floor, floor))
     return tuple(found)
 

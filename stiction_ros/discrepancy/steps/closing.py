@@ -99,7 +99,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         effects=tuple(effects),
         alternatives=alternatives,
         experiment=experiment_for(verdict, effects, alternatives, state.testable),
-        where=_where(task, state, no_names, verdict),
+        where=_where(task, state, noises, no_names, verdict),
         untestable=tuple(
             t for t in state.testable if not t.testable and (t.place, t.effect) not in told
         ),
@@ -121,7 +121,13 @@ def closing(task: Task, looked: State) -> Discrepancy:
     )
 
 
-def _where(task: Task, state: State, no_names: list[str], verdict: GapVerdict) -> tuple[str, ...]:
+def _where(
+    task: Task,
+    state: State,
+    noises: tuple[OutputNoise, ...],
+    no_names: list[str],
+    verdict: GapVerdict,
+) -> tuple[str, ...]:
     """Return the sentences that say where the gap is, the stem's first.
 
     Where nothing is missed there is no such place; the noise may still be another than declared.
@@ -132,7 +138,7 @@ def _where(task: Task, state: State, no_names: list[str], verdict: GapVerdict) -
         found += [sentence for look in state.looks[:1] for sentence in look.where.sentences]
     found += noise_sentences(check_noise(state.before), task.runs.sample_time)
     if state.added:
-        left = noise_sentences(check_noise(state.base), task.runs.sample_time)
+        left = noise_sentences(noises, task.runs.sample_time)
         found += [f"beside what was found, {sentence}" for sentence in left]
     last = state.looks[-1].decision
     if last.verdict is GapVerdict.UNKNOWN:

@@ -132,7 +132,9 @@ class Likelihood:
 
     def bare(self, columns: FloatArray) -> FloatArray:
         """Return columns that are white under this noise and hold nothing of the free ones."""
-        white = self._white(columns)
+        return self._without_free(self._white(columns))
+
+    def _without_free(self, white: FloatArray) -> FloatArray:
         return np.asarray(white - self._basis @ (self._basis.T @ white))
 
     def of_squares(self, squares: FloatArray | float) -> FloatArray:
@@ -154,7 +156,7 @@ class Likelihood:
         """
         r = self.bare(residual[:, None])[:, 0]
         white = self._white(columns)
-        bare = white - self._basis @ (self._basis.T @ white)
+        bare = self._without_free(white)
         first, size = bare[:, ::each], (white[:, ::each] ** 2).sum(axis=0)
         norm = (first**2).sum(axis=0)
         gained = _gained(first.T @ r, norm, size)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.discrepancy.gap.measure import OutputGap, closed_share, gap_in_one_step
+from stiction_ros.discrepancy.likelihood.noise import Blocks
 
 
 def gap(free_run: float, floor: float) -> tuple[OutputGap, ...]:
@@ -33,7 +34,7 @@ def leaving(std: float) -> Any:
     values = std * np.where(np.arange(200) % 4 < 2, 1.0, -1.0)
     noise = SimpleNamespace(innovations=np.where(held, values, 10.0))
     model = SimpleNamespace(outputs=("PV1", "PV2"))
-    blocks = SimpleNamespace(held=held, train=~held)
+    blocks = Blocks(~held, held)
     run = SimpleNamespace(model=model)
     return cast("Any", SimpleNamespace(run=run, noise=(noise,) * 2, blocks=(blocks,) * 2))
 
