@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, scanned_twice
+from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.data.unrounded import unrounded
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
@@ -59,6 +60,7 @@ class ControllerCheck:
             not, or whose OP between the samples is not told.
         finer: the OP that its law gives within the steps of the recorded one, %, shape (N, 1); None
             where OP is not rounded, or no law tells it.
+        unsure: how far OP between the samples is off, where SP was told and not recorded.
     """
 
     status: ControllerStatus
@@ -67,12 +69,16 @@ class ControllerCheck:
     clock_known: bool
     scans: Scans | None = None
     finer: FloatArray | None = None
+    unsure: Unseen | None = None
 
     def op(self, runs: Runs) -> FloatArray:
         """Return the OP of the records as the law tells it, %, shape (N, m)."""
         if self.scans is not None:
             return self.scans.op
         return runs.op if self.finer is None else self.finer
+
+
+NOT_ASKED = ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
 
 
 def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], ...]:
@@ -102,6 +108,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         quantum = quantum_of(op) if often > MANY else _chosen(op)
         keep = 1.0 - often if often <= MANY else 0.0
         beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
+        beside += [] if check.unsure is None else [check.unsure]
         if asked and often > NEARLY_ALL:
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
             spread = NORMAL_OF_MEDIAN * float(np.median(np.abs(bends)))
@@ -126,7 +133,40 @@ def _chosen(values: FloatArray) -> float:
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
-    """Compare OP with a PI law, and tell a rounded OP finer by it."""
+    """Compare OP with a PI law, and tell a rounded OP finer by it.
+
+    Where no SP is recorded it is the one that a law tells, if that law gives OP.
+    """
+    single = len(model.valves) == 1 and len(model.outputs) == 1
+    if not single:
+        return NOT_ASKED
+    if any(record.sp is None for record in runs.records):
+        return _told(model, runs)
+    return _asked(model, runs)
+
+
+def _told(model: LoopModel, runs: Runs) -> ControllerCheck:
+    """Return what the set-points show that a law tells: that law has to give OP."""
+    checks = []
+    for scans in (1, 2):
+        told = told_set_points(model, runs, scans)
+        if told is None:
+            checks.append(NOT_ASKED)
+            continue
+        check = _asked(dataclasses.replace(model, controller=told.tuning), told.runs)
+        same = check.status is ControllerStatus.SAME
+        if same and check.scans is not None:
+            error = check.scans.gain * told.error
+            unsure = Unseen(error**2, 1.0 - 1.0 / told.rest)
+            checks.append(dataclasses.replace(check, unsure=unsure))
+        else:
+            checks.append(check if same and check.left <= EXACT else NOT_ASKED)
+    once, twice = checks
+    return once if once.left <= ONCE or twice.scans is None else twice
+
+
+def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:
+    """Return what the set-points of the records show."""
     check = _compared(model, runs)
     same = check.status is ControllerStatus.SAME and check.scans is None
     if not same or quantum_of(runs.op[:, 0]) <= 0.0:
@@ -159,9 +199,6 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     Without a recorded tuning, gain and integral time are fitted: then only the clock can be
     checked. Samples at which OP rests at a limit are left out.
     """
-    single = len(model.valves) == 1 and len(model.outputs) == 1
-    if not single or any(record.sp is None for record in runs.records):
-        return ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
     laws = [_fit(model, runs, shift) for shift in range(LONGEST_SHIFT + 1)]
     scans = _scans(model, runs, laws[0])
     if scans is not None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
@@ -80,18 +81,32 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
 
 
 def _fitted(parts: Sequence[_Part]) -> tuple[float, float]:
-    """Return K and K h / T_i by least squares, the error between two samples being their mean.
+    """Return K and K h / T_i by least squares, the errors between samples on a cubic through four.
 
-    That it is not where SP has moved: such samples are not asked.
+    They are not where SP has moved: such samples are not asked.
     """
     moves = np.concatenate([part.moves for part in parts])
     change = np.concatenate([np.diff(part.error) for part in parts])
-    error = np.concatenate([1.5 * part.error[1:] + 0.5 * part.error[:-1] for part in parts])
+    error = np.concatenate([part.error[1:] + between_samples(part.error) for part in parts])
     usual = float(np.median(np.abs(change)))
-    asked = np.isfinite(moves) & (np.abs(change) <= USUAL * usual)
+    rests = np.concatenate([_rests(part.error, USUAL * usual) for part in parts])
+    asked = np.isfinite(moves) & rests
     columns = np.column_stack([change, error])
     gain, integral = np.linalg.lstsq(columns[asked], moves[asked], rcond=None)[0].tolist()
     return gain, integral
+
+
+def between_samples(values: FloatArray) -> FloatArray:
+    """Return values half-way between samples, on a cubic through four of them, shape (N − 1,)."""
+    mean = 0.5 * (values[1:] + values[:-1])
+    mean[1:-1] += (mean[1:-1] - 0.5 * (values[3:] + values[:-3])) / 8.0
+    return np.asarray(mean)
+
+
+def _rests(error: FloatArray, most: float) -> BoolArray:
+    """Return where neither a change of the error nor its neighbours are moves of SP."""
+    small = np.pad(np.abs(np.diff(error)) <= most, 1, constant_values=True)
+    return np.asarray(small[1:-1] & small[2:] & small[:-2])
 
 
 @dataclasses.dataclass(frozen=True)

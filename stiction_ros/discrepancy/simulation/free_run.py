@@ -21,7 +21,9 @@ from stiction_ros.records import Record
 
 HELD_SHARE = 4
 BLOCKS = 24
-PHASES = (0, 1, 3)  # of the held-out blocks, record by record
+PHASES = (0, 1, 3)
+"""Of the held-out blocks, record by record. By each of them the first block of a record is fitted:
+nothing else holds its state at the start."""
 SHORTEST_BLOCK = 20
 MOVE_ON = ("stiction", "backlash", "slew", "lag", "pole")
 """Effects with which what enters a process goes on moving between two samples."""
@@ -48,6 +50,8 @@ class Runs:
             moves its stem; empty where that is not asked.
         scans: OP at the two scans of each sample, shape (2 N, m), %; a stem slips by either. None
             where a sample holds one OP.
+        phases: of the blocks of each record that are kept back, each of :data:`PHASES`; by turns
+            where none are given.
     """
 
     records: tuple[Record, ...]
@@ -62,11 +66,24 @@ class Runs:
     unseen: tuple[tuple[Unseen, ...], ...] = ()
     between: tuple[bool, ...] = ()
     scans: FloatArray | None = None
+    phases: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.phases:
+            phases = tuple(PHASES[r % len(PHASES)] for r in range(len(self.slices)))
+            object.__setattr__(self, "phases", phases)
 
     @property
     def scanned(self) -> int:
         """Scans of a sample, each of which holds an OP of its own."""
         return 1 if self.scans is None else 2
+
+    def kept_back(self, record: int, phase: int) -> BoolArray:
+        """Return which rows of one record are kept back, shape (n,)."""
+        rows = self.slices[record]
+        size = max(len(self) // BLOCKS, SHORTEST_BLOCK)
+        place = np.arange(rows.stop - rows.start) // size + phase
+        return np.asarray(place % HELD_SHARE == HELD_SHARE - 2)
 
     def at_scans(self, rows: slice) -> slice:
         """Return where the scans of some rows are."""
@@ -142,7 +159,8 @@ class FreeRun:
 
     The state at the start, and a constant, of every record are left open: they are columns
     that every fit projects out. So is how late within a sample a sticky or slow stem moves: OP and
-    PV are held to samples, the stem is not.
+    PV are held to samples, the stem is not; and what it does that the scans of a sample differ,
+    whose mean alone the model of the process knows.
 
     Attributes:
         model, runs: what runs, over what.
@@ -203,12 +221,9 @@ class FreeRun:
         for rows in self.runs.slices:
             first[rows.start : rows.start + self.responses.skip + MAX_ORDER] = True
         usable = _with_past(self.runs.usable[output]) & ~first
-        size = max(len(self.runs) // BLOCKS, SHORTEST_BLOCK)
-        kept = np.zeros(len(self.runs), dtype=bool)
-        for r, rows in enumerate(self.runs.slices):
-            # The first block of a record is fitted: nothing else holds its state at the start.
-            place = np.arange(rows.stop - rows.start) // size + PHASES[r % len(PHASES)]
-            kept[rows] = place % HELD_SHARE == HELD_SHARE - 2
+        kept = np.concatenate(
+            [self.runs.kept_back(r, phase) for r, phase in enumerate(self.runs.phases)]
+        )
         return Blocks(usable & ~kept, usable & kept)
 
     def drive(
@@ -248,15 +263,36 @@ class FreeRun:
             for j, asked in enumerate(self.runs.between)
             if asked and self.responses.reaches(output, j) and moves_on(self.model, output, j)
         ]
-        return np.column_stack([block_diag(*blocks), *late])
+        within = [
+            self._within(output, j)
+            for j in range(len(self.model.valves))
+            if self.runs.scans is not None and self.responses.reaches(output, j)
+        ]
+        return np.column_stack([block_diag(*blocks), *late, *within])
 
     def _late(self, output: int, valve: int) -> FloatArray:
-        """Return what an output lacks where a stem's moves come a sample late, shape (N,)."""
-        moves = np.zeros(len(self.runs))
+        """Return what an output lacks where a stem's moves come a sample late, shape (N, 1)."""
+        moves = np.zeros((len(self.runs), 1))
         for rows in self.runs.slices:
-            moves[rows][1:] = np.diff(self.stems[rows, valve])
-        moved = self.drive(output, valve, (self.stems[:, valve] + SMALL * moves)[:, None])[:, 0]
-        return np.asarray((moved - self.forced[:, output]) / SMALL)
+            moves[rows][1:, 0] = np.diff(self.stems[rows, valve])
+        return self._answer(output, valve, moves)
+
+    def _within(self, output: int, valve: int) -> FloatArray:
+        """Return the answers to what the first scan of a sample is above the second, shape (N, 2).
+
+        Now and a sample late: together they hold what any process of two lags does.
+        """
+        first, second = self.scanned[:, valve].reshape(len(self.runs), -1).T
+        above = np.zeros((len(self.runs), 2))
+        for rows in self.runs.slices:
+            above[rows, 0] = first[rows] - second[rows]
+            above[rows][1:, 1] = above[rows][:-1, 0]
+        return self._answer(output, valve, above)
+
+    def _answer(self, output: int, valve: int, moves: FloatArray) -> FloatArray:
+        """Return what small moves of a stem, shape (N, G), %, do to an output, per %."""
+        moved = self.drive(output, valve, self.stems[:, valve, None] + SMALL * moves)
+        return np.asarray((moved - self.forced[:, output, None]) / SMALL)
 
     def _inputs(self, rows: slice) -> list[FloatArray]:
         """Return what enters the process in one record, per valve, each of shape (N, 1)."""

@@ -14,6 +14,7 @@ from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.data.long_records import liveliest_parts
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted
 from stiction_ros.discrepancy.options import GapOptions
 from stiction_ros.discrepancy.process.refit import (
     longest_delay,
@@ -57,6 +58,7 @@ def begin(
         unseen=unseen_of(runs, controller),
         between=() if options.free_process else _between(model),
     )
+    runs = with_surprises_fitted(model, runs)
     bare, longest = add_data_effects(model, data), 0
     if options.free_process:
         longest = longest_delay(model)

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from gap_loops import loop, record, without_controller, without_set_points
+from gap_loops import loop, record, without_controller
 
 from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
@@ -134,11 +134,6 @@ def test_a_late_shortof_pv_is_named(known: bool) -> None:
     check = check_controller(model, join_records(model, [dataclasses.replace(recorded, pv=late)]))
     assert check.finding is not None
     assert check.finding.behaviour == TimeShift(4.0)
-
-
-def test_without_set_points_the_controller_is_not_asked() -> None:
-    check = check_controller(loop(), join_records(loop(), [without_set_points(record(loop()))]))
-    assert check.status is ControllerStatus.NOT_ASKED
 
 
 def test_op_of_an_operator_is_left_unexplained() -> None:

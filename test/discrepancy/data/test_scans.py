@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from gap_loops import loop, record, without_controller
+from gap_loops import loop, record, without_controller, without_set_points
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
 from stiction_ros.discrepancy.data.controller_check import check_controller
@@ -20,7 +20,7 @@ EVERY = 2
 TUNING = PiTuning(gain=0.8, integral_time=24.0)
 
 
-def thinned() -> tuple[Runs, LoopModel, FloatArray]:
+def thinned(*, with_sp: bool = True) -> tuple[Runs, LoopModel, FloatArray]:
     """Return every other sample of a loop, its model and the mean OP of each sample."""
     document = without_controller(loop()).to_mapping()
     document["controller"] = {"kind": "pi", "gain": 0.8, "integral_time": 24.0}
@@ -35,7 +35,7 @@ def thinned() -> tuple[Runs, LoopModel, FloatArray]:
         sp=whole.sp[::EVERY],
     )
     slower = LoopModel.from_mapping(document | {"sample_time": float(EVERY)})
-    runs, _ = open_gate(slower, [part])
+    runs, _ = open_gate(slower, [part if with_sp else without_set_points(part)])
     return runs, slower, whole.op[:, 0].reshape(-1, EVERY).mean(axis=1)
 
 
@@ -66,7 +66,16 @@ def test_a_stem_slips_by_the_op_of_either_scan() -> None:
     assert bare.stems == pytest.approx(found.op)
     candidate = next(c for c in valve_candidates(bare) if c.law == "he")
     assert isinstance(candidate, ValveCandidate)
-    assert candidate.stems(bare, np.array([[1.0, 0.6, 0.0]]))[:, 0] == pytest.approx(moved)
+    assert candidate.stems(bare, np.array([[1.0, 0.6, 0.0]])) == pytest.approx(sticky.stems)
+
+
+def test_without_set_points_the_op_between_two_samples_is_told_too() -> None:
+    runs, model, mean = thinned(with_sp=False)
+    check = check_controller(model, runs)
+    assert check.scans is not None
+    away, naive = check.scans.op[:-1, 0] - mean[:-1], runs.op[:-1, 0] - mean[:-1]
+    assert np.std(away) < 0.2 * np.std(naive)
+    assert check.unsure is not None
 
 
 def test_its_recorded_tuning_is_no_other_one() -> None:

@@ -1,0 +1,181 @@
+r"""The set-point that a record lacks, where the law of its controller tells it.
+
+.. math:: s_k = u_k - u_{k-1} + K (y_k - y_{k-1}) + I \sum y = K (r_k - r_{k-1}) + I \sum r
+
+rests where the set-point r does, and jumps where it does. The sums are over the scans of a sample.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.discrepancy.data.scans import between_samples
+from stiction_ros.discrepancy.likelihood.noise import BoolArray
+from stiction_ros.discrepancy.simulation.free_run import Runs
+from stiction_ros.effects import FloatArray
+from stiction_ros.loop import LoopModel, PiTuning
+
+TURNS = 30  # of the weights that make the sum of sizes least
+DIGITS = 1e-9  # of the largest move, that counts as nothing
+OUTSIDE = 8.0  # times the usual size of what a law leaves, beyond which SP has moved
+NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
+MOST_MOVES = 0.1  # of the samples: what moves more often is nothing that an operator sets
+FEWEST = 50  # samples in which OP is free
+MOSTLY = 0.5  # of the samples: where OP rests more often, somebody moves it
+LEFT = 0.5  # of the usual change of a move of OP, that a law may leave
+
+
+@dataclasses.dataclass(frozen=True)
+class Told:
+    """Records with set-points that a law tells.
+
+    Attributes:
+        runs: the records.
+        tuning: of the controller.
+        error: standard error of a set-point, units of PV.
+        rest: samples between two moves of it, in the mean.
+    """
+
+    runs: Runs
+    tuning: PiTuning
+    error: float
+    rest: float
+
+
+def told_set_points(model: LoopModel, runs: Runs, scans: int) -> Told | None:
+    """Return the records with the set-points by which a PI law gives OP.
+
+    Args:
+        model: of a loop with one valve and one output.
+        runs: records of it.
+        scans: of the controller in a sample, 1 or 2; PV between two samples is taken to lie on a
+            cubic through the four about them, which leaves the mean of s where it is.
+
+    Returns:
+        None where no law does, or its set-point hardly ever rests.
+    """
+    parts = [_Part.of(runs, rows, scans, model.limits[0]) for rows in runs.slices]
+    law = _law(parts, model.controller, runs.sample_time / scans)
+    if law is None:
+        return None
+    records, levels = [], 0
+    for record, part in zip(runs.records, parts, strict=True):
+        own = part.set_point(*law)
+        if own is None:
+            return None
+        sp = np.full(record.pv.shape, np.nan)
+        sp[:, record.outputs.index(model.outputs[0])] = own
+        records.append(dataclasses.replace(record, sp=sp))
+        levels += len(np.unique(own))
+    rest = max(len(runs) / levels, 2.0)
+    gain, integral, usual = law
+    tuning = PiTuning(gain, gain * runs.sample_time / (scans * integral))
+    error = usual / (scans * abs(integral) * math.sqrt(rest))
+    return Told(dataclasses.replace(runs, records=tuple(records)), tuning, error, rest)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Part:
+    """One record.
+
+    Attributes:
+        scans: of the controller in a sample.
+        moves: u_k − u_{k−1}, shape (N,), the first 0.
+        columns: y_k − y_{k−1} and the sum of y over the scans since k − 1, shape (N, 2).
+        free: where OP and the two before it are between the limits, shape (N,).
+    """
+
+    scans: int
+    moves: FloatArray
+    columns: FloatArray
+    free: BoolArray
+
+    @classmethod
+    def of(cls, runs: Runs, rows: slice, scans: int, limits: FloatArray) -> _Part:
+        """Return the rows of one record."""
+        op, pv = runs.op[rows, 0], runs.pv[rows, 0]
+        free = (op > limits[0]) & (op < limits[1])
+        free[2:] &= free[1:-1] & free[:-2]
+        free[:2] = False
+        seen = pv.copy()
+        if scans == 2:
+            seen[1:] += between_samples(pv)
+        columns = np.column_stack([np.diff(pv, prepend=pv[0]), seen])
+        return cls(scans, np.diff(op, prepend=op[0]), columns, free)
+
+    def set_point(self, gain: float, integral: float, usual: float) -> FloatArray | None:
+        """Return SP, shape (N,); None where it moves too often."""
+        told = self.moves + self.columns @ np.array([gain, integral])
+        moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > OUTSIDE * usual)
+        begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]]))
+        if len(begins) > MOST_MOVES * len(told):
+            return None
+        edges = np.concatenate([[0], begins, [len(told)]])
+        rests = self.free & ~moved
+        counts = np.add.reduceat(rests, edges[:-1]).astype(float)
+        means = np.add.reduceat(np.where(rests, told, 0.0), edges[:-1]) / np.maximum(counts, 1.0)
+        levels = self._levels(told[begins], means, counts, gain, integral)
+        return np.repeat(levels, np.diff(edges))
+
+    def _levels(
+        self, jumps: FloatArray, means: FloatArray, counts: FloatArray, gain: float, integral: float
+    ) -> FloatArray:
+        """Return SP between its moves, by least squares of its rests and of its jumps.
+
+        With two scans in a sample SP may move at either; the one that is nearer is taken.
+
+        Args:
+            jumps: s where SP moves, shape (n − 1,).
+            means: of s between them, shape (n,).
+            counts: samples of each mean, shape (n,); where there are none, the jumps alone tell.
+            gain, integral: K and I.
+        """
+        whole, n = self.scans * integral, len(means)
+        first = means / whole
+        ways = []
+        for late in range(self.scans):
+            old, new = late * integral - gain, whole + gain - late * integral
+            ways.append(new * np.eye(n)[1:] + old * np.eye(n)[:-1])
+        rows = ways[0]
+        if self.scans == 2:
+            left = [np.abs(jumps - way @ first) for way in ways]
+            rows = np.where((left[1] < left[0])[:, None], ways[1], ways[0])
+        weights = np.sqrt(counts)
+        columns = np.vstack([whole * np.diag(weights), rows])
+        wanted = np.concatenate([weights * means, jumps])
+        return np.asarray(np.linalg.lstsq(columns, wanted, rcond=None)[0])
+
+
+def _law(
+    parts: list[_Part], tuning: PiTuning | None, interval: float
+) -> tuple[float, float, float] | None:
+    """Return K, I and the usual size of what they leave of the changes of s; None without a law.
+
+    Where no tuning is given the sum of sizes is least: jumps of SP are few and large.
+
+    Args:
+        parts: of all records.
+        tuning: of the controller, where it is known.
+        interval: between two scans, s.
+    """
+    wanted = np.concatenate([np.diff(p.moves, prepend=0.0)[p.free] for p in parts])
+    columns = np.vstack([-np.diff(p.columns, axis=0, prepend=p.columns[:1])[p.free] for p in parts])
+    if len(wanted) < FEWEST or np.mean(wanted != 0.0) < MOSTLY:
+        return None
+    nothing = DIGITS * float(np.abs(wanted).max())
+    if tuning is None:
+        law, weights = np.zeros(2), np.ones(len(wanted))
+        for _ in range(TURNS):
+            law[:] = np.linalg.lstsq(columns * weights[:, None], wanted * weights, rcond=None)[0]
+            left = np.abs(wanted - columns @ law)
+            weights = 1.0 / np.sqrt(np.maximum(left, nothing))
+    else:
+        law = tuning.gain * np.array([1.0, interval / tuning.integral_time])
+    gain, integral = law.tolist()
+    usual = float(np.median(np.abs(wanted - columns @ law)))
+    if integral == 0.0 or gain / integral <= 0.0 or usual > LEFT * float(np.median(np.abs(wanted))):
+        return None
+    return gain, integral, max(NORMAL_OF_MEDIAN * usual, nothing)
