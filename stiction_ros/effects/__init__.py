@@ -58,6 +58,7 @@ from stiction_ros.effects.sensor.freeze import Freeze
 from stiction_ros.effects.sensor.quantisation import Quantisation
 from stiction_ros.effects.valve.backlash import Backlash
 from stiction_ros.effects.valve.characteristic import Characteristic
+from stiction_ros.effects.valve.characteristic_cubic import CubicCharacteristic
 from stiction_ros.effects.valve.lag import Lag
 from stiction_ros.effects.valve.offset import Offset
 from stiction_ros.effects.valve.saturation import Saturation
@@ -77,6 +78,7 @@ __all__ = [
     "ChoudhuryStiction",
     "Clip",
     "ColouredDisturbance",
+    "CubicCharacteristic",
     "DriftDisturbance",
     "DrivenByNoise",
     "ExtraDelay",

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.candidate.valve import lag_axis, lasts
+from stiction_ros.discrepancy.candidate.valve import lag_axis, lasts, late_axes, later
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Axis,
@@ -72,7 +72,7 @@ class FilterCandidate(OutputCandidate):
             step = run.runs.sample_time
             start = self.starts(points, float(values[0]))
             parts.append(self.kind.simulate_grid(points[:, :1], values, start, step))
-        response = end_to_end(parts)
+        response = self.late(end_to_end(parts), points, run)
         response -= run.forced[:, self.output, None]
         return Response({self.output: response})
 
@@ -80,18 +80,25 @@ class FilterCandidate(OutputCandidate):
         """Return what the filters rest at before the first sample, shape (G,)."""
         return np.full(len(points), first)
 
+    def late(self, values: FloatArray, points: FloatArray, run: FreeRun) -> FloatArray:
+        """Return the outputs of the filters, shape (N, G), as late as they come."""
+        return values
+
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
         return self.kind.from_mapping({self.kind.parameters()[0].key: float(point[0])})
 
 
 class PoleCandidate(FilterCandidate):
-    """One more lag of the output, by its time constant and where it begins."""
+    """One more lag of the output, by its time constant, where it begins and how late it moves."""
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         return lasts(self, point)
 
     def starts(self, points: FloatArray, first: float) -> FloatArray:
         return first + points[:, 1]
+
+    def late(self, values: FloatArray, points: FloatArray, run: FreeRun) -> FloatArray:
+        return later(values, points[:, 2:], run)
 
     def count(self, point: FloatArray) -> int:
         return 1
@@ -141,9 +148,9 @@ def output_candidates(run: FreeRun) -> list[Candidate]:
         delays = Axis(1.0, LONGEST_DELAY, LONGEST_DELAY, natural=True)
         found += [
             GainCandidate(place=f"process:{tag}", effect=ProcessGain.effect, output=i),
-            PoleCandidate.of(run, i, ExtraPole, (lag_axis(run), start)).or_else(
-                f"sensor:{tag}", Lag.effect
-            ),
+            PoleCandidate.of(
+                run, i, ExtraPole, (lag_axis(run), start, *late_axes(any(run.runs.between)))
+            ).or_else(f"sensor:{tag}", Lag.effect),
             FilterCandidate.of(run, i, ExtraDelay, (delays,)),
         ]
         if memory > INTEGRATES * longest:

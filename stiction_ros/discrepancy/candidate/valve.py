@@ -10,12 +10,14 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
+from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
     Backlash,
     Behaviour,
     Characteristic,
+    CubicCharacteristic,
     FloatArray,
     HeStiction,
     Lag,
@@ -28,8 +30,10 @@ from stiction_ros.effects import (
 Rows = Callable[[FloatArray], FloatArray]
 LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
-LEAST_LAG = 5.0  # times the shortest lag that is searched, a fifth of a sample
-LEAST_TRAVEL = 0.1  # of the span of OP
+LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample
+LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
+STATIONS = 101  # of the travel of a valve, at which its curve has to rise
+LEAST_TRAVEL = 0.05  # of the span of OP
 LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two samples
 _NEGLIGIBLE = 1e-9
 
@@ -105,7 +109,11 @@ class ValveCandidate(Candidate):
             shift -= run.forced[:, i : i + 1]
             if max(float(shift.max()), -float(shift.min())) > least:
                 shifts[i] = shift
-        return Response(shifts or {0: np.zeros((len(stems), len(points)))})
+        possible = self.possible(points)
+        return Response(
+            shifts or {0: np.zeros((len(stems), len(points)))},
+            possible=None if possible.all() else possible,
+        )
 
     def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
         row = self.rows(point[None, :])[0]
@@ -172,10 +180,13 @@ class BacklashCandidate(ValveCandidate):
 
 
 class LagCandidate(ValveCandidate):
-    """A lag by its time constant and the place of the stem at the start."""
+    """A lag by its time constant, the place of the stem at the start, and how late it moves."""
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         return lasts(self, point)
+
+    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
+        return later(super().stems(run, points), points[:, 2:], run)
 
     def rows(self, points: FloatArray) -> FloatArray:
         return points[:, :1]
@@ -212,6 +223,35 @@ class SlewCandidate(ValveCandidate):
         return 1
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class CubicCandidate(ValveCandidate):
+    """A characteristic of two figures, by the first and the best second one.
+
+    Attributes:
+        low, high: between which OP moves, %.
+    """
+
+    low: float
+    high: float
+
+    @property
+    def curved(self) -> bool:
+        return True
+
+    @property
+    def absorbed(self) -> bool:
+        """Left out beside a free process, which has a slope of its own."""
+        return True
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        """Refuse curves that are straight where OP moves, or fall."""
+        travel = np.linspace(self.low, self.high, STATIONS)
+        curve = travel + CubicCharacteristic.shapes(travel) @ point
+        chord = np.linspace(curve[0], curve[-1], STATIONS)
+        bent = np.abs(curve - chord).max() >= LEAST_BEND * abs(curve[-1] - curve[0])
+        return bool(bent and np.all(np.diff(curve) > 0.0))
+
+
 class SaturationCandidate(ValveCandidate):
     """A stem that stops short of what OP asks, at one end or both."""
 
@@ -222,10 +262,13 @@ class SaturationCandidate(ValveCandidate):
         low, high = self.axes[0].low, self.axes[1].high
         return int(point[0] > low) + int(point[1] < high)
 
-    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+    def possible(self, points: FloatArray) -> BoolArray:
         """Refuse ends that leave hardly any travel: whatever holds it, such a valve stands."""
         span = self.axes[1].high - self.axes[0].low
-        return abs(float(point[1] - point[0])) >= LEAST_TRAVEL * span
+        return np.asarray(np.abs(points[:, 1] - points[:, 0]) >= LEAST_TRAVEL * span)
+
+    def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
+        return True
 
     def reference(self, seen: Seen) -> tuple[float, ...]:
         return self.axes[0].low, float(np.quantile(seen.values, 0.95))
@@ -294,7 +337,14 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
             run, j, (Axis(0.003 * fastest, 0.95 * fastest, 24, logarithmic=True), start), span
         ),
         LagCandidate.at(
-            run, j, Lag, (lag_axis(run), Axis(-2.0 * span, 2.0 * span, 1, linear=True))
+            run,
+            j,
+            Lag,
+            (
+                lag_axis(run),
+                Axis(-2.0 * span, 2.0 * span, 1, linear=True),
+                *late_axes(any(run.runs.between[j : j + 1])),
+            ),
         ),
         SaturationCandidate.at(
             run,
@@ -303,15 +353,43 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
             (Axis(low, lower, 14, natural=True), Axis(upper, high, 14, natural=True)),
         ),
         ValveCandidate.at(run, j, Characteristic, (Axis(-4.0, 4.0, 18),)),
+        CubicCandidate(
+            place=f"valve:{run.model.valves[j].name}",
+            effect=CubicCharacteristic.effect,
+            axes=(Axis(-40.0, 40.0, 17), Axis(-30.0, 30.0, 1, linear=True)),
+            valve=j,
+            kind=CubicCharacteristic,
+            low=low,
+            high=high,
+        ),
     ]
 
 
 def lasts(candidate: Candidate, point: FloatArray) -> bool:
-    """Tell whether a lag is longer than a sample.
+    """Tell whether a lag is longer than half a sample.
 
     Between samples a signal moves on: less than one of them may be the sampling's own.
     """
     return float(point[0]) >= LEAST_LAG * candidate.axes[0].low
+
+
+def late_axes(asked: bool) -> tuple[Axis, ...]:
+    """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
+    return (Axis(-1.0, 1.0, 1, linear=True),) if asked else ()
+
+
+def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
+    """Return signals that come late by a share of a sample.
+
+    Args:
+        values: shape (N, G).
+        late: samples, shape (G, 1); shape (G, 0) where that is not asked.
+        run: whose records they are of.
+    """
+    for share in late.T:
+        for rows in run.runs.slices:
+            values[rows][1:] -= share * np.diff(values[rows], axis=0)
+    return values
 
 
 def lag_axis(run: FreeRun) -> Axis:

@@ -20,7 +20,8 @@ from stiction_ros.records import Record
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
-ONCE = 1e-3  # of the moves of OP, that a law leaves which scans once
+ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
+TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
 COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem smaller
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
@@ -155,12 +156,14 @@ def _told(model: LoopModel, runs: Runs) -> ControllerCheck:
             continue
         check = _asked(dataclasses.replace(model, controller=told.tuning), told.runs)
         same = check.status is ControllerStatus.SAME
-        if same and check.scans is not None:
+        if same and check.scans is not None and check.left <= TWICE:
             error = check.scans.gain * told.error
             unsure = Unseen(error**2, 1.0 - 1.0 / told.rest)
             checks.append(dataclasses.replace(check, unsure=unsure))
         else:
-            checks.append(check if same and check.left <= EXACT else NOT_ASKED)
+            checks.append(
+                check if same and check.scans is None and check.left <= EXACT else NOT_ASKED
+            )
     once, twice = checks
     return once if once.left <= ONCE or twice.scans is None else twice
 

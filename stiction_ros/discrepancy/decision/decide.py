@@ -224,7 +224,8 @@ def friction_kind(
         return best, (other.candidate.key,)
     if jump > JUMP_SURE and jumping[0].candidate.leaps(jumping[0].point):
         return jumping[0], ()
-    if jump < -JUMP_ABSENT and departures(plain[0]) >= OFTEN:
+    absent = jump < -JUMP_ABSENT and not jumping[0].candidate.leaps(jumping[0].point)
+    if absent and departures(plain[0]) >= OFTEN:
         return plain[0], ()
     first, second = (jumping[0], plain[0]) if jump > 0.0 else (plain[0], jumping[0])
     return first, (second.candidate.key,)

@@ -98,14 +98,18 @@ def extend(
     return Extension(tuple(worth), after_base, True, "")
 
 
-def has_friction(added: Sequence[AddedEffect], fit: CandidateFit) -> bool:
-    """Tell whether a fit is one more friction of a valve that has one already.
+def told_already(added: Sequence[AddedEffect], fit: CandidateFit) -> bool:
+    """Tell whether a fit is one more friction or curve of a valve that has one already.
 
-    The two laws tell one thing in two ways: the second one mends the figures of the first.
+    Laws tell one thing in several ways: the second one mends the figures of the first.
     """
-    family = fit.candidate.about.family
-    return family == FRICTION and any(
-        each.place == fit.candidate.place and each.fit.candidate.about.family == family
+    new = fit.candidate
+    return any(
+        each.place == new.place
+        and (
+            (new.curved and each.fit.candidate.curved)
+            or each.fit.candidate.about.family == FRICTION == new.about.family
+        )
         for each in added
     )
 

@@ -7,8 +7,8 @@ import dataclasses
 from stiction_ros.discrepancy.decision.decide import FRICTION, confirmed, large_enough
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
-    has_friction,
     refit_together,
+    told_already,
 )
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted
 from stiction_ros.discrepancy.fit.search import CandidateFit
@@ -92,7 +92,7 @@ def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]
         and f.evidence > max(mine - NEAR, 0.0)
         and confirmed(f)
         and large_enough(f)
-        and not has_friction(others.added, f)
+        and not told_already(others.added, f)
         and not (own.about.family == f.candidate.about.family == FRICTION)
     ]
     return twins, alike[:RIVALS]

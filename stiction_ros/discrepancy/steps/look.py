@@ -13,11 +13,11 @@ from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
     extend,
-    has_friction,
     held_rows_bear_out,
     left_open,
     moved_away,
     tangents,
+    told_already,
 )
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
 from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
@@ -174,7 +174,7 @@ def decided(task: Task, state: State, scored: Scored) -> Decision:
     else:
         chance = chance_threshold(base, scored.candidates, task.random)
     possible = not_contradicted(base.run, scored.scores.fits)
-    allowed = [fit for fit in possible if not has_friction(state.added, fit)]
+    allowed = [fit for fit in possible if not told_already(state.added, fit)]
     chance *= margin / task.options.margin
     decision = decide(allowed, margin, max(margin, chance), rests_left(base.run))
     if task.options.free_process:

@@ -102,12 +102,21 @@ def test_a_gain_that_a_curve_explains_as_well_is_no_correction_of_the_model() ->
     assert answer.process_changes == ()
 
 
-def test_a_gain_beside_a_curve_of_another_law_is_the_slope_of_that_curve() -> None:
-    answer = answered(141)  # a quadratic characteristic; what is searched is exponential
+@pytest.mark.parametrize("seed", [141, 700099])
+def test_a_curve_that_is_no_exponential_is_one_effect(seed: int) -> None:
+    answer = answered(seed)  # a quadratic characteristic
     assert names(answer) == [("valve:V1", "characteristic")]
-    (change,) = answer.process_changes
-    assert change.what == "gain"
-    assert 1.0 < change.value < 1.15
+    assert answer.process_changes == ()
+    true = -25.0 * hidden_loop(seed).hidden[0].figures["curve"]
+    assert answer.effects[0].parameters["bend"] == pytest.approx(true, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [700100, 710249, 710281])
+def test_a_lag_that_moves_on_between_samples_is_told_from_another_process(seed: int) -> None:
+    answer = answered(seed)
+    (found,) = answer.effects
+    told = {(found.place, found.effect), *found.alternatives}
+    assert told == {("valve:V1", "lag"), ("process:PV1", "pole"), ("sensor:PV1", "lag")}
 
 
 def test_a_curve_is_stepped_with_the_process_that_stands_in_for_it() -> None:
