@@ -137,8 +137,9 @@ def _characteristic(draw: Draw) -> Effect:
     sign = draw.sign()
     if draw.random.random() < 0.5:
         return Effect(places.VALVE, "characteristic", {"curve": sign * draw.within(1.0, 3.0)})
-    curve = sign * draw.within(0.5, 0.9)
-    return Effect(places.VALVE, "characteristic", {"curve": curve}, "quadratic", ("curve",))
+    law = "quadratic" if sign > 0.0 else "in a line"
+    curve = {"curve": draw.within(0.5, 0.9)}
+    return Effect(places.VALVE, "characteristic", curve, law, ("curve",))
 
 
 def _offset(draw: Draw) -> Effect:

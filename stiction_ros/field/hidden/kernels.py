@@ -12,7 +12,7 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.field.kernels import FlagArray, FloatArray, stem_step
 
-SMOOTH, EXPONENTIAL, QUADRATIC = range(3)
+SMOOTH, EXPONENTIAL, QUADRATIC, IN_A_LINE = range(4)
 NO_FRICTION = -1
 VELOCITY, WINDING_UP = range(2)
 
@@ -22,13 +22,20 @@ def curved(kind: int, curve: float, stem: float) -> float:
     """Return the flow behind a stem, %: a curve through (0, 0) and (100, 100).
 
     Exponential: 100 (R^x − 1)/(R − 1) with ln R = ``curve``; quadratic: (1 − q) x + q x² with
-    q = ``curve``; x is the stem over 100.
+    q = ``curve``; in a line: x / √(s + (1 − s) x²), a linear valve that keeps the share s = 1 −
+    ``curve`` of the pressure drop of its line when it is open; x is the stem over 100.
+
+    References:
+        W. L. Luyben: Process Modeling, Simulation, and Control for Chemical Engineers. 2nd ed.,
+        McGraw-Hill 1990, section 7.1.
     """
     if kind == EXPONENTIAL:
         return 100.0 * (math.exp(curve * stem / 100.0) - 1.0) / (math.exp(curve) - 1.0)
     if kind == QUADRATIC:
         x = stem / 100.0
         return 100.0 * ((1.0 - curve) * x + curve * x * x)
+    if kind == IN_A_LINE:
+        return stem / math.sqrt(1.0 - curve + curve * (stem / 100.0) ** 2)
     return stem
 
 

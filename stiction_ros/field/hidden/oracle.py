@@ -180,7 +180,7 @@ class Fits:
             return self._random(effect)
         moved = [key for key in effect.figures if key not in ("natural", "damping", "lag")]
         moved = [key for key in moved if key not in (*effect.untold, "stribeck")]
-        if effect.law == "quadratic":
+        if effect.law in ("quadratic", "in a line"):
             moved = ["curve"]
         true = np.array([effect.figures[key] for key in moved])
         size = np.maximum(np.abs(true), 1e-6)
@@ -355,6 +355,8 @@ def _allowed(effect: Effect) -> bool:
         if not math.isfinite(value) or (value < 0.0 and not free):
             return False
     if figures.get("f_d", 0.0) > figures.get("f_s", math.inf):
+        return False
+    if effect.law == "in a line" and figures["curve"] >= 1.0:
         return False
     if figures.get("sliding", 0.0) > figures.get("static", math.inf):
         return False

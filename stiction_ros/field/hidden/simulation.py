@@ -26,6 +26,13 @@ LEAD = 300
 
 FAR = 1e9
 
+CURVES = {
+    "": kernels.EXPONENTIAL,
+    "quadratic": kernels.QUADRATIC,
+    "in a line": kernels.IN_A_LINE,
+}
+"""Of a characteristic, by its law."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Signals:
@@ -172,7 +179,7 @@ def _chain(effects: Iterable[Effect]) -> FloatArray:
             low, high = figures["low"], figures["high"]
         elif effect.name == "characteristic":
             curve = figures["curve"]
-            kind = kernels.QUADRATIC if effect.law == "quadratic" else kernels.EXPONENTIAL
+            kind = CURVES[effect.law]
         elif effect.name == "offset":
             offset = figures["size"]
     return np.array([slew, lag, low, high, float(kind), curve, offset])
