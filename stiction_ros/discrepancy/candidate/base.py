@@ -180,6 +180,16 @@ class Candidate(ABC):
         """
         raise NotImplementedError(f"{self.name} is no needle")
 
+    def combed(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return values around a point as :meth:`scattered` does, whatever happened before.
+
+        Args:
+            point: values, shape (axes,).
+            cube: points between −1 and 1, shape (G, axes).
+            size: of the box, 1 for the largest.
+        """
+        raise NotImplementedError(f"{self.name} is no needle")
+
     def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
         """Return values along the valley of a point, over its whole length; for needles alone.
 

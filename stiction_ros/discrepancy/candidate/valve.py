@@ -152,6 +152,12 @@ class StictionCandidate(ValveCandidate):
         leads = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
         return self._points(totals, jumps, leads)
 
+    def combed(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+        """Return points around one as ``scattered`` does, with any start."""
+        values = self.scattered(point, cube, size)
+        values[:, 2] = cube[:, 2]
+        return values
+
     def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
         """Return points of about the same sum of the frictions, with any jump and any start."""
         totals = math.exp(self.valley(point)) * np.exp(SUM_BOX * cube[:, 0])

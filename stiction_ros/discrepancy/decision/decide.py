@@ -20,6 +20,7 @@ FRICTION = "friction"  # families of effects
 LAGS = "lag"
 SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
 DOUBTFUL = 3.0  # standard deviations
+ONE_LAW = 0.05  # of the evidence of a lag, that another one in its path may explain less
 EQUAL = 1.0  # BIC by which two explanations differ that are one
 MOMENT = 10.0  # what held-out rows may lose by an effect of one moment
 
@@ -115,7 +116,7 @@ def decide(
         for f in ranked
         if f.candidate.inside
         and f.candidate.key != best.candidate.key
-        and f.evidence > max(best.evidence - margin, 0.0)
+        and f.evidence > max(best.evidence - _apart(f, best, margin), 0.0)
         and large_enough(f)
         and not _same_family(f, best)
     ]
@@ -182,6 +183,14 @@ def _part(fit: CandidateFit, stranger: CandidateFit) -> bool:
     """Tell whether a fit is most of what a rival outside the catalogue contains."""
     part = fit.candidate.key in stranger.candidate.contains
     return part and fit.evidence > stranger.candidate.most_of * stranger.evidence
+
+
+def _apart(fit: CandidateFit, best: CandidateFit, margin: float) -> float:
+    """Return the evidence by which two effects are told apart.
+
+    Two lags of one path are one law: what tells them is where they begin and how they are sampled.
+    """
+    return max(margin, ONE_LAW * best.evidence) if _lags(fit) and _lags(best) else margin
 
 
 def _lags(fit: CandidateFit) -> bool:

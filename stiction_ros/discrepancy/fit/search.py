@@ -11,7 +11,6 @@ import numpy as np
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.evolution import evolved
 from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.fit.settled import settled
 from stiction_ros.discrepancy.fit.shared_factors import shared_factors
@@ -37,9 +36,8 @@ THROWS = 2
 THROWN = 400
 THROW_SHRINK = 0.7
 CENTRES = 5
-BOXES = (0.02, 0.1, 0.3, 1.0)  # in which a crowd begins, of the largest box
-IN_A_BOX = 1000
-CROWD, EVOLUTION, CROWDS = 250, 40, 2  # points, and rounds in which they move
+COMBS = (0.1, 0.03, 0.01)  # boxes around the best point, of the largest
+TEETH, STROKES = 3000, 4  # points in each, and how often it is moved to a better one
 ROUNDS = 5
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
@@ -102,8 +100,7 @@ def fit_candidate(
             search.refine(centre, 0.7, ar)
     if candidate.needle and around is None and search.best().delta_bic > 0.0:
         search.scatter()
-        for _ in range(CROWDS):
-            search.evolve()
+        search.comb()
     if candidate.dated:
         if len(candidate.axes) > 1:
             search.polish()
@@ -251,26 +248,21 @@ class _Search:
                 self._judge_best(values, response, dict.fromkeys(response.outputs, ar))
             size *= THROW_SHRINK
 
-    def evolve(self) -> None:
-        """Let a crowd around the best point move on; what it ends in is judged."""
-        candidate, best = self.candidate, self.best()
-        ar = {i: noise.ar for i, noise in best.noise.items()}
-        halton = halton_sequence(len(candidate.axes), seed=0)
-        thrown = [
-            candidate.scattered(best.point, 2.0 * halton.random(IN_A_BOX) - 1.0, size)
-            for size in BOXES
-        ]
-        values = np.vstack([best.point[None, :], *thrown])
-        begun = np.array([candidate.coordinates(each) for each in values])
-        ends = np.array([[a.inner(a.low), a.inner(a.high)] for a in candidate.axes])
+    def comb(self) -> None:
+        """Search many points in ever smaller boxes around the best one, in each while they gain.
 
-        def loss(points: FloatArray) -> FloatArray:
-            response = candidate.respond(self.base.run, candidate.values(points))
-            return misfit(self.base, self.gap, response, ar)
-
-        points, losses = evolved(loss, begun, ends, CROWD, EVOLUTION)
-        for k in candidate.apart(points, losses, LEADERS):
-            self._try(points[k : k + 1])
+        The start of a stem is left open in all of them: one that is wrong hides the rest.
+        """
+        halton = halton_sequence(len(self.candidate.axes), seed=0)
+        for size in COMBS:
+            for _ in range(STROKES):
+                best = self.best()
+                values = self.candidate.combed(best.point, 2.0 * halton.random(TEETH) - 1.0, size)
+                response = self.candidate.respond(self.base.run, values)
+                self.best_of(values, response, [best.noise, self.base.noise])
+                self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
+                if self.best().delta_bic < best.delta_bic + NEXT_TO_NOTHING:
+                    break
 
     def _valleys(self) -> list[CandidateFit]:
         """Return the best fits so far, each in a valley of its own."""

@@ -7,7 +7,6 @@ import dataclasses
 from stiction_ros.discrepancy.decision.decide import confirmed
 from stiction_ros.discrepancy.decision.extend import refit_together
 from stiction_ros.discrepancy.steps.again import told_again
-from stiction_ros.discrepancy.steps.curve import slope_to_its_curve
 from stiction_ros.discrepancy.steps.friction import friction_beside_others, friction_told_again
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.mending import mended, singles
@@ -28,7 +27,6 @@ def settle(task: Task, state: State) -> State:
     other = mended(task, state)
     if other is not None:
         state = best_of_wholes(task, look_on(task, other))
-    state = slope_to_its_curve(task, state)
     if len(state.added) > 1 or state.changes:
         state = friction_told_again(task, state)
     if len(state.added) > 1:

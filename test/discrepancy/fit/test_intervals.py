@@ -10,7 +10,6 @@ from gap_loops import loop, record
 from stiction_ros.discrepancy.candidate.wave import DisturbanceCandidate
 from stiction_ros.discrepancy.candidate.waves import SineWave, StepWave
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.evolution import evolved
 from stiction_ros.discrepancy.fit.region import SMOOTH, STEPPED, Region
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.uncertainty import likelihood_intervals
@@ -64,17 +63,3 @@ def test_the_bound_of_a_moment_is_that_of_a_step() -> None:
     assert SMOOTH < Region.around(base, fit).excess.max() <= STEPPED
     base, fit = sine(0.0)
     assert 0.5 * SMOOTH < Region.around(base, fit).excess.max() <= SMOOTH
-
-
-def test_a_crowd_finds_a_needle_behind_a_good_point() -> None:
-    def loss(points: FloatArray) -> FloatArray:
-        across, along = points[:, 0] - points[:, 1], points[:, 0] - 0.7
-        valley = 5.0 + 4000.0 * np.abs(across) + 100.0 * np.abs(along)
-        lone = 50.0 + 1e5 * np.abs(points - 0.2).max(axis=1)  # found first, and no better one near
-        return np.minimum(valley, lone)
-
-    begun = np.vstack([[[0.2, 0.2]], np.random.default_rng(1).random((400, 2))])
-    ends = np.array([[0.0, 1.0], [0.0, 1.0]])
-    points, losses = evolved(loss, begun, ends, 100, 40)
-    assert losses == pytest.approx(loss(points))
-    assert points[np.argmin(losses)] == pytest.approx(0.7, abs=0.01)
