@@ -8,7 +8,14 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
-from stiction_ros.discrepancy.candidate.waves import DriftWave, ShapedWave, SineWave, StepWave, Wave
+from stiction_ros.discrepancy.candidate.waves import (
+    FASTEST,
+    DriftWave,
+    ShapedWave,
+    SineWave,
+    StepWave,
+    Wave,
+)
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, left_by, projector
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
@@ -20,8 +27,10 @@ from stiction_ros.effects import (
     about,
 )
 
-PEAKS = 6
+PEAKS, STANDING_OUT = 6, 3
+NEIGHBOURS = 51  # frequencies, half a spectral line apart, whose median a line is held against
 SURPRISES = 12
+_TINY = 1e-300
 SMALL = 0.01  # %, of a wave by which a process that is not linear is asked for its slope
 SAME = 1e-3  # of a wave's length, that another one and the start of the record may leave of it
 
@@ -188,14 +197,23 @@ def surprises(run: FreeRun, innovations: list[FloatArray]) -> FloatArray:
 
 
 def spectral_lines(values: list[FloatArray], lowest: float) -> FloatArray:
-    """Return the strongest lines of a gap, raw and whitened, in cycles per sample."""
+    """Return the strongest lines of a gap, raw and whitened, in cycles per sample.
+
+    And those that stand out most among their neighbours: behind slow noise, a wave is not what is
+    strongest.
+    """
+    from scipy.ndimage import median_filter
+
     found: list[float] = []
     for each in values:
         power = np.abs(np.fft.rfft(each - each.mean(), 2 * len(each))) ** 2
         frequency = np.arange(len(power)) / (2.0 * len(each))
-        power[(frequency < lowest) | (frequency > 0.45)] = 0.0
-        for _ in range(PEAKS):
-            peak = int(np.argmax(power))
-            found.append(float(frequency[peak]))
-            power[max(peak - 3, 0) : peak + 4] = 0.0
+        outside = (frequency < lowest) | (frequency > FASTEST)
+        beside = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), _TINY)
+        for sizes, count in ((power, PEAKS), (power / beside, STANDING_OUT)):
+            sizes[outside] = 0.0
+            for _ in range(count):
+                peak = int(np.argmax(sizes))
+                found.append(float(frequency[peak]))
+                sizes[max(peak - 3, 0) : peak + 4] = 0.0
     return np.unique(found)
