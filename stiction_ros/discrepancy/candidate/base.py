@@ -170,23 +170,16 @@ class Candidate(ABC):
                 break
         return chosen
 
-    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+    def scattered(
+        self, point: FloatArray, cube: FloatArray, size: float, *, any_start: bool = False
+    ) -> FloatArray:
         """Return values in a box around a point, shape (G, axes); for needles alone.
 
         Args:
             point: values, shape (axes,).
             cube: points between −1 and 1, shape (G, axes).
             size: of the box, 1 for the largest.
-        """
-        raise NotImplementedError(f"{self.name} is no needle")
-
-    def combed(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
-        """Return values around a point as :meth:`scattered` does, whatever happened before.
-
-        Args:
-            point: values, shape (axes,).
-            cube: points between −1 and 1, shape (G, axes).
-            size: of the box, 1 for the largest.
+            any_start: whether a stem may have stood anywhere before the first sample.
         """
         raise NotImplementedError(f"{self.name} is no needle")
 

@@ -140,7 +140,9 @@ class StictionCandidate(ValveCandidate):
     def leaps(self, point: FloatArray) -> bool:
         return float(1.0 - point[1]) >= LEAST_JUMP * float(1.0 + point[1])
 
-    def scattered(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
+    def scattered(
+        self, point: FloatArray, cube: FloatArray, size: float, *, any_start: bool = False
+    ) -> FloatArray:
         """Return points around one in the sum of the frictions and their difference, the jump.
 
         The sum, how far OP goes back before the stem follows, is told well by any record; the
@@ -149,14 +151,9 @@ class StictionCandidate(ValveCandidate):
         total, jump = point[0] * (1.0 + point[1]), point[0] * (1.0 - point[1])
         totals = total * np.exp(SUM_BOX * size * cube[:, 0])
         jumps = np.clip(jump + JUMP_BOX * total * size * cube[:, 1], 0.0, totals)
-        leads = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
+        near = np.clip(point[2] + 2.0 * size * cube[:, 2], -1.0, 1.0)
+        leads = cube[:, 2] if any_start else near
         return self._points(totals, jumps, leads)
-
-    def combed(self, point: FloatArray, cube: FloatArray, size: float) -> FloatArray:
-        """Return points around one as ``scattered`` does, with any start."""
-        values = self.scattered(point, cube, size)
-        values[:, 2] = cube[:, 2]
-        return values
 
     def along(self, point: FloatArray, cube: FloatArray) -> FloatArray:
         """Return points of about the same sum of the frictions, with any jump and any start."""

@@ -257,7 +257,8 @@ class _Search:
         for size in COMBS:
             for _ in range(STROKES):
                 best = self.best()
-                values = self.candidate.combed(best.point, 2.0 * halton.random(TEETH) - 1.0, size)
+                cube = 2.0 * halton.random(TEETH) - 1.0
+                values = self.candidate.scattered(best.point, cube, size, any_start=True)
                 response = self.candidate.respond(self.base.run, values)
                 self.best_of(values, response, [best.noise, self.base.noise])
                 self._judge_best(values, response, dict.fromkeys(response.outputs, NO_MEMORY))
