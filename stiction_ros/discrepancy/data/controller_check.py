@@ -148,24 +148,23 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
 
 def _told(model: LoopModel, runs: Runs) -> ControllerCheck:
     """Return what the set-points show that a law tells: that law has to give OP."""
-    checks = []
-    for scans in (1, 2):
-        told = told_set_points(model, runs, scans)
-        if told is None:
-            checks.append(NOT_ASKED)
-            continue
-        check = _asked(dataclasses.replace(model, controller=told.tuning), told.runs)
-        same = check.status is ControllerStatus.SAME
-        if same and check.scans is not None and check.left <= TWICE:
-            error = check.scans.gain * told.error
-            unsure = Unseen(error**2, 1.0 - 1.0 / told.rest)
-            checks.append(dataclasses.replace(check, unsure=unsure))
-        else:
-            checks.append(
-                check if same and check.scans is None and check.left <= EXACT else NOT_ASKED
-            )
-    once, twice = checks
+    once, twice = (_told_by(model, runs, scans) for scans in (1, 2))
     return once if once.left <= ONCE or twice.scans is None else twice
+
+
+def _told_by(model: LoopModel, runs: Runs, scans: int) -> ControllerCheck:
+    """Return what the set-points show that a law of one or two scans in a sample tells."""
+    told = told_set_points(model, runs, scans)
+    if told is None:
+        return NOT_ASKED
+    check = _asked(dataclasses.replace(model, controller=told.tuning), told.runs)
+    most = EXACT if check.scans is None else TWICE
+    if check.status is not ControllerStatus.SAME or check.left > most:
+        return NOT_ASKED
+    if check.scans is None:
+        return check
+    error = check.scans.gain * told.error
+    return dataclasses.replace(check, unsure=Unseen(error**2, 1.0 - 1.0 / told.rest))
 
 
 def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:

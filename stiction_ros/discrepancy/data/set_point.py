@@ -11,6 +11,7 @@ import dataclasses
 import math
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
 from stiction_ros.discrepancy.likelihood.noise import BoolArray
@@ -111,10 +112,10 @@ class _Part:
         told = self.moves + self.columns @ np.array([gain, integral])
         moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > OUTSIDE * usual)
         begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]]))
-        if len(begins) > MOST_MOVES * len(told):
+        rests = self.free & ~moved
+        if len(begins) > MOST_MOVES * len(told) or not rests.any():
             return None
         edges = np.concatenate([[0], begins, [len(told)]])
-        rests = self.free & ~moved
         counts = np.add.reduceat(rests, edges[:-1]).astype(float)
         means = np.add.reduceat(np.where(rests, told, 0.0), edges[:-1]) / np.maximum(counts, 1.0)
         levels = self._levels(told[begins], means, counts, gain, integral)
@@ -133,20 +134,23 @@ class _Part:
             counts: samples of each mean, shape (n,); where there are none, the jumps alone tell.
             gain, integral: K and I.
         """
-        whole, n = self.scans * integral, len(means)
+        whole = self.scans * integral
         first = means / whole
-        ways = []
-        for late in range(self.scans):
-            old, new = late * integral - gain, whole + gain - late * integral
-            ways.append(new * np.eye(n)[1:] + old * np.eye(n)[:-1])
-        rows = ways[0]
-        if self.scans == 2:
-            left = [np.abs(jumps - way @ first) for way in ways]
-            rows = np.where((left[1] < left[0])[:, None], ways[1], ways[0])
-        weights = np.sqrt(counts)
-        columns = np.vstack([whole * np.diag(weights), rows])
-        wanted = np.concatenate([weights * means, jumps])
-        return np.asarray(np.linalg.lstsq(columns, wanted, rcond=None)[0])
+        if not len(jumps):
+            return first
+        late = integral * np.arange(self.scans)[:, None]  # what of the sums is still the old one's
+        old, new = late - gain, whole + gain - late
+        left = np.abs(jumps - new * first[1:] - old * first[:-1])
+        nearer = left.argmin(axis=0)
+        old, new = old[nearer, 0], new[nearer, 0]
+        bands, wanted = np.zeros((2, len(means))), whole * counts * means
+        bands[1] = whole**2 * counts
+        bands[1, 1:] += new**2
+        bands[1, :-1] += old**2
+        bands[0, 1:] = old * new
+        wanted[1:] += new * jumps
+        wanted[:-1] += old * jumps
+        return np.asarray(solveh_banded(bands, wanted))
 
 
 def _law(

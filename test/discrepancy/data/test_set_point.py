@@ -35,6 +35,13 @@ def test_a_set_point_at_rest_is_told_to_its_digits(records: int) -> None:
         assert found.sp[1:] == pytest.approx(true.sp[1:], abs=1e-6)
 
 
+def test_a_set_point_that_never_moves_is_told() -> None:
+    runs = join_records(loop(), [without_set_points(record(loop(), moves=False))])
+    told = told_set_points(loop(), runs, 1)
+    assert told is not None
+    assert told.runs.records[0].sp == pytest.approx(50.0, abs=1e-6)
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_the_controller_is_recognised_and_nothing_acts_beside_its_op(known: bool) -> None:
     model = loop() if known else without_controller(loop())
