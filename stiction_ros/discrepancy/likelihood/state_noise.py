@@ -10,6 +10,7 @@ from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.effects import FloatArray
 
 DOUBLINGS = 30
+STEADY = 1e-13  # of a gain and of a variance: what changes less from row to row stays
 _TINY = 1e-300
 
 
@@ -83,35 +84,43 @@ def innovations(
     states, p = np.zeros((columns, size)), start.copy()
     shown, moved, gain = np.zeros(size), np.zeros((size, size)), np.zeros(size)
     following = np.zeros(size)
+    total, unit, steady = r, 1.0, False
     for k in range(count):
         if begins[k]:
             states[:] = 0.0
             p[:] = start
-        total = r
-        for i in range(size):
-            shown[i] = 0.0
-            for j in range(size):
-                shown[i] += p[i, j] * c[j]
-            total += c[i] * shown[i]
+            steady = False
+        if not (steady and seen[k] and when[k] == when[k - 1]):
+            before, total = total, r
+            for i in range(size):
+                shown[i] = 0.0
+                for j in range(size):
+                    shown[i] += p[i, j] * c[j]
+                total += c[i] * shown[i]
+            unit = np.sqrt(total)
+            steady = seen[k] and abs(total - before) <= STEADY * total
+            for i in range(size):
+                old = gain[i]
+                gain[i] = 0.0
+                for j in range(size):
+                    gain[i] += a[i, j] * shown[j] / total if seen[k] else 0.0
+                steady = steady and abs(gain[i] - old) <= STEADY * (1.0 + abs(old))
+                for j in range(size):
+                    moved[i, j] = 0.0
+                    for m in range(size):
+                        moved[i, j] += a[i, m] * p[m, j]
+            for i in range(size):
+                for j in range(i, size):
+                    value = q[i, j] + when[k] * driven[i, j] - gain[i] * gain[j] * total
+                    for m in range(size):
+                        value += moved[i, m] * a[j, m]
+                    p[i, j] = p[j, i] = value
         variance[k] = total
-        for i in range(size):
-            gain[i] = 0.0
-            for j in range(size):
-                gain[i] += a[i, j] * shown[j] / total if seen[k] else 0.0
-                moved[i, j] = 0.0
-                for m in range(size):
-                    moved[i, j] += a[i, m] * p[m, j]
-        for i in range(size):
-            for j in range(i, size):
-                value = q[i, j] + when[k] * driven[i, j] - gain[i] * gain[j] * total
-                for m in range(size):
-                    value += moved[i, m] * a[j, m]
-                p[i, j] = p[j, i] = value
         for g in range(columns):
             left = values[g, k]
             for i in range(size):
                 left -= c[i] * states[g, i]
-            missed[g, k] = left / np.sqrt(total)
+            missed[g, k] = left / unit
             for i in range(size):
                 following[i] = gain[i] * left
                 for j in range(size):
