@@ -114,6 +114,7 @@ def innovations(
                     value = q[i, j] + when[k] * driven[i, j] - gain[i] * gain[j] * total
                     for m in range(size):
                         value += moved[i, m] * a[j, m]
+                    steady = steady and abs(value - p[i, j]) <= STEADY * (1.0 + abs(value))
                     p[i, j] = p[j, i] = value
         variance[k] = total
         for g in range(columns):
