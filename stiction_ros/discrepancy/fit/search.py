@@ -92,7 +92,11 @@ def fit_candidate(
         around: a point near which alone is searched, shape (axes,), values; None everywhere.
     """
     search = _Search(base, gap, candidate)
-    centres = search.coarse()[:STARTS] if around is None else [candidate.coordinates(around)]
+    if around is None:
+        centres = search.coarse()[:STARTS]
+    else:
+        search.judge(around, candidate.respond(base.run, around[None, :]))
+        centres = [candidate.coordinates(around)]
     for centre in centres:
         search.refine(centre, 0.7)
     if candidate.sharp and around is None:
@@ -187,7 +191,7 @@ class _Search:
         if not self.candidate.axes:
             self._try(self.candidate.grid())
             return
-        best = self._try(np.array([centre]), under=under)
+        best = self._try(np.array([centre]), self.found, under)
         for _ in range(ROUNDS):
             best = self._around(best, size, under)
             size *= SHRINK

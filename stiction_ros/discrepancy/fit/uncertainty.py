@@ -98,9 +98,9 @@ def bootstrap_intervals(
 ) -> Intervals:
     """Return 95 % of each parameter by resampled blocks of innovations.
 
-    Every resample is the fitted response with noise rebuilt from blocks of 25 innovations in
-    random order, fitted again near the estimate. The interval is at least that of the
-    likelihood.
+    Every resample is the fitted response with noise rebuilt from blocks of 25 innovations of
+    scored rows in random order, fitted again near the estimate. The interval is at least that of
+    the likelihood.
     """
     found = []
     gap = base.run.gap
@@ -110,7 +110,8 @@ def bootstrap_intervals(
         for i in response.outputs:
             noise = fit.noise[i]
             fitted = gap[:, i] - noise.residual
-            drawn[:, i] = fitted + _rebuilt(noise.innovations, noise.ar, random)
+            sound = noise.innovations[base.blocks[i].scored]
+            drawn[:, i] = fitted + _rebuilt(sound, len(drawn), noise.ar, random)
         again = fit_candidate(base, drawn, fit.candidate, fit.point if len(fit.point) else None)
         found.append((again.point, again.factors))
         if progress is not None:
@@ -265,9 +266,10 @@ def _ends(
     return {key: (min(v[key] for v in values), max(v[key] for v in values)) for key in values[0]}
 
 
-def _rebuilt(innovations: FloatArray, ar: FloatArray, random: np.random.Generator) -> FloatArray:
-    """Return noise of the same length from blocks of innovations in random order."""
-    count = len(innovations)
-    begins = random.integers(0, max(count - BLOCK, 1), count // BLOCK + 1)
-    drawn = np.concatenate([innovations[b : b + BLOCK] for b in begins])[:count]
+def _rebuilt(
+    innovations: FloatArray, count: int, ar: FloatArray, random: np.random.Generator
+) -> FloatArray:
+    """Return ``count`` samples of noise from blocks of innovations in random order."""
+    begins = random.integers(0, max(len(innovations) - BLOCK, 1), count // BLOCK + 1)
+    drawn = np.resize(np.concatenate([innovations[b : b + BLOCK] for b in begins]), count)
     return coloured(drawn - drawn.mean(), ar)

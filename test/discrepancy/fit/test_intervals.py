@@ -12,17 +12,20 @@ from stiction_ros.discrepancy.candidate.waves import SineWave, StepWave
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.region import SMOOTH, STEPPED, Region
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.fit.uncertainty import likelihood_intervals
+from stiction_ros.discrepancy.fit.uncertainty import bootstrap_intervals, likelihood_intervals
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects import FloatArray
 
 PERIOD = 40.0
 
 
-def base_beside(added: FloatArray) -> Baseline:
+def base_beside(added: FloatArray, unscored: FloatArray | None = None) -> Baseline:
     model = loop()
     runs = join_records(model, [record(model)])
-    runs = dataclasses.replace(runs, pv=runs.pv + added[:, None])
+    pv, usable = runs.pv + added[:, None], runs.usable.copy()
+    if unscored is not None:
+        pv, usable = pv + unscored[:, None], usable & (unscored == 0.0)
+    runs = dataclasses.replace(runs, pv=pv, usable=usable)
     return Baseline.of(FreeRun(model, runs))
 
 
@@ -33,8 +36,8 @@ def sine(phase: float) -> tuple[Baseline, CandidateFit]:
     return base, fit_candidate(base, base.run.gap, DisturbanceCandidate.on(base.run, 0, wave))
 
 
-def step() -> tuple[Baseline, CandidateFit]:
-    base = base_beside(np.where(np.arange(900) >= 400, 0.3, 0.0))
+def step(unscored: FloatArray | None = None) -> tuple[Baseline, CandidateFit]:
+    base = base_beside(np.where(np.arange(900) >= 400, 0.3, 0.0), unscored)
     candidate = DisturbanceCandidate.on(base.run, 0, StepWave.of(base.run, np.array([400.0])))
     return base, fit_candidate(base, base.run.gap, candidate)
 
@@ -47,6 +50,17 @@ def test_the_size_of_a_sine_is_as_sure_at_any_phase() -> None:
         assert low < 0.3 < high
         widths.append(high - low)
     assert widths == pytest.approx([widths[0]] * 3, rel=0.15)
+
+
+def test_rows_that_are_not_scored_make_no_noise() -> None:
+    wild = np.zeros(900)
+    wild[600:603] = 50.0
+    widths = []
+    for unscored in (None, wild):
+        base, fit = step(unscored)
+        low, high = bootstrap_intervals(base, fit, 40, np.random.default_rng(1))["size"]
+        widths.append(high - low)
+    assert widths[1] < 1.5 * widths[0]
 
 
 def test_what_another_effect_may_do_otherwise_makes_a_size_less_sure() -> None:
