@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
-from stiction_ros.discrepancy.data.scans import Scans, scanned_twice
+from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
 from stiction_ros.discrepancy.data.set_point import told_set_points
 from stiction_ros.discrepancy.data.unrounded import unrounded
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
@@ -29,6 +29,9 @@ FINE = 0.02  # of the span of OP: values that are chosen are rounder than what r
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
 DIGITS = 1e-7  # of the span of OP, that its digits may leave
 NEARLY_ALL = 0.9  # of the samples: where OP rests more often, no scan lies between them
+FITTED, LASTING = 0.03, 0.98
+"""Of the steps of OP, by which a law with a fitted tuning tells it wrongly, and how much of that is
+left in the next sample."""
 HALF = 0.5  # of a sample, for which an OP between two samples is held
 NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
 MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
@@ -61,7 +64,9 @@ class ControllerCheck:
             not, or whose OP between the samples is not told.
         finer: the OP that its law gives within the steps of the recorded one, %, shape (N, 1); None
             where OP is not rounded, or no law tells it.
-        unsure: how far OP between the samples is off, where SP was told and not recorded.
+        unsure: how far OP is off that was told by a law whose SP was not recorded, or whose tuning
+            was not.
+        between: whether OP may be another between the samples, as far as rounded values tell.
     """
 
     status: ControllerStatus
@@ -71,6 +76,7 @@ class ControllerCheck:
     scans: Scans | None = None
     finer: FloatArray | None = None
     unsure: Unseen | None = None
+    between: bool = False
 
     def op(self, runs: Runs) -> FloatArray:
         """Return the OP of the records as the law tells it, %, shape (N, m)."""
@@ -97,18 +103,20 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         runs: the records.
         check: of the controller.
     """
-    if check.finer is not None:
-        return tuple(() for _ in runs.op.T)
+    if check.finer is not None and not check.between:
+        return tuple(() if check.unsure is None else (check.unsure,) for _ in runs.op.T)
     untold = any(record.sp is None for record in runs.records)
     given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
     asked = not given and check.left > EXACT and check.scans is None
+    asked = asked or check.between
     found = []
     for op in runs.op.T:
         moves = np.concatenate([np.diff(op[rows]) for rows in runs.slices])
         often = float(np.mean(moves != 0.0))
         quantum = quantum_of(op) if often > MANY else _chosen(op)
         keep = 1.0 - often if often <= MANY else 0.0
-        beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
+        rounded = quantum > 0.0 and check.finer is None
+        beside = [Unseen(quantum**2 / 12.0, keep)] if rounded else []
         beside += [] if check.unsure is None else [check.unsure]
         if asked and often > NEARLY_ALL:
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
@@ -171,13 +179,17 @@ def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:
     """Return what the set-points of the records show."""
     check = _compared(model, runs)
     same = check.status is ControllerStatus.SAME and check.scans is None
-    if not same or quantum_of(runs.op[:, 0]) <= 0.0:
+    quantum = quantum_of(runs.op[:, 0])
+    if not same or quantum <= 0.0:
         return check
-    recorded = model.controller
-    if recorded is None:
-        law = _fit(model, runs, 0)
-        recorded = PiTuning(law.gain, law.integral_time)
-    return dataclasses.replace(check, finer=_finer(model, runs, recorded))
+    if model.controller is not None:
+        if rather_twice(model, runs, model.controller):
+            return dataclasses.replace(check, between=True)
+        return dataclasses.replace(check, finer=_finer(model, runs, model.controller))
+    law = _fit(model, runs, 0)
+    finer = _finer(model, runs, PiTuning(law.gain, law.integral_time))
+    unsure = None if finer is None else Unseen((FITTED * quantum) ** 2, LASTING)
+    return dataclasses.replace(check, finer=finer, unsure=unsure, between=True)
 
 
 def _finer(model: LoopModel, runs: Runs, tuning: PiTuning) -> FloatArray | None:
