@@ -114,6 +114,13 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                 usable[i, rows] &= ~alone
                 lonely[i] += int(alone.sum())
                 notes.append(f"{int(alone.sum())} samples of {name} stand alone and are not scored")
+            again = _again(values, quantum, usable[i, rows])
+            if again.any():
+                usable[i, rows] &= ~again
+                notes.append(
+                    f"{int(again.sum())} samples of {name} repeat the one before to the last digit "
+                    "and are not scored"
+                )
             if not rounded and _compressed(values, quantum):
                 notes.append(
                     f"{name} lies on straight lines: a historian has thinned it out, small "
@@ -276,6 +283,19 @@ def _held(values: FloatArray, quantum: float, usable: BoolArray) -> float:
     """
     moves = np.abs(np.diff(values))[usable[1:] & usable[:-1]]
     return _too_often(moves, 0.5 * quantum, values)
+
+
+def _again(values: FloatArray, quantum: float, usable: BoolArray) -> BoolArray:
+    """Return samples that repeat the one before, of values that hardly ever do: they were held.
+
+    None of rounded values, which rest anyway, and of those that are held so often that all evidence
+    counts less for it.
+    """
+    found = np.zeros(len(values), dtype=bool)
+    if quantum > 0.0:
+        return found
+    found[1:] = (np.diff(values) == 0.0) & usable[1:] & usable[:-1]
+    return found if np.mean(found) <= OFTEN else np.zeros_like(found)
 
 
 def _alone(values: FloatArray) -> BoolArray:
