@@ -90,9 +90,10 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
     for x, delay in zip(signal.inputs, signal.delays, strict=True):
         columns += [x[rows - delay - lag] for lag in range(ORDER)]
     plain = independent(np.column_stack(columns))
-    left = signal.y[rows] - plain @ (plain.T @ signal.y[rows])
+    wanted = signal.y[rows] - signal.y[rows].mean()  # far from zero, rounding would eat it
+    left = wanted - plain @ (plain.T @ wanted)
     energy = float(left @ left)
-    floor = 1e-12 * float(signal.y[rows] @ signal.y[rows])  # what rounding leaves
+    floor = 1e-12 * float(wanted @ wanted)  # what rounding leaves
     price = np.log(len(rows)) * (1.0 + 2.0 * np.arange(1, harmonics + 1))
     best = (-np.inf, period)
     for shift in np.linspace(-NEAR, NEAR, STEPS):

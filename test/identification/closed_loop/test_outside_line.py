@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from known_loops import DELAY, Kind, known
 
@@ -51,6 +51,7 @@ def test_there_is_no_line_in_noise(seed: int) -> None:
 
 
 @given(scale=st.floats(0.01, 100.0), shift=st.floats(-100.0, 100.0))
+@example(scale=0.01, shift=47.0)
 @settings(max_examples=10, deadline=None)
 def test_units_change_no_gain(scale: float, shift: float) -> None:
     signal = moved(sine(0.3, 50.0))
