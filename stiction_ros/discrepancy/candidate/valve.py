@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
+from stiction_ros.discrepancy.candidate.lags import lag_axis, lasts, late_axes, later
 from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
@@ -30,7 +31,6 @@ from stiction_ros.effects import (
 Rows = Callable[[FloatArray], FloatArray]
 LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told
 SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best point
-LEAST_LAG = 2.5  # times the shortest lag that is searched, a fifth of a sample
 LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
 STATIONS = 101  # of the travel of a valve, at which its curve has to rise
 LEAST_TRAVEL = 0.05  # of the span of OP
@@ -366,36 +366,3 @@ def _at_valve(run: FreeRun, j: int, op: FloatArray, span: float) -> list[Candida
             high=high,
         ),
     ]
-
-
-def lasts(candidate: Candidate, point: FloatArray) -> bool:
-    """Tell whether a lag is longer than half a sample.
-
-    Between samples a signal moves on: less than one of them may be the sampling's own.
-    """
-    return float(point[0]) >= LEAST_LAG * candidate.axes[0].low
-
-
-def late_axes(asked: bool) -> tuple[Axis, ...]:
-    """Return the axis of how late within a sample a lag moves on; none where that is not asked."""
-    return (Axis(-1.0, 1.0, 1, linear=True),) if asked else ()
-
-
-def later(values: FloatArray, late: FloatArray, run: FreeRun) -> FloatArray:
-    """Return signals that come late by a share of a sample.
-
-    Args:
-        values: shape (N, G).
-        late: samples, shape (G, 1); shape (G, 0) where that is not asked.
-        run: whose records they are of.
-    """
-    for share in late.T:
-        for rows in run.runs.slices:
-            values[rows][1:] -= share * np.diff(values[rows], axis=0)
-    return values
-
-
-def lag_axis(run: FreeRun) -> Axis:
-    """Return the range of time constants that a record tells."""
-    step = run.runs.sample_time
-    return Axis(0.2 * step, max(len(run.runs) / 8.0, 2.0) * step, 20, logarithmic=True)

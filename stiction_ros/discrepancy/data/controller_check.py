@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
-from stiction_ros.discrepancy.data.set_point import told_set_points
+from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
 from stiction_ros.discrepancy.data.unrounded import unrounded
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
@@ -33,7 +33,6 @@ FITTED, LASTING = 0.03, 0.98
 """Of the steps of OP, by which a law with a fitted tuning tells it wrongly, and how much of that is
 left in the next sample."""
 HALF = 0.5  # of a sample, for which an OP between two samples is held
-NORMAL_OF_MEDIAN = 1.4826  # σ of normal values, by the median of their sizes
 MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
 
 

@@ -58,10 +58,7 @@ def scanned_twice(model: LoopModel, runs: Runs) -> Scans | None:
     """
     low, high = model.limits[0]
     h = 0.5 * runs.sample_time
-    parts = [
-        _Part.of(runs.op[rows, 0], _error(model, runs, k), (low, high))
-        for k, rows in enumerate(runs.slices)
-    ]
+    parts = _parts(model, runs)
     if sum(int(np.isfinite(part.moves).sum()) for part in parts) < ROWS:
         return None
     laws = [_fitted(parts)]
@@ -94,8 +91,7 @@ def rather_twice(model: LoopModel, runs: Runs, tuning: PiTuning) -> bool:
         tuning: of the controller.
     """
     once, twice, count = 0.0, 0.0, 0
-    for k, rows in enumerate(runs.slices):
-        part = _Part.of(runs.op[rows, 0], _error(model, runs, k), tuple(model.limits[0].tolist()))
+    for part in _parts(model, runs):
         change = np.diff(part.error)
         usual = float(np.median(np.abs(change)))
         asked = np.isfinite(part.moves) & _rests(part.error, USUAL * usual)
@@ -105,6 +101,14 @@ def rather_twice(model: LoopModel, runs: Runs, tuning: PiTuning) -> bool:
         twice += float(np.sum((left - share * between_samples(part.error))[asked] ** 2))
         count += int(asked.sum())
     return once > 0.0 and count * math.log(once / max(twice, _TINY)) > SURELY
+
+
+def _parts(model: LoopModel, runs: Runs) -> list[_Part]:
+    low, high = model.limits[0].tolist()
+    return [
+        _Part.of(runs.op[rows, 0], _error(model, runs, k), (low, high))
+        for k, rows in enumerate(runs.slices)
+    ]
 
 
 def _fitted(parts: Sequence[_Part]) -> tuple[float, float]:

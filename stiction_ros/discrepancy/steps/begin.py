@@ -58,7 +58,8 @@ def begin(
         unseen=unseen_of(runs, controller),
         between=() if options.free_process else _between(model),
     )
-    runs = with_surprises_fitted(model, runs)
+    base = Baseline.of(FreeRun(model, runs))
+    runs = with_surprises_fitted(base)
     bare, longest = add_data_effects(model, data), 0
     if options.free_process:
         longest = longest_delay(model)
@@ -76,7 +77,8 @@ def begin(
         report=progress or (lambda share: None),
         begun=begun,
     )
-    base = Baseline.of(FreeRun(bare if options.free_process else model, runs))
+    if runs is not base.run.runs:
+        base = Baseline.of(FreeRun(bare if options.free_process else model, runs))
     return task, State(given=bare, bare=bare, before=base, base=base)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gap_loops import loop, record
 
+from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted
 from stiction_ros.discrepancy.simulation.free_run import PHASES, FreeRun, Runs, join_records
 
@@ -21,9 +22,13 @@ def with_blow(at: int | None) -> Runs:
     return join_records(loop(), [dataclasses.replace(sound, pv=pv)])
 
 
+def fitted(runs: Runs) -> Runs:
+    return with_surprises_fitted(Baseline.of(FreeRun(loop(), runs)))
+
+
 def test_what_nothing_foretells_is_fitted() -> None:
     held = int(np.flatnonzero(with_blow(None).kept_back(0, PHASES[0]))[10])
-    runs = with_surprises_fitted(loop(), with_blow(held))
+    runs = fitted(with_blow(held))
     assert runs.phases != with_blow(held).phases
     blocks = FreeRun(loop(), runs).blocks(0)
     assert blocks.train[held]
@@ -32,9 +37,9 @@ def test_what_nothing_foretells_is_fitted() -> None:
 
 def test_what_is_fitted_already_moves_nothing() -> None:
     usual = with_blow(None)
-    fitted = int(np.flatnonzero(~usual.kept_back(0, PHASES[0]))[200])
-    for runs in (usual, with_blow(fitted)):
-        assert with_surprises_fitted(loop(), runs).phases == usual.phases
+    place = int(np.flatnonzero(~usual.kept_back(0, PHASES[0]))[200])
+    for runs in (usual, with_blow(place)):
+        assert fitted(runs).phases == usual.phases
 
 
 @pytest.mark.parametrize("phase", PHASES)
