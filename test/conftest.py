@@ -35,3 +35,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     if config.option.markexpr != "alone" or collection_path.suffix != ".py":
         return None
     return "mark.alone" not in collection_path.read_text(encoding="utf-8") or None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if os.environ.get("STICTION_ALL_TRIALS") == "1":
+        return
+    for item in items:
+        if item.get_closest_marker("trial"):
+            item.add_marker(pytest.mark.skip(reason="long: STICTION_ALL_TRIALS=1"))

@@ -29,6 +29,7 @@ def names(answer: Discrepancy) -> list[tuple[str, str]]:
     return [(each.place, each.effect) for each in answer.effects]
 
 
+@pytest.mark.trial
 def test_noise_of_the_equation_does_not_hide_what_an_effect_closes() -> None:
     answer = answered(601)  # a pole; the declared noise wanders farther than the pole moves PV
     (found,) = answer.effects
@@ -66,6 +67,7 @@ def test_a_model_that_is_off_is_mended_before_steps_are_seen_in_it() -> None:
     assert answer.process_changes[-1].value == pytest.approx(lead, abs=0.03)
 
 
+@pytest.mark.trial
 def test_no_noise_is_named_that_explains_less_than_a_wave_in_doubt() -> None:
     answer = answered(220, given="off")  # a triangle of the load with nine periods
     assert answer.verdict is GapVerdict.AMBIGUOUS
@@ -195,27 +197,32 @@ def test_a_curve_is_judged_with_the_changed_process_left_open() -> None:
     assert names(answered(340, given="off")) == [("valve:V1", "characteristic")]
 
 
+@pytest.mark.trial
 def test_a_lag_is_stepped_with_the_process_that_stands_in_for_it() -> None:
     (found,) = answered(352, given="off").effects
     assert ("sensor:PV1", "lag") in {(found.place, found.effect), *found.alternatives}
     assert found.closed > 0.9
 
 
+@pytest.mark.trial
 def test_a_dead_time_far_beyond_an_error_of_the_model_is_an_effect() -> None:
     assert names(answered(320, given="off")) == [("process:PV1", "delay")]
 
 
+@pytest.mark.trial
 def test_a_set_in_doubt_that_leaves_a_larger_noise_is_no_answer() -> None:
     answer = answered(162)  # healthy; a controller that scans twice in a sample, OP rounded
     assert answer.verdict is GapVerdict.UNKNOWN
     assert answer.alternatives == ()
 
 
+@pytest.mark.trial
 def test_noise_behind_an_effect_is_searched_from_where_the_effect_was_found() -> None:
     answer = answered(110059)  # a slew where the model declares no noise
     assert names(answer) == [("valve:V1", "slew")]
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(("seed", "first"), [(841, "saturation"), (130038, "stiction")])
 def test_a_sine_is_found_beside_what_was_found_first(seed: int, first: str) -> None:
     valve, wave = answered(seed, family="two").effects
@@ -243,20 +250,24 @@ def test_how_late_within_a_sample_a_stem_slips_is_no_dead_time() -> None:
     assert not answer.noise[0].disagrees
 
 
+@pytest.mark.trial
 def test_a_square_load_that_changes_sides_between_samples_is_one() -> None:
     assert names(answered(322, family="two")) == [("valve:V1", "stiction"), ("load:V1", "square")]
 
 
+@pytest.mark.trial
 def test_a_recorded_stem_refuses_no_load() -> None:
     assert names(answered(321, family="two")) == [("valve:V1", "slew"), ("load:V1", "square")]
 
 
+@pytest.mark.trial
 def test_what_is_in_doubt_beside_another_effect_is_told_when_that_is_found() -> None:
     answer = answered(351, family="two")  # a curve, or a gain; and a drift
     assert names(answer)[1:] == [("valve:V1", "characteristic"), ("disturbance:PV1", "drift")]
     assert answer.effects[1].alternatives == ()
 
 
+@pytest.mark.trial
 def test_a_noise_that_is_not_said_stands_against_no_effect() -> None:
     answer = answered(315, family="two")  # a step of the load behind coarse rounding
     assert ("load:V1", "step") in names(answer)
@@ -270,6 +281,7 @@ def test_a_needle_is_looked_for_over_the_whole_length_of_its_valley() -> None:
     assert found.parameters["f_d"] == pytest.approx(2.531, rel=0.02)
 
 
+@pytest.mark.trial
 def test_two_spikes_in_a_row_are_no_steps() -> None:
     answer = answered(399, family="two")
     assert names(answer) == [("valve:V1", "backlash"), ("disturbance:PV1", "sine")]
@@ -306,12 +318,14 @@ def test_a_healthy_loop_that_scans_twice_and_keeps_no_set_point_lacks_nothing(se
     assert answered(seed).verdict is GapVerdict.NONE
 
 
+@pytest.mark.trial
 def test_a_hundredth_of_what_a_law_explains_is_no_second_effect() -> None:
     answer = answered(500443)  # OP is rounded; a square makes up for what is left of a triangle
     assert names(answer) == [("disturbance:PV1", "triangle")]
     assert not answer.effects[0].alternatives
 
 
+@pytest.mark.trial
 def test_what_held_out_rows_refuse_is_tried_before_less_is_named() -> None:
     answer = answered(510123, family="two")  # an open loop, a step of the load in a held-out block
     assert names(answer) == [("valve:V1", "characteristic"), ("load:V1", "step")]
@@ -319,6 +333,7 @@ def test_what_held_out_rows_refuse_is_tried_before_less_is_named() -> None:
     assert answer.effects[0].parameters["curve"] == pytest.approx(truth, rel=1e-3)
 
 
+@pytest.mark.trial
 def test_what_comes_next_is_seen_beside_other_figures_of_what_was_found() -> None:
     answer = answered(510067, family="two")  # stiction; a step pulled its figures at first
     assert names(answer)[0] == ("valve:V1", "stiction")
@@ -334,6 +349,7 @@ def test_friction_of_a_level_closes_what_it_closes_in_one_step() -> None:
     assert any(each.startswith("beside what was found") for each in answer.where)
 
 
+@pytest.mark.trial
 def test_what_is_known_of_a_friction_is_not_lost_when_it_is_told_again() -> None:
     answer = answered(610004, family="two")  # a search of everything misses the needle
     assert names(answer)[0] == ("valve:V1", "stiction")
