@@ -22,6 +22,9 @@ IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 BEYOND = 1e6
 """Times the size of a start from which on a run is taken as gone."""
 
+LANES = 8
+"""Runs that go side by side: as many as a vector of the processor or two hold."""
+
 
 class Process(NamedTuple):
     """Equation (9) of p outputs and m valves.
@@ -75,10 +78,25 @@ class Runs(NamedTuple):
 
 
 @compiled
+def _in_lanes(values: FloatArray, first: int, by_lane: FloatArray) -> None:
+    """Copy runs from ``first`` on, shape (R, n, q), side by side, shape (n, q, LANES).
+
+    Where there are fewer, the last one is repeated.
+    """
+    for lane in range(LANES):
+        run = min(first + lane, len(values) - 1)
+        for k in range(values.shape[1]):
+            for i in range(values.shape[2]):
+                by_lane[k, i, lane] = values[run, k, i]
+
+
+@compiled
 def run_loops(
     process: Process, controllers: Controllers, runs: Runs, sp: FloatArray, load: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return OP, shape (R, n, m), and PV, shape (R, n, p).
+
+    Several runs go side by side, each computed as it would be alone.
 
     Args:
         process: of all runs.
@@ -89,76 +107,90 @@ def run_loops(
         load: added to PV behind the process, shape (R, H + n, p).
     """
     number, outputs, past = runs.pv.shape
-    valves = runs.stem.shape[1]
-    count = sp.shape[1] - past
+    valves, whole = runs.stem.shape[1], sp.shape[1]
     na, nb = process.a.shape[1], process.b.shape[2]
-    op_rows = np.empty((number, count, valves))
-    pv_rows = np.empty((number, count, outputs))
-    for r in range(number):
-        y = np.empty((past + count, outputs))
-        stem = np.empty((past + count, valves))
-        for k in range(past):
-            for i in range(outputs):
-                y[k, i] = runs.pv[r, i, k]
-            for j in range(valves):
-                stem[k, j] = runs.stem[r, j, k]
-        size = 1.0
-        for i in range(outputs):
+    op_rows = np.full((number, whole - past, valves), np.inf)
+    pv_rows = np.full((number, whole - past, outputs), np.inf)
+    y, stem = np.empty((whole, outputs, LANES)), np.empty((whole, valves, LANES))
+    wanted, added = np.empty((whole, outputs, LANES)), np.empty((whole, outputs, LANES))
+    command, error = np.empty((valves, LANES)), np.zeros((valves, 2, LANES))
+    friction, tuning = np.empty((valves, 2, LANES)), np.empty((valves, 3, LANES))
+    value, bound = np.empty(LANES), np.empty(LANES)
+    op, gone = np.empty((whole, valves, LANES)), np.empty(LANES, dtype=np.int64)
+    for first in range(0, number, LANES):
+        _in_lanes(runs.pv.transpose(0, 2, 1), first, y)
+        _in_lanes(runs.stem.transpose(0, 2, 1), first, stem)
+        _in_lanes(runs.friction, first, friction)
+        _in_lanes(runs.tuning, first, tuning)
+        _in_lanes(sp, first, wanted)
+        _in_lanes(load, first, added)
+        for lane in range(LANES):
+            run = min(first + lane, number - 1)
+            size = 1.0
             for k in range(past):
-                size = max(size, abs(y[k, i]))
-        command = runs.op[r].copy()
-        error = np.zeros((valves, 3))
-        for j in range(valves):
-            i = controllers.output[j]
-            if i >= 0:
-                late = past - 1 - controllers.lag[j]
-                share = controllers.smoothing[j]
-                e = sp[r, late - 2, i] - y[late - 2, i] - load[r, late - 2, i]
-                for back in range(3):
-                    k = late - 2 + back
-                    now = sp[r, k, i] - y[k, i] - load[r, k, i]
-                    e = share * e + (1.0 - share) * now
-                    error[j, 2 - back] = e
-        gone = False
-        for k in range(past, past + count):
-            if gone:
                 for i in range(outputs):
-                    pv_rows[r, k - past, i] = np.inf
-                for j in range(valves):
-                    op_rows[r, k - past, j] = np.inf
-                continue
+                    size = max(size, abs(y[k, i, lane]))
+            bound[lane], gone[lane] = BEYOND * size, 0
+            for j in range(valves):
+                command[j, lane] = runs.op[run, j]
+                i = controllers.output[j]
+                if i >= 0:
+                    late = past - 1 - controllers.lag[j]
+                    share = controllers.smoothing[j]
+                    e = wanted[late - 2, i, lane] - y[late - 2, i, lane] - added[late - 2, i, lane]
+                    for k in range(late - 2, late + 1):
+                        now = wanted[k, i, lane] - y[k, i, lane] - added[k, i, lane]
+                        e = share * e + (1.0 - share) * now
+                        error[j, 1, lane] = error[j, 0, lane]
+                        error[j, 0, lane] = e
+        for k in range(past, whole):
             for i in range(outputs):
-                value = process.bias[i]
+                for lane in range(LANES):
+                    value[lane] = process.bias[i]
                 for lag in range(na):
-                    value -= process.a[i, lag] * y[k - 1 - lag, i]
+                    factor = process.a[i, lag]
+                    for lane in range(LANES):
+                        value[lane] -= factor * y[k - 1 - lag, i, lane]
                 for j in range(valves):
                     shift = k - 1 - process.delay[i, j]
                     for lag in range(nb):
-                        value += process.b[i, j, lag] * stem[shift - lag, j]
-                y[k, i] = value
-                pv_rows[r, k - past, i] = value + load[r, k, i]
-                if not abs(value) < BEYOND * size:
-                    gone = True
+                        factor = process.b[i, j, lag]
+                        for lane in range(LANES):
+                            value[lane] += factor * stem[shift - lag, j, lane]
+                for lane in range(LANES):
+                    y[k, i, lane] = value[lane]
+                    if gone[lane] == 0 and not abs(value[lane]) < bound[lane]:
+                        gone[lane] = k
             for j in range(valves):
                 i = controllers.output[j]
                 if i >= 0:
-                    late = k - controllers.lag[j]
-                    share = controllers.smoothing[j]
-                    now = sp[r, late, i] - y[late, i] - load[r, late, i]
-                    e = share * error[j, 0] + (1.0 - share) * now
-                    change = e - error[j, 0]
-                    value = command[j] + runs.tuning[r, j, 0] * change
-                    value += runs.tuning[r, j, 1] * e
-                    value += runs.tuning[r, j, 2] * (change - error[j, 0] + error[j, 1])
-                    command[j] = min(max(value, controllers.low[j]), controllers.high[j])
-                    error[j, 1] = error[j, 0]
-                    error[j, 0] = e
-                op_rows[r, k - past, j] = command[j]
-                apart = command[j] - stem[k - 1, j]
-                if apart > runs.friction[r, j, 0]:
-                    stem[k, j] = command[j] - runs.friction[r, j, 1]
-                elif apart < -runs.friction[r, j, 0]:
-                    stem[k, j] = command[j] + runs.friction[r, j, 1]
-                else:
-                    stem[k, j] = stem[k - 1, j]
+                    late, share = k - controllers.lag[j], controllers.smoothing[j]
+                    low, high = controllers.low[j], controllers.high[j]
+                    for lane in range(LANES):
+                        now = wanted[late, i, lane] - y[late, i, lane] - added[late, i, lane]
+                        before = error[j, 0, lane]
+                        e = share * before + (1.0 - share) * now
+                        change = e - before
+                        moved = command[j, lane] + tuning[j, 0, lane] * change
+                        moved += tuning[j, 1, lane] * e
+                        moved += tuning[j, 2, lane] * (change - before + error[j, 1, lane])
+                        moved = low if moved < low else moved
+                        command[j, lane] = high if moved > high else moved
+                        error[j, 1, lane] = before
+                        error[j, 0, lane] = e
+                for lane in range(LANES):
+                    op[k, j, lane] = command[j, lane]
+                    apart = command[j, lane] - stem[k - 1, j, lane]
+                    still = abs(apart) <= friction[j, 0, lane]
+                    slip = -friction[j, 1, lane] if apart > 0.0 else friction[j, 1, lane]
+                    slipped = command[j, lane] + slip
+                    stem[k, j, lane] = stem[k - 1, j, lane] if still else slipped
+        for lane in range(min(LANES, number - first)):
+            until = whole if gone[lane] == 0 else gone[lane] + 1
+            for i in range(outputs):
+                for k in range(past, until):
+                    pv_rows[first + lane, k - past, i] = y[k, i, lane] + added[k, i, lane]
+            for j in range(valves):
+                for k in range(past, until):
+                    op_rows[first + lane, k - past, j] = op[k, j, lane]
     return op_rows, pv_rows

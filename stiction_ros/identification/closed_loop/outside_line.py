@@ -20,6 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.kernels.step import IntArray
 
 ORDER = 5
 """n, samples of the past: enough to leave white noise of what loops are sampled at."""
@@ -94,17 +95,13 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
     left = wanted - plain @ (plain.T @ wanted)
     energy = float(left @ left)
     floor = 1e-12 * float(wanted @ wanted)  # what rounding leaves
+    frequencies = 1.0 / period + np.linspace(-NEAR, NEAR, STEPS) / count
+    frequencies = frequencies[frequencies > 0.0]
+    taken = _taken(2.0 * np.pi * frequencies, rows, harmonics, plain, left)
+    rest = np.maximum(energy - taken, floor)
     price = np.log(len(rows)) * (1.0 + 2.0 * np.arange(1, harmonics + 1))
-    best = (-np.inf, period)
-    for shift in np.linspace(-NEAR, NEAR, STEPS):
-        frequency = 1.0 / period + shift / count
-        if frequency <= 0.0:
-            continue
-        taken = _taken(waves_of(2 * np.pi * frequency * rows, harmonics), plain, left)[1::2]
-        rest = np.maximum(energy - taken, floor)
-        gains = len(rows) * np.log(max(energy, floor) / rest) - price[: len(rest)]
-        if len(gains):
-            best = max(best, (float(gains.max()), 1.0 / frequency))
+    gains = (len(rows) * np.log(max(energy, floor) / rest) - price).max(axis=1)
+    best = max(zip(gains.tolist(), (1.0 / frequencies).tolist(), strict=True))
     count, columns_used = plain.shape
     before = count * np.log(max(energy, floor) / count) + columns_used * np.log(count)
     return OutsideLine(*best, float(before))
@@ -139,26 +136,62 @@ def waves_of(angle: FloatArray, harmonics: int) -> FloatArray:
     return np.stack([turns.imag, turns.real], axis=1).reshape(-1, len(angle)).T
 
 
-def _taken(lines: FloatArray, plain: FloatArray, left: FloatArray) -> FloatArray:
-    """Return the energy that the first k lines take of what a basis leaves, k from 1, (2 H,).
+def _taken(
+    turns: FloatArray, rows: IntArray, harmonics: int, plain: FloatArray, left: FloatArray
+) -> FloatArray:
+    """Return the energy that the first h harmonics take of what a basis leaves, shape (F, H).
 
     Args:
-        lines: shape (N, 2 H).
+        turns: radians per sample, rising in even steps, shape (F,).
+        rows: consecutive, shape (N,).
+        harmonics: H.
         plain: orthonormal basis, shape (N, q).
         left: that it leaves, shape (N,).
     """
-    known, seen = plain.T @ lines, lines.T @ left
-    gram = lines.T @ lines
-    own = np.diag(gram).copy()
-    gram -= known.T @ known
-    taken = np.zeros(len(seen))
-    for k in range(len(seen)):
-        if gram[k, k] > DEPENDENT * own[k]:
-            by = gram[k, k:] / gram[k, k]
-            taken[k] = seen[k] ** 2 / gram[k, k]
-            seen[k + 1 :] -= by[1:] * seen[k]
-            gram[k + 1 :, k + 1 :] -= np.outer(by[1:], gram[k, k + 1 :])
-    return np.cumsum(taken)
+    by_harmonic = np.empty((len(turns), harmonics, 2, len(rows)))
+    wave = np.exp(1j * turns[0] * rows)
+    step = np.exp(1j * (turns[1] - turns[0]) * rows)
+    for own in by_harmonic:
+        power = wave
+        for h in range(harmonics):
+            own[h] = power.imag, power.real
+            power = power * wave
+        wave = wave * step
+    lines = by_harmonic.reshape(len(turns), 2 * harmonics, len(rows))
+    known, seen = lines @ plain, lines @ left
+    own = _products(turns, rows, harmonics)
+    gram = own - known @ known.transpose(0, 2, 1)
+    taken = np.zeros_like(seen)
+    for k in range(seen.shape[1]):
+        pivot = gram[:, k, k]
+        there = pivot > DEPENDENT * own[:, k, k]
+        over = np.where(there, 1.0, 0.0) / np.where(there, pivot, 1.0)
+        taken[:, k] = over * seen[:, k] ** 2
+        by = over[:, None] * gram[:, k]
+        seen -= by * seen[:, k : k + 1]
+        gram -= by[:, :, None] * gram[:, k, None, :]
+    return np.asarray(np.cumsum(taken, axis=1)[:, 1::2])
+
+
+def _products(turns: FloatArray, rows: IntArray, harmonics: int) -> FloatArray:
+    """Return the inner products of sines and cosines of the harmonics, shape (F, 2 H, 2 H).
+
+    Of two waves it is half the sums of that of their difference and that of their sum, which are
+    geometric.
+    """
+    h = np.arange(1, harmonics + 1)
+    sums = np.full((len(turns), 2 * harmonics + 1), len(rows), dtype=complex)
+    each = np.exp(1j * np.outer(turns, np.arange(1, 2 * harmonics + 1)))
+    sums[:, 1:] = each ** rows[0] * (1.0 - each ** len(rows)) / (1.0 - each)
+    both = sums[:, h[:, None] + h]
+    apart = sums[:, np.abs(h[:, None] - h)]
+    apart = np.where(h[:, None] >= h, apart, apart.conj())
+    found = np.empty((len(turns), harmonics, 2, harmonics, 2))
+    found[:, :, 0, :, 0] = (apart - both).real
+    found[:, :, 1, :, 1] = (apart + both).real
+    found[:, :, 0, :, 1] = (both + apart).imag
+    found[:, :, 1, :, 0] = (both - apart).imag
+    return 0.5 * found.reshape(len(turns), 2 * harmonics, 2 * harmonics)
 
 
 def independent(columns: FloatArray) -> FloatArray:

@@ -19,9 +19,11 @@ from __future__ import annotations
 import dataclasses
 import enum
 import itertools
+from collections.abc import Mapping
 
 import numpy as np
 
+from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.kernels.polynomials import recursion
 
@@ -151,7 +153,11 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
         return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
     error = (set_point - pv) / scales[1]
     command = (op - float(op[rows].mean())) / scales[0]
-    data = _Data(command, error, sp is None, signals.stretches, free)
+    filtered = {
+        share: [smoothed(error[first:last], share) for first, last in signals.stretches]
+        for share in FILTERS
+    }
+    data = _Data(command, filtered, sp is None, signals.stretches, free)
     textbook = {
         span: _best(data, [_Form(lag, 0.0, False, span) for lag in LAGS])
         for span in SPANS
@@ -171,10 +177,10 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
 
 @dataclasses.dataclass(frozen=True)
 class _Data:
-    """Scaled signals: u and e, whether SP is unknown, stretches, and where OP is free."""
+    """Scaled: u, e of every stretch by its filter, whether SP is unknown, where OP is free."""
 
     command: FloatArray
-    error: FloatArray
+    filtered: Mapping[float, list[FloatArray]]
     unknown: bool
     stretches: Stretches
     free: BoolArray
@@ -213,17 +219,15 @@ def _best(data: _Data, forms: list[_Form]) -> _Fit | None:
 def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
     """Return regressors, shape (n, q), and moves of OP, shape (n,), over h samples."""
     h, rows, moves = form.span, [], []
-    for first, last in data.stretches:
+    for (first, last), filtered in zip(data.stretches, data.filtered[form.smoothing], strict=True):
         start = first + form.lag + 1
         if last - start <= h:
             continue
-        error = smoothed(data.error[first:last], form.smoothing)
-        error = error[1 : last - first - form.lag]
-        before = smoothed(data.error[first:last], form.smoothing)[: len(error)]
+        error = filtered[1 : last - first - form.lag]
         sums = np.concatenate([[0.0], np.cumsum(error)])
         columns = [error[h:] - error[:-h], (sums[h:] - sums[:-h])[1:]]
         if form.derivative:
-            change = error - before
+            change = error - filtered[: len(error)]
             columns.append(change[h:] - change[:-h])
         if data.unknown:
             columns.append(np.full(len(error) - h, float(h)))
@@ -236,12 +240,67 @@ def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
     return np.vstack(rows), np.concatenate(moves)
 
 
+@compiled
+def _add_products(
+    products: FloatArray,
+    filtered: FloatArray,
+    command: FloatArray,
+    free: BoolArray,
+    span: int,
+    derivative: bool,
+    unknown: bool,
+) -> int:
+    """Add the inner products of regressors and moves of one stretch; return the number of rows.
+
+    Args:
+        products: of regressors and moves, the lower half of shape (q + 1, q + 1).
+        filtered: e of the samples before those of ``command``, and of these, shape (n + 1,).
+        command: u, as many samples late as the form says, shape (n,).
+        free: where OP is free, shape (n,).
+        span: h.
+        derivative, unknown: whether the form has a derivative, and whether SP is unknown.
+    """
+    size, count, total = len(products), 0, 0.0
+    row = np.empty(size)
+    for k in range(len(command)):
+        total += filtered[k + 1]
+        if k >= span:
+            total -= filtered[k + 1 - span]
+        if k < span or not (free[k] and free[k - span]):
+            continue
+        row[0] = filtered[k + 1] - filtered[k + 1 - span]
+        row[1] = total
+        if derivative:
+            row[2] = row[0] - filtered[k] + filtered[k - span]
+        if unknown:
+            row[size - 2] = span
+        row[size - 1] = command[k] - command[k - span]
+        for i in range(size):
+            for j in range(i + 1):
+                products[i, j] += row[i] * row[j]
+        count += 1
+    return count
+
+
 def _fit(data: _Data, form: _Form) -> _Fit | None:
-    columns, moves = _columns(data, form)
-    total = float(moves @ moves)
-    if len(moves) < LEAST_ROWS or total <= 0.0:
+    size = 3 + form.derivative + data.unknown
+    products, rows = np.zeros((size, size)), 0
+    for (first, last), filtered in zip(data.stretches, data.filtered[form.smoothing], strict=True):
+        start = first + form.lag + 1
+        if last - start > form.span:
+            rows += _add_products(
+                products,
+                filtered[: last - first - form.lag],
+                data.command[start:last],
+                data.free[start:last],
+                form.span,
+                form.derivative,
+                data.unknown,
+            )
+    products += np.tril(products, -1).T
+    gram, side, total = products[:-1, :-1], products[:-1, -1], float(products[-1, -1])
+    if rows < LEAST_ROWS or total <= 0.0:
         return None
-    gram, side = columns.T @ columns, columns.T @ moves
     kept = np.ones(len(side), dtype=bool)
     theta = _solved(gram, side, kept)
     if theta[0] * theta[1] < 0.0:  # a reset against the gain is none
