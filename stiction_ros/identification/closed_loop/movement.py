@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.oscillation import slow_mean
 
@@ -73,21 +74,45 @@ def size(moved: FloatArray) -> float:
     return float(np.sqrt(np.mean(moved**2)))
 
 
-def own_period(moved: FloatArray) -> float:
-    """Return the samples per cycle of what moves about zero; 0 with less than one cycle.
+@compiled
+def _sizes_and_periods(runs: FloatArray, late: int) -> FloatArray:
+    """Return root mean square and samples per cycle of runs about their mean, shape (R, 2).
 
     A half cycle ends where the signal goes from beyond half its size on one side to beyond it
-    on the other.
+    on the other. The period is 0 with less than one cycle; a run that is not finite has no
+    period and an infinite size.
+
+    Args:
+        runs: shape (R, n).
+        late: first sample that counts.
     """
-    level = 0.5 * size(moved)
-    rows = np.flatnonzero(np.abs(moved) > level)
-    if level <= 0.0 or not len(rows):
-        return 0.0
-    sides = np.sign(moved[rows])
-    turns = rows[1:][sides[1:] != sides[:-1]]
-    if len(turns) < 3:
-        return 0.0
-    return float(2.0 * (turns[-1] - turns[0]) / (len(turns) - 1))
+    found = np.empty((len(runs), 2))
+    for r in range(len(runs)):
+        total = 0.0
+        for k in range(late, runs.shape[1]):
+            total += runs[r, k]
+        mean = total / (runs.shape[1] - late)
+        squares = 0.0
+        for k in range(late, runs.shape[1]):
+            squares += (runs[r, k] - mean) ** 2
+        size = np.sqrt(squares / (runs.shape[1] - late))
+        found[r, 0], found[r, 1] = np.inf, 0.0
+        if not (np.isfinite(size) and np.isfinite(runs[r, :late]).all()):
+            continue
+        found[r, 0], level = size, 0.5 * size
+        side, turns, first, last = 0, 0, 0, 0
+        for k in range(late, runs.shape[1]):
+            away = runs[r, k] - mean
+            now = 1 if away > level else (-1 if away < -level else 0)
+            if now == 0:
+                continue
+            if side == -now:
+                first, last = (k, k) if turns == 0 else (first, k)
+                turns += 1
+            side = now
+        if turns >= 3:
+            found[r, 1] = 2.0 * (last - first) / (turns - 1)
+    return found
 
 
 def gone(stuck: float, free: float) -> float:
@@ -104,16 +129,8 @@ def compare(runs: FloatArray, recorded: float, period: float) -> Movement:
         period: recorded one, samples.
     """
     late = int((1.0 - LATE) * runs.shape[1])
-    ratios, periods = [], []
-    for run in runs:
-        if not np.isfinite(run).all():
-            ratios.append(np.inf)
-            periods.append(0.0)
-            continue
-        moved = run[late:] - run[late:].mean()
-        ratios.append(size(moved) / recorded)
-        periods.append(own_period(moved) / period)
-    ratio, own = np.array(ratios), np.array(periods)
+    sizes, periods = _sizes_and_periods(np.ascontiguousarray(runs), late).T
+    ratio, own = sizes / recorded, periods / period
     same = (own > 1.0 / SAME_PERIOD) & (own < SAME_PERIOD)
     alike = (ratio > ALIKE[0]) & (ratio < ALIKE[1]) & same
     going = own[(own > 0.0) & (ratio > 0.2)]
