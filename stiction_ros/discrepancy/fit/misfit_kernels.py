@@ -11,6 +11,7 @@ from stiction_ros.effects import FloatArray
 
 IntArray = NDArray[np.int64]
 _RIDGE = 1e-10
+_ROUNDING = 1e-14
 _TINY = 1e-300
 
 
@@ -71,24 +72,18 @@ def whitened_shifts(shift: FloatArray, rows: IntArray, ar: FloatArray) -> FloatA
 
 
 @compiled
-def _whitened(
-    sizes: FloatArray, point: int, rows: IntArray, basis: FloatArray, ar: FloatArray
-) -> FloatArray:
-    """Return the columns of one point without the shared ones, shape (s, n)."""
+def _whitened(sizes: FloatArray, point: int, rows: IntArray, ar: FloatArray) -> FloatArray:
+    """Return the columns of one point, whitened, shape (s, n)."""
     count = sizes.shape[2]
-    free = np.empty((count, len(rows)))
+    white = np.empty((count, len(rows)))
     for s in range(count):
         for n in range(len(rows)):
             k = rows[n]
             value = sizes[k, point, s]
             for i in range(min(len(ar), k)):
                 value -= ar[i] * sizes[k - 1 - i, point, s]
-            free[s, n] = value
-        for c in range(len(basis)):
-            part = inner_product(basis[c], free[s])
-            for n in range(len(rows)):
-                free[s, n] -= part * basis[c, n]
-    return free
+            white[s, n] = value
+    return white
 
 
 @compiled
@@ -119,20 +114,26 @@ def taken_by_sizes(
     """Return the squares that least squares of the factors takes away, shape (G,).
 
     Args:
-        target, rows, ar: as for :func:`left_of_shifts`.
+        target, rows, ar: as for :func:`left_of_shifts`; the shared columns are not in ``target``.
         sizes: columns of the factors, shape (N, G, s).
         basis: as for :func:`left_of_shifts`, but of shape (r, n).
     """
-    points, count = sizes.shape[1], sizes.shape[2]
-    taken = np.empty(points)
+    points, count, rank = sizes.shape[1], sizes.shape[2], len(basis)
+    taken, inside = np.empty(points), np.empty((count, rank))
     gram, cross = np.empty((count, count)), np.empty(count)
     for g in range(points):
-        free = _whitened(sizes, g, rows, basis, ar)
+        white = _whitened(sizes, g, rows, ar)
         for s in range(count):
-            cross[s] = inner_product(free[s], target)
+            for c in range(rank):
+                inside[s, c] = inner_product(white[s], basis[c])
+        ridge = _TINY
+        for s in range(count):
+            cross[s] = inner_product(white[s], target)
             for t in range(s + 1):
-                gram[s, t] = gram[t, s] = inner_product(free[s], free[t])
-        ridge = _RIDGE * np.trace(gram) + _TINY
+                whole = inner_product(white[s], white[t])
+                left = whole - inner_product(inside[s], inside[t])
+                gram[s, t] = gram[t, s] = left
+            ridge += _RIDGE * left + _ROUNDING * whole
         for s in range(count):
             gram[s, s] += ridge
         wanted = cross.copy()

@@ -39,6 +39,7 @@ CENTRES = 5
 COMBS = (0.1, 0.03, 0.01)  # boxes around the best point, of the largest
 TEETH, STROKES = 3000, 4  # points in each, and how often it is moved to a better one
 ROUNDS = 5
+FAIR, BEHIND = 3, 20.0  # rounds after which a start that is so far behind, in BIC, is given up
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
 NO_MEMORY = np.zeros(0)
@@ -192,7 +193,9 @@ class _Search:
             self._try(self.candidate.grid())
             return
         best = self._try(np.array([centre]), self.found, under)
-        for _ in range(ROUNDS):
+        for done in range(ROUNDS):
+            if done >= FAIR and best[1].delta_bic < self.best().delta_bic - BEHIND:
+                break
             best = self._around(best, size, under)
             size *= SHRINK
 
@@ -316,32 +319,51 @@ class _Search:
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)
         best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
-        return coordinates[best], self.judge(values[best], response.pick(best))
+        return coordinates[best], self.judge(values[best], response.pick(best), like)
 
-    def judge(self, values: FloatArray, response: Response) -> CandidateFit:
-        """Return the fit at one point of the search; the best one is remembered."""
+    def judge(
+        self, values: FloatArray, response: Response, like: CandidateFit | None = None
+    ) -> CandidateFit:
+        """Return the fit at one point of the search; the best one is remembered.
+
+        Args:
+            values: the point, shape (axes,).
+            response: there.
+            like: a fit near by, with whose noise the search for that at the point begins; None
+                begins as if nothing was known.
+        """
         key = tuple(values.tolist())
         if key in self.judged:
             return self.judged[key]
-        fit = self._fit(values, response, rounded=False)
+        fit = self._fit(values, response, rounded=False, like=like)
         self.judged[key] = fit
         if self.found is None or fit.delta_bic > self.found.delta_bic:
             self.found = fit
         return fit
 
     def exact(self, fit: CandidateFit) -> CandidateFit:
-        """Return a fit by the likelihood of rounded values, where an output is rounded."""
-        if not any(self.base.run.runs.quanta):
-            return fit
+        """Return a fit with its noise found anew, where an output is rounded as that of groups."""
         response = self.candidate.respond(self.base.run, fit.point[None, :])
         return self._fit(fit.point, response, rounded=True)
 
-    def _fit(self, values: FloatArray, response: Response, rounded: bool) -> CandidateFit:
+    def _fit(
+        self,
+        values: FloatArray,
+        response: Response,
+        rounded: bool,
+        like: CandidateFit | None = None,
+    ) -> CandidateFit:
         factors = np.zeros(0)
         if response.impossible:
             unmoved = {i: self.base.noise[i] for i in response.outputs}
             return CandidateFit(self.candidate, values, factors, unmoved, -np.inf, 0.0)
-        noise = {i: self._noise(i, response, values, None, rounded) for i in response.outputs}
+        starts = {
+            i: (None, self.base.noise[i].ar) if like is None else (like.noise[i].ar,)
+            for i in response.outputs
+        }
+        noise = {
+            i: self._noise(i, response, values, None, rounded, starts[i]) for i in response.outputs
+        }
         if response.sizes:
             own = {i: sizes[:, 0] for i, sizes in response.sizes.items()}
             first = next(iter(own))
@@ -349,7 +371,8 @@ class _Search:
             if len(own) > 1:
                 factors = shared_factors(own, self.base.columns, noise, self.base.blocks)
                 noise = {
-                    i: self._noise(i, response, values, factors, rounded) for i in response.outputs
+                    i: self._noise(i, response, values, factors, rounded, starts[i])
+                    for i in response.outputs
                 }
         gained, held = -self.candidate.count(values) * self._price(response), 0.0
         before = self.base.noise if rounded else self.base.plain
@@ -365,6 +388,7 @@ class _Search:
         values: FloatArray,
         factors: FloatArray | None,
         rounded: bool,
+        starts: Sequence[FloatArray | None],
     ) -> NoiseFit:
         """Return what a response leaves of an output, its factors given or open."""
         columns, target = self.base.columns[i], self.gap[:, i]
@@ -381,7 +405,7 @@ class _Search:
         if forms and keep is not None:  # what slows PV may or may not slow its noise
             forms = (*forms, *(behind_lag(ar, keep) for ar in forms))
         blocks = self.base.blocks[i]
-        fits = noise_forms(target, columns, blocks, (None, self.base.noise[i].ar), forms)
+        fits = noise_forms(target, columns, blocks, starts, forms)
         return best_noise(fits, self.base.run.runs.quanta[i] if rounded else 0.0, blocks)
 
     def _price(self, response: Response) -> float:

@@ -15,6 +15,7 @@ BoolArray = NDArray[np.bool_]
 
 DOUBTFUL = 1e-8  # pivot of a scaled column below which the fast solution is not trusted,
 DEPENDENT = 1e-10  # and below which the column adds nothing to the others
+APART = 1e-3  # and above which the normal equations keep half of all digits
 NOTHING = 1e-150  # length of a column that is zero on the fitted rows
 TINY = 1e-300
 _TRACE_SHARE = 1e-12
@@ -144,6 +145,42 @@ def least_squares(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatA
         beta[order[step]] = value / whole[step, step]
     for j in range(count):
         beta[j] /= scale[j]
+    return True, beta
+
+
+@compiled
+def normal_equations(columns: FloatArray, target: FloatArray) -> tuple[bool, FloatArray]:
+    """Return whether the columns are far from dependent, and the coefficients of least squares.
+
+    Half as much work as :func:`least_squares`, and half as many digits.
+
+    Args:
+        columns: shape (q, n).
+        target: shape (n,).
+    """
+    count = len(columns)
+    factor, beta, scale = np.empty((count, count)), np.zeros(count), np.empty(count)
+    for i in range(count):
+        scale[i] = np.sqrt(inner_product(columns[i], columns[i]))
+        if not scale[i] > NOTHING:
+            return False, beta
+        for j in range(i + 1):
+            value = inner_product(columns[i], columns[j]) / (scale[i] * scale[j])
+            for k in range(j):
+                value -= factor[i, k] * factor[j, k]
+            factor[i, j] = value / factor[j, j] if j < i else np.sqrt(max(value, 0.0))
+        if not factor[i, i] > APART:
+            return False, beta
+        value = inner_product(columns[i], target) / scale[i]
+        for k in range(i):
+            value -= factor[i, k] * beta[k]
+        beta[i] = value / factor[i, i]
+    for i in range(count - 1, -1, -1):
+        for k in range(i + 1, count):
+            beta[i] -= factor[k, i] * beta[k]
+        beta[i] /= factor[i, i]
+    for i in range(count):
+        beta[i] /= scale[i]
     return True, beta
 
 
@@ -299,4 +336,5 @@ def turn(
         column = whitened_rows(columns[j], ar, rows)
         for n in range(len(column)):
             white[j, n] = column[n]
-    return least_squares(white, wanted)
+    sure, beta = normal_equations(white, wanted)
+    return (sure, beta) if sure else least_squares(white, wanted)

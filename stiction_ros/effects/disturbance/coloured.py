@@ -6,7 +6,16 @@ import dataclasses
 import math
 from typing import ClassVar
 
-from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, Memory, elapsed, parameter
+import numpy as np
+
+from stiction_ros.effects.behaviour import (
+    NO_SAMPLE,
+    Behaviour,
+    FloatArray,
+    Memory,
+    elapsed,
+    parameter,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,3 +64,9 @@ class ColouredDisturbance(Behaviour):
         keep = 0.0 if before == NO_SAMPLE else math.exp(-elapsed(before, time) / self.time_constant)
         wave = keep * last + self.std * math.sqrt(1.0 - keep * keep) * normal
         return (wave, time), value + wave
+
+    def simulate(
+        self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
+    ) -> FloatArray:
+        """Return the signal as it is: from rest nothing is expected to be added."""
+        return np.array(values, dtype=float)
