@@ -117,7 +117,9 @@ def score(
     there = may.union(*names)
     wrong = tuple(_word(c.first) for c in claims if c.named and c.first not in there)
     sets = [c for c in claims if not c.named]
-    held = sum(bool(c.names & there) for c in sets)
+    gain_is_off = abs(loop.known.gain) != abs(loop.base.plant.gain)
+    in_doubt = there | ({(PROCESS, "gain")} if gain_is_off else set())  # a set says no direction
+    held = sum(bool(c.names & in_doubt) for c in sets)
     found = [
         any(_is_right(c, own, alike | may) for c in claims)
         for own, alike in zip(names, families, strict=True)

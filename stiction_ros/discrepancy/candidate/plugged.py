@@ -44,14 +44,14 @@ class PluggedValve(ValveCandidate):
     def possible(self, points: FloatArray) -> BoolArray:
         return possible(self.plugged, points)
 
-    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
+    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         """Return stem positions, shape (N, G), %; OP where the figures are not possible."""
         rows = self.possible(points)
         if rows.all():
-            return super().stems(run, points)
+            return super().stems(run, points, from_measured=from_measured)
         stems = np.repeat(run.stems[:, self.valve, None], len(points), axis=1)
         if rows.any():
-            stems[:, rows] = super().stems(run, points[rows])
+            stems[:, rows] = super().stems(run, points[rows], from_measured=from_measured)
         return stems
 
     def respond(self, run: FreeRun, points: FloatArray) -> Response:

@@ -82,15 +82,26 @@ class ValveCandidate(Candidate):
         """Return the behaviour's parameters, shape (G, parameters), for points of the grid."""
         return points
 
-    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
-        """Return stem positions, shape (N, G), %."""
+    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
+        """Return stem positions, shape (N, G), %.
+
+        Args:
+            run: of the current model.
+            points: shape (G, axes).
+            from_measured: whether stems that are recorded start where they were, whatever the
+                points say of that.
+        """
         low, high = run.model.limits[self.valve]
-        rows = self.rows(points)
+        rows, valve = self.rows(points), run.model.valve_names[self.valve]
         parts = []
         every = run.runs.sample_time / run.runs.scanned
-        for part in map(run.runs.at_scans, run.runs.slices):
+        for record, part in zip(
+            run.runs.records, map(run.runs.at_scans, run.runs.slices), strict=True
+        ):
             values = run.scanned[part, self.valve]
             start = self.starts(points, float(values[0]))
+            if from_measured and record.stem is not None:
+                start = np.full(len(points), record.stem[0, record.valves.index(valve)])
             parts.append(self.kind.simulate_grid(rows, values, start, every))
         stems = end_to_end(parts)
         return over_samples(np.clip(stems, low, high, out=stems), run.runs)
@@ -188,8 +199,9 @@ class LagCandidate(ValveCandidate):
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
         return lasts(self, point)
 
-    def stems(self, run: FreeRun, points: FloatArray) -> FloatArray:
-        return later(super().stems(run, points), points[:, 2:], run)
+    def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
+        stems = super().stems(run, points, from_measured=from_measured)
+        return later(stems, points[:, 2:], run)
 
     def rows(self, points: FloatArray) -> FloatArray:
         return points[:, :1]

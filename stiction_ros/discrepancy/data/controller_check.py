@@ -219,7 +219,12 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
     best = min(range(len(laws)), key=lambda shift: laws[shift].left * (1.0 + 1e-3 * shift))
     recorded = model.controller
     own = math.inf if recorded is None else _left(model, runs, recorded, 0)
-    if recorded is not None and own <= max(EXACT, 2.0 * laws[0].left) and best == 0:
+    as_well = own <= 2.0 * laws[0].left
+    if (
+        recorded is not None
+        and best == 0
+        and (as_well or (own <= EXACT and _alike(recorded, laws[0])))
+    ):
         known = laws[0].left < EXACT
         return ControllerCheck(ControllerStatus.SAME, None, own, known)
     law = laws[best]

@@ -108,7 +108,11 @@ def decide(
     if lent is not None and lent.evidence > best.evidence + margin:
         reason = f"the held-out rows do not confirm {lent.candidate.name}, which gains most"
         return Decision(GapVerdict.UNKNOWN, None, (), False, reason, lent)
-    if stranger is not None and stranger.evidence > best.evidence and not _part(best, stranger):
+    if (
+        stranger is not None
+        and stranger.evidence > best.evidence + EQUAL
+        and not _part(best, stranger)
+    ):
         return _unknown(stranger, f"{best.candidate.name} explains less of the gap", lent)
     best, family = friction_kind(best, ranked, departures)
     rivals = [

@@ -265,6 +265,15 @@ def _stem_trouble(base: Baseline, after_base: Baseline, place: str) -> str:
         if place != f"valve:{valve}":
             continue
         old = stem_misfit(base.run, j, base.run.stems[:, j])
-        if stem_misfit(base.run, j, after_base.run.stems[:, j]) > old:
+        if stem_misfit(base.run, j, _from_measured(after_base.run, j)) > old:
             return f"the measured stem of {valve} is further from that effect than without it"
     return ""
+
+
+def _from_measured(run: FreeRun, valve: int) -> FloatArray:
+    """Return the stem of a valve, shape (N,), from where the first record shows it."""
+    record, name = run.runs.records[0], run.model.valve_names[valve]
+    if record.stem is None:
+        return run.stems[:, valve]
+    lead = float(record.stem[0, record.valves.index(name)] - run.runs.op[0, valve])
+    return FreeRun(run.model, run.runs, {**run.leads, name: lead}).stems[:, valve]

@@ -21,7 +21,7 @@ def not_contradicted(run: FreeRun, fits: Sequence[CandidateFit]) -> list[Candida
     for fit in fits:
         if isinstance(fit.candidate, ValveCandidate):
             valve = fit.candidate.valve
-            stems = fit.candidate.stems(run, fit.point[None, :])[:, 0]
+            stems = fit.candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
             if stem_misfit(run, valve, stems) > stem_misfit(run, valve, run.stems[:, valve]):
                 continue
         kept.append(fit)
@@ -38,7 +38,7 @@ def confirmed(run: FreeRun, fit: CandidateFit) -> bool:
         return False
     if any(record.stem is None for record in run.runs.records):
         return False
-    stems = candidate.stems(run, fit.point[None, :])[:, 0]
+    stems = candidate.stems(run, fit.point[None, :], from_measured=True)[:, 0]
     now = stem_misfit(run, candidate.valve, run.stems[:, candidate.valve])
     return stem_misfit(run, candidate.valve, stems) < CONFIRMED * now
 

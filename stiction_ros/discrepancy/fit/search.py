@@ -319,51 +319,32 @@ class _Search:
         values = self.candidate.values(coordinates)
         response = self.candidate.respond(self.base.run, values)
         best = int(np.argmin(misfit(self.base, self.gap, response, ar)))
-        return coordinates[best], self.judge(values[best], response.pick(best), like)
+        return coordinates[best], self.judge(values[best], response.pick(best))
 
-    def judge(
-        self, values: FloatArray, response: Response, like: CandidateFit | None = None
-    ) -> CandidateFit:
-        """Return the fit at one point of the search; the best one is remembered.
-
-        Args:
-            values: the point, shape (axes,).
-            response: there.
-            like: a fit near by, with whose noise the search for that at the point begins; None
-                begins as if nothing was known.
-        """
+    def judge(self, values: FloatArray, response: Response) -> CandidateFit:
+        """Return the fit at one point of the search; the best one is remembered."""
         key = tuple(values.tolist())
         if key in self.judged:
             return self.judged[key]
-        fit = self._fit(values, response, rounded=False, like=like)
+        fit = self._fit(values, response, rounded=False)
         self.judged[key] = fit
         if self.found is None or fit.delta_bic > self.found.delta_bic:
             self.found = fit
         return fit
 
     def exact(self, fit: CandidateFit) -> CandidateFit:
-        """Return a fit with its noise found anew, where an output is rounded as that of groups."""
+        """Return a fit by the likelihood of rounded values, where an output is rounded."""
+        if not any(self.base.run.runs.quanta):
+            return fit
         response = self.candidate.respond(self.base.run, fit.point[None, :])
         return self._fit(fit.point, response, rounded=True)
 
-    def _fit(
-        self,
-        values: FloatArray,
-        response: Response,
-        rounded: bool,
-        like: CandidateFit | None = None,
-    ) -> CandidateFit:
+    def _fit(self, values: FloatArray, response: Response, rounded: bool) -> CandidateFit:
         factors = np.zeros(0)
         if response.impossible:
             unmoved = {i: self.base.noise[i] for i in response.outputs}
             return CandidateFit(self.candidate, values, factors, unmoved, -np.inf, 0.0)
-        starts = {
-            i: (None, self.base.noise[i].ar) if like is None else (like.noise[i].ar,)
-            for i in response.outputs
-        }
-        noise = {
-            i: self._noise(i, response, values, None, rounded, starts[i]) for i in response.outputs
-        }
+        noise = {i: self._noise(i, response, values, None, rounded) for i in response.outputs}
         if response.sizes:
             own = {i: sizes[:, 0] for i, sizes in response.sizes.items()}
             first = next(iter(own))
@@ -371,8 +352,7 @@ class _Search:
             if len(own) > 1:
                 factors = shared_factors(own, self.base.columns, noise, self.base.blocks)
                 noise = {
-                    i: self._noise(i, response, values, factors, rounded, starts[i])
-                    for i in response.outputs
+                    i: self._noise(i, response, values, factors, rounded) for i in response.outputs
                 }
         gained, held = -self.candidate.count(values) * self._price(response), 0.0
         before = self.base.noise if rounded else self.base.plain
@@ -388,7 +368,6 @@ class _Search:
         values: FloatArray,
         factors: FloatArray | None,
         rounded: bool,
-        starts: Sequence[FloatArray | None],
     ) -> NoiseFit:
         """Return what a response leaves of an output, its factors given or open."""
         columns, target = self.base.columns[i], self.gap[:, i]
@@ -405,7 +384,7 @@ class _Search:
         if forms and keep is not None:  # what slows PV may or may not slow its noise
             forms = (*forms, *(behind_lag(ar, keep) for ar in forms))
         blocks = self.base.blocks[i]
-        fits = noise_forms(target, columns, blocks, starts, forms)
+        fits = noise_forms(target, columns, blocks, (None, self.base.noise[i].ar), forms)
         return best_noise(fits, self.base.run.runs.quanta[i] if rounded else 0.0, blocks)
 
     def _price(self, response: Response) -> float:

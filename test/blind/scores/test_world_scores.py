@@ -142,6 +142,9 @@ def test_process_changes_are_right_in_the_true_direction(loop: HiddenLoop) -> No
     larger, smaller = (effect(PROCESS, "gain", factor=f) for f in (1.1, 0.9))
     assert not judged(loop, (), said(larger), known=weaker).alarm
     assert judged(loop, (), said(smaller), known=weaker).alarm
+    left_open = ((PROCESS, "gain"), (VALVE, "characteristic"))
+    assert judged(loop, (), said(loose=left_open, verdict="ambiguous"), known=weaker).held == 1
+    assert judged(loop, (), said(loose=left_open, verdict="ambiguous"), known=plant).held == 0
     faster = dataclasses.replace(plant, lags=tuple(0.9 * lag for lag in plant.lags))
     slower = dataclasses.replace(plant, lags=tuple(1.1 * lag for lag in plant.lags))
     assert not judged(loop, (), said(effect(PROCESS, "pole")), known=faster).alarm

@@ -7,9 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
 from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.effects import Tuning
 from stiction_ros.field.hidden import hidden_loop
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.model import PiTuning
@@ -76,6 +78,16 @@ def test_no_noise_is_named_that_explains_less_than_a_wave_in_doubt() -> None:
 
 def test_fine_rounding_beside_noise_of_the_equation_is_no_noise_of_its_own() -> None:
     assert names(answered(700)) == [("disturbance:PV1", "triangle")]
+
+
+def test_another_reset_is_told_though_the_gain_makes_nearly_all_moves() -> None:
+    seen, _ = blind_loop(95109, "single")  # no set-point moves: Δe is far more than its reset
+    runs, _ = open_gate(seen.model, [seen.record])
+    check = check_controller(seen.model, runs)
+    assert check.status is ControllerStatus.OTHER
+    assert check.finding is not None
+    assert isinstance(check.finding.behaviour, Tuning)
+    assert check.finding.behaviour.integral_time == pytest.approx(60.83, abs=0.01)
 
 
 @pytest.mark.parametrize(("factor", "other"), [(0.97, False), (0.8, True)])
@@ -253,6 +265,10 @@ def test_how_late_within_a_sample_a_stem_slips_is_no_dead_time() -> None:
 @pytest.mark.trial
 def test_a_square_load_that_changes_sides_between_samples_is_one() -> None:
     assert names(answered(322, family="two")) == [("valve:V1", "stiction"), ("load:V1", "square")]
+
+
+def test_a_start_that_nobody_sees_is_no_contradiction_to_a_recorded_stem() -> None:
+    assert names(answered(740020)) == [("valve:V1", "slew")]
 
 
 @pytest.mark.trial
