@@ -246,7 +246,8 @@ def _kind(
     followed = _cycles(output) and (output.set_point_line or 0.0) > FOLLOWED
     if followed or (regular and _set_point(output, loop)):
         return CauseKind.SET_POINT, "The set-point moves the loop at this period."
-    if acting:
+    turns = swing.regularity > 0.0 or swing.share > PLAIN_SHARE
+    if acting and turns:  # a valve that sticks where nothing comes back makes no cycle
         valve, with_it = max(acting, key=lambda one: _gone(one[1]))
         if _gone(with_it) <= MATERIAL:
             return (

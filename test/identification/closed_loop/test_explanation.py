@@ -100,6 +100,22 @@ def test_where_nothing_else_explains_a_cycle_a_friction_does_that_is_not_sure(
     assert ("Nothing else explains it" in told.sentence) == blamed
 
 
+@pytest.mark.parametrize(
+    ("regularity", "share", "blamed"), [(0.3, 0.2, True), (0.0, 0.7, True), (0.0, 0.2, False)]
+)
+def test_a_valve_that_sticks_makes_no_cycle_where_nothing_comes_back(
+    regularity: float, share: float, blamed: bool
+) -> None:
+    one = known(Kind(friction=(6.0, 2.0), noise=0.05))
+    closed = close_loop(one.record, one.found)
+    swing = closed.outputs[0].oscillation
+    assert swing is not None
+    swing = dataclasses.replace(swing, regularity=regularity, share=share)
+    output = dataclasses.replace(closed.outputs[0], oscillation=swing)
+    told = cause_of(one.record, one.found, ClosedLoop(closed.valves, (output,)), 0)
+    assert told.kind is (CauseKind.VALVE if blamed else CauseKind.NONE)
+
+
 def test_where_there_is_no_line_there_is_no_rival() -> None:
     worse = dataclasses.replace(NO_LINE, gain=-4.0)
     assert OutputLoop("PV1", None, after=worse, alone=worse).rivalry <= 0.0
