@@ -156,8 +156,8 @@ class Fits:
                 column[k] = c @ state
                 state = a @ state
             free.append(column)
-        if self.plant.integrating:  # nobody knows the OP at which a level stands still
-            free.append(self._behind(np.ones((self.count, 1)))[:, 0])
+        if self.plant.integrating:  # nobody knows the OP at which a level stands, or stood, still
+            free.append(self._behind(np.ones((LEAD + self.count, 1)))[LEAD:, 0])
         self.free = np.column_stack(free)
         form = true_form(loop.noise, self.plant, loop.record.sample_time, loop.kept)
         self.form = form

@@ -119,6 +119,13 @@ def test_what_is_not_there_gains_nothing() -> None:
     assert gain.over_none < 12.0
 
 
+def test_the_op_at_which_a_level_stood_still_before_the_record_is_not_known_either() -> None:
+    (gain,) = oracle(
+        hidden_loop(730078)
+    )  # an offset in front of a level, and noise of its equation
+    assert gain.over_none == pytest.approx(0.0, abs=0.1)
+
+
 def test_an_output_of_a_level_that_drifts_is_a_level_about_another_op() -> None:
     loop = found("none", integrating=True)
     fits = Fits(loop, ())
