@@ -47,6 +47,7 @@ from stiction_ros.identification.result.identification import (
     Identification,
     ValveEstimate,
 )
+from stiction_ros.identification.side_by_side import at_once
 from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 
@@ -283,18 +284,23 @@ def _valve(
             tag, "", LoopStatus.UNTESTABLE, law.reason, oscillation=swing, band_share=share
         )
     recorded = repeated.recorded(j, period)
-    free = compare(repeated.without_friction(j), recorded, period)
     linear = LinearController(law.coefficients, law.lag, law.smoothing)
     cycle = outputs[i].oscillation
     at = outputs[i].alone.period or (period if cycle is None else cycle.period)
-    moved = repeated.moved(j, at)
-    if estimate.static_friction > 0.0:
-        stuck = compare(repeated.with_friction(j), recorded, period)
-        status, reason = _status(stuck), ""
-    else:
-        stuck, status, reason = STILL, LoopStatus.UNTESTABLE, "no friction was identified"
     rows = _last_rows(loop)
     error = law.set_point[rows] - loop.pv[rows, i]
+    sticks = estimate.static_friction > 0.0
+    stuck, (free, moved, line) = at_once(
+        lambda: compare(repeated.with_friction(j), recorded, period) if sticks else STILL,
+        lambda: (
+            compare(repeated.without_friction(j), recorded, period),
+            repeated.moved(j, at),
+            outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
+        ),
+    )
+    status, reason = LoopStatus.UNTESTABLE, "no friction was identified"
+    if sticks:
+        status, reason = _status(stuck), ""
     return ValveLoop(
         tag,
         outputs[i].name,
@@ -311,7 +317,7 @@ def _valve(
         moved.with_friction,
         moved.without_friction,
         moved.gone,
-        outside_line(Predicted(loop.op[rows, j], [error], [0]), at),
+        line,
         outputs[i].after,
     )
 
