@@ -14,6 +14,7 @@ from stiction_ros.identification.evidence.rates import PRICE, Look, looks
 from stiction_ros.identification.evidence.verdict import (
     ANOTHER,
     AS_RECORDED,
+    GAINED,
     HARDLY,
     LEAST_GONE,
     MATTERS,
@@ -225,6 +226,16 @@ def test_a_loop_that_does_not_cycle_acquits_no_valve_alone(
     seen = (dataclasses.replace(quiet, accepted=(open_,)),)
     assert not acquits(found, seen, 0)
     assert acquits(rings, seen, 0)
+
+
+@pytest.mark.parametrize(("gain", "acquitted"), [(0.9 * GAINED, True), (1.1 * GAINED, False)])
+def test_a_loop_that_does_not_cycle_acquits_no_valve_where_a_rate_gains_by_what_matters(
+    told: Identification, quiet: Look, gain: float, acquitted: bool
+) -> None:
+    found = with_loop(told, moved_without=1.0, loop_gone=0.0)
+    other = dataclasses.replace(quiet.accepted[0], material_gain=gain)
+    seen = (quiet, dataclasses.replace(quiet, accepted=(other,)))
+    assert acquits(found, seen, 0) is acquitted
 
 
 def test_a_loop_acquits_no_valve_in_which_a_rate_finds_friction(
