@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 
+from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
@@ -13,6 +15,9 @@ from stiction_ros.effects import Behaviour, FloatArray
 
 LATEST = 20  # samples that a stem may come late
 TELLS = 0.5  # of the squared distance from OP that an effect has to explain to be told
+SIDES = (-1.0, -0.5, 0.0, 0.5, 1.0)
+ROUNDS, SHRINK = 9, 0.5
+BOXES, THROWN = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003), 1000  # of a needle, and points in each
 ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
 
@@ -22,9 +27,11 @@ class StemLook:
 
     Attributes:
         valve: tag.
-        off: root mean square of stem less OP, %, a constant taken out.
+        off: root mean square of stem less where the model has it, %, a constant taken out.
         constant: that constant, %.
-        late: samples by which the stem matches OP best.
+        moved: whether the model moves it by anything but OP.
+        late: samples by which the stem matches that best; 0 as well where it may be more than
+            :data:`LATEST`.
         behaviour: the effect of the valve that explains most of the distance; None where none
             explains enough.
         share: of the squared distance that it explains, 0 to 1.
@@ -34,6 +41,7 @@ class StemLook:
     valve: str
     off: float
     constant: float
+    moved: bool
     late: int
     behaviour: Behaviour | None
     share: float
@@ -42,7 +50,8 @@ class StemLook:
     @property
     def sentence(self) -> str:
         """What it says, for people."""
-        head = f"the stem of {self.valve} is recorded: it stands {self.off:.2g} % off OP"
+        other = "the simulated one" if self.moved else "OP"
+        head = f"the stem of {self.valve} is recorded: it stands {self.off:.2g} % off {other}"
         if abs(self.constant) > self.off:
             head += f" about a constant {self.constant:.3g} %"
         if self.off <= ACCURATE * self.span:
@@ -79,22 +88,47 @@ def _look(run: FreeRun, valve: int) -> StemLook:
     for candidate in valve_candidates(run):
         if not isinstance(candidate, ValveCandidate) or candidate.valve != valve:
             continue
-        points = candidate.values(candidate.grid())
-        left = _left(stem, candidate.stems(run, points))
-        k = int(np.argmin(left))
-        gone = 1.0 - float(left[k]) / max(float(before), 1e-300)
+        point, left = _nearest(candidate, run, stem)
+        gone = 1.0 - left / max(float(before), 1e-300)
         if gone > share:
-            best, share = candidate.behaviour(run, points[k], np.zeros(0)), gone
+            best, share = candidate.behaviour(run, point, np.zeros(0)), gone
     shifted = [_left(stem[late:], op[: len(op) - late, None])[0] for late in range(LATEST + 1)]
+    late = int(np.argmin(shifted))
     return StemLook(
         name,
         float(np.sqrt(before / len(stem))),
         constant,
-        int(np.argmin(shifted)),
+        bool(run.model.valves[valve].effects),
+        late if late < LATEST else 0,
         best,
         share if best is not None else 0.0,
         float(np.ptp(op)),
     )
+
+
+def _nearest(candidate: ValveCandidate, run: FreeRun, stem: FloatArray) -> tuple[FloatArray, float]:
+    """Return the figures whose stem is nearest, shape (axes,), and its squared distance."""
+    steps = np.array([axis.step for axis in candidate.axes])
+    around = np.array(list(itertools.product(SIDES, repeat=len(steps))))
+    tried, size = candidate.grid(), 1.0
+    for _ in range(ROUNDS):
+        points = candidate.values(tried)
+        left = _left(stem, candidate.stems(run, points))
+        k = int(np.argmin(left))
+        size *= SHRINK
+        tried = tried[k] + size * steps * around
+    point, least = points[k], float(left[k])
+    if not candidate.needle:
+        return point, least
+    halton = halton_sequence(len(steps), seed=0)
+    for size in BOXES:
+        cube = 2.0 * halton.random(THROWN) - 1.0
+        points = candidate.scattered(point, cube, size, any_start=True)
+        left = _left(stem, candidate.stems(run, points))
+        k = int(np.argmin(left))
+        if left[k] < least:
+            point, least = points[k], float(left[k])
+    return point, least
 
 
 def _left(stem: FloatArray, tried: FloatArray) -> FloatArray:

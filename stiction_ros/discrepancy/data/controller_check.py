@@ -17,6 +17,7 @@ from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 from stiction_ros.records import Record
+from stiction_ros.records.quality import Quality
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
@@ -251,6 +252,8 @@ class _Law:
         left: share of the moves that it leaves.
         samples: how many moves there are.
         usual: their root mean square, %.
+        mostly: what it leaves of the move in the middle, over the move in the middle: a few samples
+            that were not measured do not count.
     """
 
     gain: float
@@ -258,11 +261,12 @@ class _Law:
     left: float
     samples: int
     usual: float = 0.0
+    mostly: float = 1.0
 
 
 def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:
     """Return the law of a controller that scans twice, where one scan does not give OP."""
-    if law.left <= max(ROUNDED * _rounding(runs, law), ONCE):
+    if min(law.left, law.mostly) <= max(ROUNDED * _rounding(runs, law), ONCE):
         return None
     found = scanned_twice(model, runs)
     if found is None or model.controller is None or _alike(model.controller, found):
@@ -286,15 +290,24 @@ def _finding(
 
 
 def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, FloatArray]:
-    """Return the moves of OP, shape (n,), and (e_k − e_{k−1}, T_s e_k), shape (n, 2)."""
+    """Return the moves of OP, shape (n,), and (e_k − e_{k−1}, T_s e_k), shape (n, 2).
+
+    Moves to or from a sample that was carried over or drawn in say nothing of a law.
+    """
     low, high = model.limits[0]
     moves, columns = [], []
     for record, rows in zip(runs.records, runs.slices, strict=True):
         op = runs.op[rows, 0]
         count = len(op) - shift
-        inside = (op[1:count] > low) & (op[1:count] < high)
+        if count < 2:
+            continue
+        told = record.quality != Quality.HELD
+        told = (told[1:] & told[:-1])[: count - 1] & (told[1:] & told[:-1])[shift:]
+        inside = (op[1:count] > low) & (op[1:count] < high) & told
         moves.append(np.diff(op[:count])[inside])
         columns.append(_terms(model, runs, record, rows, shift)[inside])
+    if not moves:
+        return np.zeros(0), np.zeros((0, 2))
     return np.concatenate(moves), np.vstack(columns)
 
 
@@ -316,7 +329,9 @@ def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:
     share = float(np.linalg.norm(left) / np.linalg.norm(moves))
     time = gain / integral if integral != 0.0 and gain / integral > 0.0 else 1e9
     usual = float(np.sqrt(np.mean(moves**2)))
-    return _Law(gain, min(time, 1e9), share, len(moves), usual)
+    middle = float(np.median(np.abs(moves)))
+    mostly = float(np.median(np.abs(left))) / middle if middle > 0.0 else 1.0
+    return _Law(gain, min(time, 1e9), share, len(moves), usual, mostly)
 
 
 def _rounding(runs: Runs, law: _Law) -> float:

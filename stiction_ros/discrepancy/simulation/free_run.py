@@ -25,6 +25,7 @@ PHASES = (0, 1, 3)
 """Of the held-out blocks, record by record. By each of them the first block of a record is fitted:
 nothing else holds its state at the start."""
 SHORTEST_BLOCK = 20
+FEWEST = 40  # samples of the longest record
 MOVE_ON = ("stiction", "backlash", "slew", "lag", "pole")
 """Effects with which what enters a process goes on moving between two samples."""
 SMALL = 0.01  # %, of a move by which a process that is not linear is asked for its slope
@@ -115,6 +116,12 @@ def join_records(
         raise InputError("no record", where=model.name, fix="give one record at least")
     for record in records:
         _check(model, record)
+    if (longest := max(map(len, records))) < FEWEST:
+        raise InputError(
+            f"{longest} samples are too few, {FEWEST} are needed",
+            where=records[0].name,
+            fix="take a longer record",
+        )
     op = np.vstack([r.op[:, [r.valves.index(v) for v in model.valve_names]] for r in records])
     pv = np.vstack([r.pv[:, [r.outputs.index(o) for o in model.outputs]] for r in records])
     ends = np.cumsum([len(r) for r in records]).tolist()

@@ -9,12 +9,13 @@ import pytest
 from gap_loops import loop, record, without_controller, without_set_points
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate, valve_candidates
-from stiction_ros.discrepancy.data.controller_check import check_controller
+from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.data.scans import scanned_twice
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray, HeStiction
 from stiction_ros.loop import LoopModel, PiTuning
+from stiction_ros.records.quality import Quality
 
 EVERY = 2
 TUNING = PiTuning(gain=0.8, integral_time=24.0)
@@ -89,3 +90,18 @@ def test_a_controller_that_scans_once_holds_its_op() -> None:
     model = loop()
     runs, _ = open_gate(model, [record(model)])
     assert check_controller(model, runs).scans is None
+
+
+@pytest.mark.parametrize("quality", [Quality.HELD, Quality.GOOD], ids=["told", "not told"])
+def test_a_sample_that_was_drawn_in_makes_no_second_scan(quality: Quality) -> None:
+    document = without_controller(loop()).to_mapping()
+    document["controller"] = {"kind": "pi", "gain": 0.8, "integral_time": 24.0}
+    model = LoopModel.from_mapping(document)
+    whole = record(model, samples=700)
+    pv, marks = whole.pv.copy(), whole.quality.copy()
+    pv[300] = 0.5 * (pv[299] + pv[301])
+    marks[300] = quality
+    runs, _ = open_gate(model, [dataclasses.replace(whole, pv=pv, mask=marks)])
+    check = check_controller(model, runs)
+    assert check.scans is None
+    assert check.status is ControllerStatus.SAME

@@ -9,7 +9,7 @@ import pytest
 from gap_loops import loop, record
 
 from stiction_ros.config_files import find_config
-from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
+from stiction_ros.discrepancy.simulation.free_run import FEWEST, FreeRun, join_records
 from stiction_ros.effects import (
     ExtraDelay,
     ExtraPole,
@@ -113,3 +113,10 @@ def test_an_unstable_model_is_refused() -> None:
     model = LoopModel.from_mapping(document)
     with np.errstate(all="ignore"), pytest.raises(InputError, match="without bound"):
         FreeRun(model, join_records(model, [record(loop(), samples=3000)]))
+
+
+def test_a_record_of_a_few_samples_is_refused_in_one_sentence() -> None:
+    short = record(loop(), samples=FEWEST - 1)
+    with pytest.raises(InputError, match=f"{FEWEST - 1} samples are too few, {FEWEST} are needed"):
+        join_records(loop(), [short])
+    join_records(loop(), [short, record(loop(), samples=FEWEST)])
