@@ -20,6 +20,7 @@ from stiction_ros.cli.options.intake import (
 )
 from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
+from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.set_points import SetPoints
@@ -86,10 +87,10 @@ def _is_model(source: str) -> bool:
 def _of_model(options: argparse.Namespace) -> Any:
     from stiction_ros.gain.model_gain import SAMPLES, gain_of_model
 
-    model = LoopModel.load(options.record)
+    model = LoopModel.load(find_config(options.record))
     schedule = None
     if options.set_points is not None:
-        schedule = SetPoints.load(options.set_points, model.outputs)
+        schedule = SetPoints.load(find_config(options.set_points), model.outputs)
     samples = SAMPLES if options.samples is None else options.samples
     if samples < 100:
         raise InputError(f"{samples} is too few", where="--samples", fix="use 100 or more")

@@ -21,6 +21,7 @@ from stiction_ros.cli.options.intake import (
 )
 from stiction_ros.cli.output.as_json import hand_over
 from stiction_ros.cli.output.progress import bar
+from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError, storing
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
@@ -93,14 +94,18 @@ def run(options: argparse.Namespace) -> int:
     )
     with bar("comparing") as show:
         found = find_discrepancy(model, records, settings, progress=show)
-    hand_over(options.json, found.to_json(), lambda: _print(found))
-    if options.out is not None:
+    if options.out is not None:  # first: who reads what is printed may stop doing so
         _write(found, Path(options.out))
+    hand_over(options.json, found.to_json(), lambda: _print(found))
     return EXIT_CODES[found.verdict]
 
 
 def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
     if options.fit_linear:
+        for path in filter(_is_yaml, options.inputs):
+            raise InputError(
+                "is a loop model", where=path, fix="leave it out, --fit-linear makes one"
+            )
         records = [_record(path, options) for path in options.inputs]
         from stiction_ros.discrepancy.data.first_model import first_model
 
@@ -111,8 +116,18 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
             where="gap",
             fix="write stiction gap MODEL RECORD, or --fit-linear RECORD without a model",
         )
-    model = LoopModel.load(options.inputs[0])
+    if not _is_yaml(options.inputs[0]):
+        raise InputError(
+            "is no loop model",
+            where=options.inputs[0],
+            fix="name the model first, a .yaml file, then its records",
+        )
+    model = LoopModel.load(find_config(options.inputs[0]))
     return model, [_record(path, options) for path in options.inputs[1:]]
+
+
+def _is_yaml(path: str) -> bool:
+    return path.endswith((".yaml", ".yml"))
 
 
 def _record(path: str, options: argparse.Namespace) -> Record:

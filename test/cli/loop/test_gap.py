@@ -63,3 +63,25 @@ def test_a_model_without_a_record_is_refused(
 ) -> None:
     assert main(["gap", str(files / "model.loop.yaml")]) == 2
     assert "no record" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("inputs", "said"),
+    [
+        (["healthy.csv", "model.loop.yaml"], "healthy.csv: is no loop model; name the model first"),
+        (["--fit-linear", "model.loop.yaml", "healthy.csv"], "is a loop model; leave it out"),
+    ],
+)
+def test_a_model_in_the_place_of_a_record_is_told(
+    files: Path, capsys: pytest.CaptureFixture[str], inputs: list[str], said: str
+) -> None:
+    paths = [str(files / each) if "." in each else each for each in inputs]
+    assert main(["gap", *paths]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_model_that_comes_along_is_found_by_its_name(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["gap", "flow.loop.yaml", str(files / "healthy.csv"), "--quick"]) in (0, 3, 4)
+    assert "no such file" not in capsys.readouterr().err
