@@ -155,6 +155,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = next((word for word in given if not word.startswith("-")), "")
+    if not given:
+        parser("").print_help(sys.stderr)
+        return USAGE
     try:
         if command and command not in COMMANDS:
             parser("").error(f"there is no command {command}{_meant(command, COMMANDS)}")

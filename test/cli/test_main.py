@@ -38,6 +38,12 @@ def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[
     assert "usage: stiction " + name in capsys.readouterr().out
 
 
+def test_without_a_command_all_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    err = capsys.readouterr().err
+    assert all(name in err for name in COMMANDS)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -7,7 +7,7 @@ import functools
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -21,6 +21,7 @@ from stiction_ros.errors import InputError, storing
 if TYPE_CHECKING:
     from stiction_ros.examples.control_study import StudyOptions, Trial
 
+LABELS = ("", "PV")  # heads of the columns of words
 SEEDS = (101, 103)
 OPTIONS = (
     "plant",
@@ -169,11 +170,25 @@ def _print(studies: Sequence[Any], page: Path) -> None:
 
     console = Console()
     for study in studies:
-        title = f"{PLANT_TITLES[study.options.plant]}: {describe(study)}"
-        shown = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
-        for column, name in enumerate(HEAD):
-            shown.add_column(name, justify="left" if column < 2 else "right", no_wrap=True)
-        for row in rows_of(study, short=True):
-            shown.add_row(*row)
-        console.print(shown)
+        title: str | None = f"{PLANT_TITLES[study.options.plant]}: {describe(study)}"
+        rows = rows_of(study, short=True)
+        for columns in _parts(HEAD, rows, console.width):
+            shown = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
+            for column in columns:
+                label = HEAD[column] in LABELS
+                side: Literal["left", "right"] = "left" if label else "right"
+                shown.add_column(HEAD[column], justify=side, no_wrap=True)
+            for row in rows:
+                shown.add_row(*(row[column] for column in columns))
+            console.print(shown)
+            title = None
     console.print(f"{page}")
+
+
+def _parts(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[list[int]]:
+    """Return the columns of one table, or of one on outputs and one on valves where it is wide."""
+    wide = sum(2 + max(len(row[k]) for row in (head, *rows)) for k in range(len(head)))
+    if wide <= width:
+        return [list(range(len(head)))]
+    valve = head.index("", 1)
+    return [list(range(valve)), [0, *range(valve, len(head))]]

@@ -27,6 +27,21 @@ def test_page_figures_and_scores_are_written(folder: Path) -> None:
     assert names == {"compare.html", "compare.json", "figure6_linear.png", "figure6_linear.svg"}
 
 
+@pytest.mark.parametrize(("width", "tables"), [(80, 2), (120, 1)])
+def test_a_terminal_of_80_columns_cuts_nothing_off(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    width: int,
+    tables: int,
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main(["demo", "tank", "--compare", *SHORT, "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "…" not in out
+    assert out.count("no friction") == tables
+
+
 def test_the_scores_hold_every_controller(folder: Path) -> None:
     document: dict[str, Any] = json.loads((folder / "copy.json").read_text(encoding="utf-8"))
     linear = document["linear"]
