@@ -39,6 +39,7 @@ REASONS: dict[str, dict[str, str]] = {
         "how many threads there are is nobody's floor",
     },
     GAP: {
+        "records": "a record tells of itself: how long it is, which of its samples were measured",
         "loop": "a loop model tells its tags and limits, and takes in the effect that is named",
         "processes": "the process as a linear model, and made anew with each effect taken in",
         "effects": "what a search asks of an effect is said in the file of the effect alone: axes, "

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -122,6 +123,11 @@ class Record:
         if self.mask is not None:
             return self.mask
         return np.broadcast_to(np.uint8(Quality.GOOD), (len(self),))
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which samples were measured, neither carried over nor drawn in, shape (N,)."""
+        return np.asarray(self.quality != Quality.HELD)
 
     @property
     def segments(self) -> tuple[Segment, ...]:

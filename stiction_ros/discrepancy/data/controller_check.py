@@ -17,7 +17,6 @@ from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
 from stiction_ros.records import Record
-from stiction_ros.records.quality import Quality
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
@@ -252,8 +251,6 @@ class _Law:
         left: share of the moves that it leaves.
         samples: how many moves there are.
         usual: their root mean square, %.
-        mostly: what it leaves of the move in the middle, over the move in the middle: a few samples
-            that were not measured do not count.
     """
 
     gain: float
@@ -261,12 +258,11 @@ class _Law:
     left: float
     samples: int
     usual: float = 0.0
-    mostly: float = 1.0
 
 
 def _scans(model: LoopModel, runs: Runs, law: _Law) -> Scans | None:
     """Return the law of a controller that scans twice, where one scan does not give OP."""
-    if min(law.left, law.mostly) <= max(ROUNDED * _rounding(runs, law), ONCE):
+    if law.left <= max(ROUNDED * _rounding(runs, law), ONCE):
         return None
     found = scanned_twice(model, runs)
     if found is None or model.controller is None or _alike(model.controller, found):
@@ -301,8 +297,8 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
         count = len(op) - shift
         if count < 2:
             continue
-        told = record.quality != Quality.HELD
-        told = (told[1:] & told[:-1])[: count - 1] & (told[1:] & told[:-1])[shift:]
+        told = record.measured[1:] & record.measured[:-1]
+        told = told[: count - 1] & told[shift:]
         inside = (op[1:count] > low) & (op[1:count] < high) & told
         moves.append(np.diff(op[:count])[inside])
         columns.append(_terms(model, runs, record, rows, shift)[inside])
@@ -329,9 +325,7 @@ def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:
     share = float(np.linalg.norm(left) / np.linalg.norm(moves))
     time = gain / integral if integral != 0.0 and gain / integral > 0.0 else 1e9
     usual = float(np.sqrt(np.mean(moves**2)))
-    middle = float(np.median(np.abs(moves)))
-    mostly = float(np.median(np.abs(left))) / middle if middle > 0.0 else 1.0
-    return _Law(gain, min(time, 1e9), share, len(moves), usual, mostly)
+    return _Law(gain, min(time, 1e9), share, len(moves), usual)
 
 
 def _rounding(runs: Runs, law: _Law) -> float:
