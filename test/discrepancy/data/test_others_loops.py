@@ -43,6 +43,7 @@ def test_noise_of_the_equation_does_not_hide_what_an_effect_closes() -> None:
     assert found.closed > 0.9
 
 
+@pytest.mark.trial
 def test_a_recorded_stem_tells_a_lag_of_the_valve_from_those_behind_it() -> None:
     told = answered(629)
     assert names(told) == [("valve:V1", "lag")]
@@ -109,6 +110,7 @@ def test_a_tuning_is_another_one_by_a_size_that_matters(factor: float, other: bo
     assert check.status is (ControllerStatus.OTHER if other else ControllerStatus.SAME)
 
 
+@pytest.mark.trial
 def test_a_gain_that_a_curve_explains_as_well_is_no_correction_of_the_model() -> None:
     answer = answered(838)  # a quadratic characteristic of which the set-points see the slope
     assert answer.verdict is GapVerdict.AMBIGUOUS
@@ -133,6 +135,7 @@ def test_a_lag_that_moves_on_between_samples_is_told_from_another_process(seed: 
     assert told == {("valve:V1", "lag"), ("process:PV1", "pole"), ("sensor:PV1", "lag")}
 
 
+@pytest.mark.trial
 def test_a_curve_is_stepped_with_the_process_that_stands_in_for_it() -> None:
     answer = answered(302, given="off")
     assert names(answer) == [("valve:V1", "characteristic")]
@@ -205,6 +208,7 @@ def test_a_step_closes_what_it_closes_at_its_moment() -> None:
     assert found.closed > 0.9
 
 
+@pytest.mark.trial
 def test_a_curve_is_judged_with_the_changed_process_left_open() -> None:
     assert names(answered(340, given="off")) == [("valve:V1", "characteristic")]
 
@@ -267,6 +271,7 @@ def test_a_square_load_that_changes_sides_between_samples_is_one() -> None:
     assert names(answered(322, family="two")) == [("valve:V1", "stiction"), ("load:V1", "square")]
 
 
+@pytest.mark.trial
 def test_a_start_that_nobody_sees_is_no_contradiction_to_a_recorded_stem() -> None:
     assert names(answered(740020)) == [("valve:V1", "slew")]
 
@@ -308,6 +313,7 @@ def test_a_walk_behind_thinned_values_is_not_nothing() -> None:
     assert answered(822).verdict is GapVerdict.NONE  # healthy
 
 
+@pytest.mark.trial
 def test_values_between_kept_ones_are_no_evidence() -> None:
     kept = answered(315)  # a gain, three values of four between kept ones
     assert names(kept) == [("process:PV1", "gain")]
@@ -357,6 +363,7 @@ def test_what_comes_next_is_seen_beside_other_figures_of_what_was_found() -> Non
     assert ("disturbance:PV1", "step") in {(step.place, step.effect), *step.alternatives}
 
 
+@pytest.mark.trial
 def test_friction_of_a_level_closes_what_it_closes_in_one_step() -> None:
     answer = answered(550058, family="physics")  # slips that are a little off add up in a level
     (found,) = answer.effects
