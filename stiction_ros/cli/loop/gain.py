@@ -14,6 +14,7 @@ from stiction_ros.cli.options.intake import (
     add_columns,
     add_intake,
     intake_options,
+    is_model,
     opened,
     show_loops,
     tell,
@@ -71,17 +72,13 @@ def run(options: argparse.Namespace) -> int:
         return show_loops([Path(options.record)], intake_options(options))
     found: Gain
     verdict: dict[str, Any] = {}
-    if _is_model(options.record):
+    if is_model(options.record):
         found = _of_model(options)
     else:
         found, verdict = _of_record(options)
     document = {"record": str(options.record)} | verdict | found.to_json()
     hand_over(options.json, document, lambda: show(found, verdict))
     return 0
-
-
-def _is_model(source: str) -> bool:
-    return source.endswith((MODEL_ENDING, ".yaml", ".yml"))
 
 
 def _of_model(options: argparse.Namespace) -> Any:

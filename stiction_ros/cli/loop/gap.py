@@ -16,6 +16,7 @@ from stiction_ros.cli.options.intake import (
     add_columns,
     add_intake,
     intake_options,
+    is_model,
     opened,
     show_loops,
 )
@@ -102,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
     if options.fit_linear:
-        for path in filter(_is_yaml, options.inputs):
+        for path in filter(is_model, options.inputs):
             raise InputError(
                 "is a loop model", where=path, fix="leave it out, --fit-linear makes one"
             )
@@ -116,7 +117,7 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
             where="gap",
             fix="write stiction gap MODEL RECORD, or --fit-linear RECORD without a model",
         )
-    if not _is_yaml(options.inputs[0]):
+    if not is_model(options.inputs[0]):
         raise InputError(
             "is no loop model",
             where=options.inputs[0],
@@ -124,10 +125,6 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
         )
     model = LoopModel.load(find_config(options.inputs[0]))
     return model, [_record(path, options) for path in options.inputs[1:]]
-
-
-def _is_yaml(path: str) -> bool:
-    return path.endswith((".yaml", ".yml"))
 
 
 def _record(path: str, options: argparse.Namespace) -> Record:

@@ -118,6 +118,11 @@ def intake_options(options: argparse.Namespace) -> IntakeOptions:
     )
 
 
+def is_model(source: str) -> bool:
+    """Tell by its name whether a file is a loop model and no record."""
+    return source.endswith((".yaml", ".yml"))
+
+
 def opened(options: argparse.Namespace) -> Loop:
     """Return the loop of the record that the command line names.
 
