@@ -6,20 +6,12 @@ import dataclasses
 import math
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import (
-    NO_SAMPLE,
-    Behaviour,
-    FloatArray,
-    Memory,
-    elapsed,
-    parameter,
-)
+from stiction_ros.effects.behaviour import NO_SAMPLE, Memory, elapsed, parameter
+from stiction_ros.effects.disturbance.drawn import DrawnDisturbance
 
 
 @dataclasses.dataclass(frozen=True)
-class ColouredDisturbance(Behaviour):
+class ColouredDisturbance(DrawnDisturbance):
     r"""Adds first-order autoregressive noise of a given spread and time constant.
 
     .. math::
@@ -35,7 +27,6 @@ class ColouredDisturbance(Behaviour):
     """
 
     effect: ClassVar[str] = "coloured"
-    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
     signature: ClassVar[str] = "a gap that wanders without a relation to OP, set-point or time"
     minimum_data: ClassVar[str] = "a record of many time constants"
     confusable: ClassVar[tuple[str, ...]] = ("disturbance random_walk", "disturbance drift")
@@ -48,13 +39,6 @@ class ColouredDisturbance(Behaviour):
     std: float = parameter("std", "signal", "standard deviation σ", low=0.0)
     time_constant: float = parameter("tau", "s", "time constant τ", low=1e-9)
 
-    def rest(self, value: float) -> Memory:
-        return (0.0, NO_SAMPLE)
-
-    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory (w, time) and the signal with the expected w added."""
-        return self.step_with(memory, value, time, 0.0)
-
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
@@ -64,9 +48,3 @@ class ColouredDisturbance(Behaviour):
         keep = 0.0 if before == NO_SAMPLE else math.exp(-elapsed(before, time) / self.time_constant)
         wave = keep * last + self.std * math.sqrt(1.0 - keep * keep) * normal
         return (wave, time), value + wave
-
-    def simulate(
-        self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
-    ) -> FloatArray:
-        """Return the signal as it is: from rest nothing is expected to be added."""
-        return np.array(values, dtype=float)

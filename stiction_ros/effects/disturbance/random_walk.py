@@ -6,20 +6,12 @@ import dataclasses
 import math
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import (
-    NO_SAMPLE,
-    Behaviour,
-    FloatArray,
-    Memory,
-    elapsed,
-    parameter,
-)
+from stiction_ros.effects.behaviour import NO_SAMPLE, Memory, elapsed, parameter
+from stiction_ros.effects.disturbance.drawn import DrawnDisturbance
 
 
 @dataclasses.dataclass(frozen=True)
-class RandomWalkDisturbance(Behaviour):
+class RandomWalkDisturbance(DrawnDisturbance):
     r"""Adds a random walk that starts at zero with the first sample.
 
     .. math:: w_k = w_{k-1} + \sigma \sqrt{T_s} \, n_k, \quad n_k \sim N(0, 1)
@@ -32,7 +24,6 @@ class RandomWalkDisturbance(Behaviour):
     """
 
     effect: ClassVar[str] = "random_walk"
-    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
     signature: ClassVar[str] = "a gap that wanders ever farther without a relation to OP"
     minimum_data: ClassVar[str] = "a record in which it leaves the noise far behind"
     confusable: ClassVar[tuple[str, ...]] = ("disturbance coloured", "disturbance drift")
@@ -44,13 +35,6 @@ class RandomWalkDisturbance(Behaviour):
 
     rate: float = parameter("rate", "signal/√s", "standard deviation after one second", low=0.0)
 
-    def rest(self, value: float) -> Memory:
-        return (0.0, NO_SAMPLE)
-
-    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory (w, time) and the signal with the last w added."""
-        return self.step_with(memory, value, time, 0.0)
-
     def step_with(
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
@@ -60,9 +44,3 @@ class RandomWalkDisturbance(Behaviour):
         spent = 0.0 if before == NO_SAMPLE else elapsed(before, time)
         wave = last + self.rate * math.sqrt(spent) * normal
         return (wave, time), value + wave
-
-    def simulate(
-        self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
-    ) -> FloatArray:
-        """Return the signal as it is: from rest nothing is expected to be added."""
-        return np.array(values, dtype=float)

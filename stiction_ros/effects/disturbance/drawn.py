@@ -1,0 +1,40 @@
+"""What the disturbances share that are drawn by chance."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, FloatArray, Memory
+
+
+@dataclasses.dataclass(frozen=True)
+class DrawnDisturbance(Behaviour):
+    """What they share: a wave w of which nothing is expected from rest.
+
+    The memory is (w, time of the last sample).
+    """
+
+    places: ClassVar[tuple[str, ...]] = ("load", "disturbance")
+
+    def rest(self, value: float) -> Memory:
+        return (0.0, NO_SAMPLE)
+
+    def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
+        """Return the memory and the signal with what is expected of w added."""
+        return self.step_with(memory, value, time, 0.0)
+
+    @abstractmethod
+    def step_with(
+        self, memory: Memory, value: float, time: float, normal: float
+    ) -> tuple[Memory, float]:
+        """Advance one sample with ``normal`` drawn from N(0, 1)."""
+
+    def simulate(
+        self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
+    ) -> FloatArray:
+        """Return the signal as it is: from rest nothing is expected to be added."""
+        return np.array(values, dtype=float)
