@@ -94,12 +94,13 @@ class DaskEngine:
         while given:
             future = coming.get()
             task, _ = given.pop(future.key)
-            if future.status == "finished":
+            failure = future.exception()  # waits where an answer was lost: it is made once more
+            if failure is None and not future.cancelled():
                 answer = future.result()
                 assert isinstance(answer, Assessed)
                 yield Done(task, answer)
             else:
-                reason = future.exception() if future.status == "error" else future.status
+                reason = failure or future.status
                 yield lost(task, f"the cluster gave it up: {reason}", again=True)
             future.release()
             hand_in()

@@ -18,7 +18,7 @@ from stiction_ros.survey.engines.engine import Task
 from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.survey import Plan, survey
 
-pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed")
 
 OPTIONS = SurveyOptions(pages=False)
 
@@ -99,6 +99,23 @@ def test_a_lost_worker_loses_no_loop(cluster: Cluster, tmp_path: Path) -> None:
     once = survey(map(unreadable, range(5)), Plan(OPTIONS, tmp_path / "out"), _engine(cluster, 1))
     assert once.engine == cluster.address
     assert len(once.entries) == 5
+
+
+def test_an_answer_lost_before_it_is_fetched_is_made_once_more(cluster: Cluster) -> None:
+    first = cluster.work()
+    engine = _engine(cluster, 1)
+    with distributed.Client(
+        cluster.address.replace("dask://", "tcp://"), set_as_default=False
+    ) as watcher:
+        run = engine.run((Task(str(k), unreadable(k)) for k in range(3)), OPTIONS)
+        reasons = [next(run).assessed.entry.reason]
+        _until(lambda: sum(map(bool, watcher.who_has().values())) == 3)
+        os.kill(first.pid, signal.SIGKILL)
+        _until(lambda: not watcher.nthreads())
+        cluster.work()
+        reasons += [done.assessed.entry.reason for done in run]
+    engine.close()
+    assert reasons == ["has no column OP"] * 3
 
 
 def test_a_scheduler_without_workers_is_said(cluster: Cluster) -> None:
