@@ -128,11 +128,13 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
     )
 
 
-def own_closed(without: Baseline, base: Baseline, dated: bool) -> float:
+def own_closed(without: Baseline, base: Baseline, dated: bool, given: bool) -> float:
     """Return the share of the excess that is gone with an effect and not without it.
 
     Where an answer leaves the noise that the model declares, both free runs are whitened by that
-    noise: noise of the equation wanders farther than most effects move PV. Where it leaves more,
+    noise: noise of the equation wanders farther than most effects move PV. So they are where none
+    is declared and the process is as it was given; one that was fitted may leave a memory of its
+    own in what looks like noise. Where an answer leaves more than the declared noise,
     something else is missing: what is slow hides a quick effect in the free run, what is quick a
     slow one in one step. The larger share counts. What comes at one moment shows there alone in
     whitened rows, which may be fitted ones.
@@ -141,9 +143,10 @@ def own_closed(without: Baseline, base: Baseline, dated: bool) -> float:
         without: the model with all other effects.
         base: with the effect, too.
         dated: whether it comes at one moment.
+        given: whether the process is the one that was given, and none that was fitted.
     """
     weights = [
-        fit.ar if forms and not fit.enlarged else NO_MEMORY
+        fit.ar if (forms or given) and not fit.enlarged else NO_MEMORY
         for fit, forms in zip(base.noise, base.declared, strict=True)
     ]
     closed = closed_share(*(measure_gap(each, weights, dated) for each in (without, base)))
