@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from gap_loops import loop, record
 
+from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
 from stiction_ros.discrepancy.candidate.wave import LoadCandidate, disturbance_candidates
-from stiction_ros.discrepancy.candidate.waves import StepWave
+from stiction_ros.discrepancy.candidate.waves import A_FREQUENCY, StepWave
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import (
@@ -78,3 +79,40 @@ def test_every_place_has_its_shapes() -> None:
     names = {key for c in disturbance_candidates(run, gap, [gap[:, 0]]) for key in c.keys}
     shapes = ("step", "drift", "sine", "square", "triangle")
     assert {(place, shape) for place in ("load:V1", "disturbance:PV1") for shape in shapes} <= names
+
+
+def test_what_samples_tell_of_a_frequency_grows_with_their_cube() -> None:
+    """Laplace's approximation of a sine's evidence, which a frequency's share of BIC stands for."""
+    counts, information = np.array([1000, 4000]), []
+    for count in counts:
+        time, step = np.arange(count) - 0.5 * count, 1e-6
+        wave = [np.sin(2.0 * np.pi * (0.05 + shift) * time) for shift in (-step, step)]
+        slope = (wave[1] - wave[0]) / (2.0 * step)
+        information.append(float(slope @ slope))
+    grown = np.log(information[1] / information[0]) / np.log(counts[1] / counts[0])
+    assert grown == pytest.approx(A_FREQUENCY, abs=0.01)
+
+
+@pytest.mark.parametrize("effect", ["sine", "square", "triangle"])
+def test_a_wave_is_priced_by_its_frequency(effect: str) -> None:
+    run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
+    found = disturbance_candidates(run, run.runs.pv - run.forced, [run.runs.pv[:, 0]])
+    counts = {each.count(each.values(each.grid())[0]) for each in found if each.effect == effect}
+    assert counts == {5}
+
+
+@pytest.mark.parametrize("seed", [196, 237])
+def test_a_line_of_chance_is_no_wave(seed: int) -> None:
+    seen, _ = blind_loop(seed, "single")
+    answer = find_discrepancy(seen.model, [seen.record], QUICK)
+    assert not answer.effects
+    assert not answer.alternatives
+
+
+@pytest.mark.parametrize(("seed", "effect"), [(41, "delay"), (287, "characteristic")])
+def test_an_effect_less_than_the_noise_of_the_equation_wanders_is_named(
+    seed: int, effect: str
+) -> None:
+    seen, _ = blind_loop(seed, "single")
+    answer = find_discrepancy(seen.model, [seen.record], QUICK)
+    assert [each.effect for each in answer.effects] == [effect]

@@ -66,6 +66,9 @@ class WaveCandidate(Candidate):
             index=index,
         )
 
+    def count(self, point: FloatArray) -> int:
+        return self.wave.figures
+
     def grid(self) -> FloatArray:
         return self.wave.grid()
 

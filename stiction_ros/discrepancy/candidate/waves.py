@@ -26,6 +26,10 @@ SHAPED = FASTEST / 3.0  # of a square or a triangle: its third harmonic has to b
 SLOWEST = 2.0  # cycles in the longest record
 BESIDE = (-0.5, -0.25, 0.0, 0.25, 0.5)  # of the width of a spectral line
 PHASES = 8
+A_FREQUENCY = 3
+"""Figures that a frequency counts as: what n samples tell of it grows with n³, of others with n
+(P. M. Djurić, A model selection rule for sinusoids in white Gaussian noise, IEEE Transactions on
+Signal Processing 44, 1996)."""
 _TURN = 2.0 * math.pi
 
 
@@ -44,6 +48,11 @@ class Wave(ABC):
     axes: tuple[Axis, ...] = ()
     factors: int = 1
     dated: bool = False
+
+    @property
+    def figures(self) -> int:
+        """How many figures it counts as, for BIC."""
+        return len(self.axes) + self.factors
 
     @abstractmethod
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
@@ -123,6 +132,10 @@ class LineWave(Wave):
     sample_time: float
     length: int
     lines: FloatArray
+
+    @property
+    def figures(self) -> int:
+        return super().figures + A_FREQUENCY - 1
 
     @property
     def width(self) -> float:
