@@ -1,7 +1,7 @@
 """What a loop is measured by: now, and under each thing that could be done about it.
 
 - *Amplitude*: √2 × RMS of the spectral line of PV − SP at the period at which the loop cycles
-  now, see :mod:`stiction_ros.identification.closed_loop.oscillation`.
+  now, over pieces of four cycles, see :mod:`stiction_ros.identification.closed_loop.oscillation`.
 - *IAE per hour*: ∫|PV − SP| dt per hour with time in hours, which is the mean |PV − SP|.
 - *Travel*, *moves* and *reversals* of the stem, an hour: :mod:`stiction_ros.records.valve_work`.
 """
@@ -21,6 +21,7 @@ from stiction_ros.identification.closed_loop.oscillation import (
     Oscillation,
     amplitude,
     dominant_cycle,
+    pieces,
 )
 from stiction_ros.records.valve_work import ValveWork
 
@@ -74,7 +75,9 @@ class Yardstick:
         """
         hours = len(error) * self.sample_time / 3600.0
         period = self._own(error) if repeats else self.period
-        line = None if period is None else amplitude(error, self.stretches, period)
+        line = None
+        if period is not None:
+            line = amplitude(error, pieces(self.stretches, period), period)
         work = ValveWork.of(stem).per_hour(hours)
         return Measures(line, float(np.abs(error).mean()), work.travel, work.moves, work.reversals)
 

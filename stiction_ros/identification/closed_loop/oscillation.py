@@ -6,7 +6,9 @@
 - *Amplitude*: √2 × RMS of the spectral line at T. Each stretch gives its last whole number of
   periods that fits after half a period for settling; sine, cosine and a constant are fitted to
   them, and the squared amplitudes are averaged with the number of samples as weight. A stretch
-  too short for one period says nothing.
+  too short for one period says nothing. A sticky valve keeps no exact time, and over many cycles
+  the line of a cycle that wanders is less than the cycle: stretches are cut into pieces of four
+  (:func:`pieces`), unless two runs are compared in which it is the same.
 - *Regularity*: mean of the intervals between zero crossings of the autocorrelation over three
   of their standard deviations. Noise averages out in the autocorrelation; a cycle that keeps its
   time leaves even intervals.
@@ -78,7 +80,7 @@ class Oscillation:
         share: of the variance that the line at this period explains.
         count: whole cycles.
         regularity: above 1 is regular.
-        amplitude: √2 × RMS of the line, units of the signal.
+        amplitude: √2 × RMS of the line over pieces of four cycles, units of the signal.
     """
 
     period: float
@@ -112,7 +114,7 @@ def oscillation(values: FloatArray, stretches: Stretches) -> Oscillation | None:
     cycle = dominant_cycle(level[:, None], stretches, periods)
     if cycle is None:
         return None
-    size = amplitude(level, stretches, cycle.period)
+    size = amplitude(level, pieces(stretches, cycle.period), cycle.period)
     return Oscillation(
         cycle.period, cycle.share, cycle.count, regular, 0.0 if size is None else size
     )
@@ -166,6 +168,22 @@ def amplitude(error: FloatArray, stretches: Stretches, period: float) -> float |
         squares += count * float(fitted[1] ** 2 + fitted[2] ** 2)
         weight += count
     return float(np.sqrt(squares / weight)) if weight else None
+
+
+def pieces(stretches: Stretches, period: float) -> list[tuple[int, int]]:
+    """Return stretches cut into pieces of four periods, each with the half before it.
+
+    What is left of a stretch at its start is a piece of its own.
+
+    Args:
+        stretches: to cut, samples.
+        period: samples.
+    """
+    found, whole = [], NEEDED_CYCLES * period
+    for first, last in stretches:
+        for end in np.arange(last, first, -whole):
+            found.append((max(first, round(end - whole - 0.5 * period)), round(end)))
+    return found
 
 
 def regularity(values: FloatArray) -> tuple[float, float]:

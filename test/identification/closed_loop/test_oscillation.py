@@ -7,9 +7,11 @@ from hypothesis import strategies as st
 
 from stiction_ros.identification.closed_loop.oscillation import (
     LEAST_LINE,
+    NEEDED_CYCLES,
     REGULAR,
     dominant_cycle,
     oscillation,
+    pieces,
     regularity,
     slow_mean,
 )
@@ -91,3 +93,20 @@ def test_too_few_cycles_are_none() -> None:
 @given(st.integers(1, 400), st.floats(-5.0, 5.0))
 def test_the_slow_mean_of_a_constant_is_the_constant(count: int, value: float) -> None:
     assert slow_mean(np.full(count, value), 40.0) == pytest.approx(np.full(count, value))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cycle_that_keeps_no_exact_time_is_no_smaller(seed: int) -> None:
+    turns = 1.0 + 0.1 * np.random.default_rng(seed).standard_normal(40)  # each cycle by a tenth
+    ends = np.concatenate([[0.0], np.cumsum(turns * 50.0)])
+    values = np.sin(2.0 * np.pi * np.interp(np.arange(1900), ends, np.arange(41.0)))
+    found = oscillation(values, [(0, 1900)])
+    assert found is not None
+    assert found.amplitude == pytest.approx(1.0, rel=0.2)
+
+
+@given(first=st.integers(0, 500), count=st.integers(1, 2000), period=st.floats(2.0, 300.0))
+def test_pieces_hold_every_sample_and_no_other(first: int, count: int, period: float) -> None:
+    found = pieces([(first, first + count)], period)
+    assert {k for a, b in found for k in range(a, b)} == set(range(first, first + count))
+    assert all(b - a <= (NEEDED_CYCLES + 0.5) * period + 1.0 for a, b in found)
