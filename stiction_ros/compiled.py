@@ -2,7 +2,8 @@
 
 The machine code is kept beside the sources, or in the user's cache directory, so only the
 first run on a machine pays for it. It is made anew when the file of a function changes, or a file
-from which that takes other compiled functions or constants.
+from which that takes other compiled functions or constants. Where anything has to be made, that is
+logged once as information.
 Importing this module costs half a second: only what loops over whole records does so.
 """
 
@@ -11,6 +12,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import inspect
+import logging
 import re
 import shutil
 import threading
@@ -19,6 +21,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -26,6 +29,24 @@ IMPORTS = re.compile(rb"^(?:from|import) ([\w.]+)", re.MULTILINE)
 HERE = __name__.encode()
 ONE_AT_A_TIME = threading.RLock()  # numba's settings are those of the process, threads import
 DIGITS = 12  # of what stands for a content
+COMPILING = "compiling, once on this machine: about half a minute"
+
+
+class _Teller(event.Listener):
+    """Logs the first function that was not found in the cache."""
+
+    told = False
+
+    def on_start(self, event: event.Event) -> None:
+        if not self.told:
+            self.told = True
+            logging.getLogger(__name__).info(COMPILING)
+
+    def on_end(self, event: event.Event) -> None:
+        """Do nothing: the next one begins, or all are made."""
+
+
+event.register("numba:compile", _Teller())  # type: ignore[no-untyped-call]
 
 
 def compiled(function: Function) -> Function:

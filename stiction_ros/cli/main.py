@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import logging
 import os
 import sys
 from collections.abc import Iterable, Sequence
@@ -72,6 +73,14 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
 }
 """Module of each command below this package, loaded when it is called, and what ``--help`` says."""
+
+
+class _OnError(logging.Handler):
+    """Shows what the package logs as the commands show what is not their answer."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one line on standard error."""
+        print(f"stiction: {self.format(record)}", file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -147,12 +156,20 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     return top
 
 
+def _show_log() -> None:
+    log = logging.getLogger("stiction_ros")
+    if not any(isinstance(handler, _OnError) for handler in log.handlers):
+        log.addHandler(_OnError())
+        log.setLevel(logging.INFO)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
         0 done, 1 failed, 2 unusable input, 130 interrupted.
     """
+    _show_log()
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = next((word for word in given if not word.startswith("-")), "")
     if not given:

@@ -65,8 +65,8 @@ class Runs(NamedTuple):
     Attributes:
         friction: (f_S, f_D), shape (R, m, 2).
         tuning: (K, K_i, K_d), shape (R, m, 3).
-        pv: before the first sample, oldest first, shape (R, p, H).
-        stem: before the first sample, oldest first, shape (R, m, H).
+        pv: before the first sample, oldest first, shape (R, H, p).
+        stem: before the first sample, oldest first, shape (R, H, m).
         op: the last one before the first sample, shape (R, m).
     """
 
@@ -97,7 +97,7 @@ def run_loops(
     runs: Runs,
     sp: FloatArray,
     load: FloatArray,
-    pv_too: bool = True,
+    pv_too: bool,
 ) -> tuple[FloatArray, FloatArray]:
     """Return OP, shape (R, n, m), and PV, shape (R, n, p), where it is asked for.
 
@@ -112,8 +112,8 @@ def run_loops(
         load: added to PV behind the process, shape (R, H + n, p).
         pv_too: whether PV is asked for; else its shape is (R, 0, p).
     """
-    number, outputs, past = runs.pv.shape
-    valves, whole = runs.stem.shape[1], sp.shape[1]
+    number, past, outputs = runs.pv.shape
+    valves, whole = runs.stem.shape[2], sp.shape[1]
     na, nb = process.a.shape[1], process.b.shape[2]
     op_rows = np.full((number, whole - past, valves), np.inf)
     pv_rows = np.full((number, whole - past if pv_too else 0, outputs), np.inf)
@@ -124,8 +124,8 @@ def run_loops(
     value, bound = np.empty(LANES), np.empty(LANES)
     op, gone = np.empty((whole, valves, LANES)), np.empty(LANES, dtype=np.int64)
     for first in range(0, number, LANES):
-        _in_lanes(runs.pv.transpose(0, 2, 1), first, y)
-        _in_lanes(runs.stem.transpose(0, 2, 1), first, stem)
+        _in_lanes(runs.pv, first, y)
+        _in_lanes(runs.stem, first, stem)
         _in_lanes(runs.friction, first, friction)
         _in_lanes(runs.tuning, first, tuning)
         _in_lanes(sp, first, wanted)

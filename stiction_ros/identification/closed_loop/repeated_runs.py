@@ -257,12 +257,13 @@ class Repeated:
         runs = Runs(
             np.ascontiguousarray(frictions),
             np.repeat(np.array([law.coefficients for _, law in self.pairs])[None], number, axis=0),
-            np.repeat(self.simulated[rows].T[None], number, axis=0),
-            np.repeat(self.loop.stem[rows].T[None], number, axis=0),
+            np.repeat(self.simulated[rows][None], number, axis=0),
+            np.repeat(self.loop.stem[rows][None], number, axis=0),
             np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
         )
         repeated = np.repeat(sp[None], number, axis=0)
-        return run_loops(self.process, self.controllers, runs, repeated, np.ascontiguousarray(load))
+        outside = np.ascontiguousarray(load)
+        return run_loops(self.process, self.controllers, runs, repeated, outside, True)
 
     def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
         """Return OP of one valve, shape (R, n), without a load and with resting set-points."""
@@ -303,20 +304,20 @@ class Repeated:
             near = slice(max(first, row - half), min(last, row + half + 1))
             pv = self.simulated[rows] + self.load[near].mean(axis=0)
             sp = self._set_points(slice(row, row + 1))[0]
-            starts.append(_Start(pv.T, self.loop.stem[rows].T, self.loop.op[row - 1], sp))
+            starts.append(_Start(pv, self.loop.stem[rows], self.loop.op[row - 1], sp))
         output = self.pairs[valve][0]
         rest = self._set_points(slice(first, last)).mean(axis=0)
         for kick in KICKS:
-            pv = np.repeat(rest[:, None], past, axis=1)
-            pv[output] += kick
-            stem = np.zeros((self.loop.op.shape[1], past))
-            starts.append(_Start(pv, stem, stem[:, 0].copy(), rest))
+            pv = np.repeat(rest[None], past, axis=0)
+            pv[:, output] += kick
+            stem = np.zeros((past, self.loop.op.shape[1]))
+            starts.append(_Start(pv, stem, stem[0].copy(), rest))
         return starts
 
 
 @dataclasses.dataclass(frozen=True)
 class _Start:
-    """PV, shape (p, H), stems, shape (m, H), and OP, shape (m,), before a run; SP during it."""
+    """PV, shape (H, p), stems, shape (H, m), and OP, shape (m,), before a run; SP during it."""
 
     pv: FloatArray
     stem: FloatArray

@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.kernels.copies import put, put_block
 
 EIGHT = 8  # stems that are turned at once: a line of the cache
 
@@ -50,7 +51,7 @@ def with_past(signal: FloatArray, taps: int) -> FloatArray:
     """Return a signal behind M samples of its first value, shape (M + N,)."""
     out = np.empty(taps + len(signal))
     out[:taps] = signal[0]
-    out[taps:] = signal
+    put(out[taps:], signal)
     return out
 
 
@@ -170,7 +171,7 @@ def lagged_products(
         for i in range(edges[g], edges[g + 1]):
             row, above = above, row
             if i == 0:
-                row[:] = begun[1]
+                put(row, begun[1])
             else:
                 row[0] = begun[0][i]
                 enters, leaves = left[taps - i], left[end - i]
@@ -251,7 +252,7 @@ def beside_lags(
         seen = step_products(noise, signals[row], rows, taps)
         for i in range(valves):
             at = i * size
-            out[row, at : at + size] = grouped(lag_products(moves[i], seen, taps), edges)
+            put(out[row, at : at + size], grouped(lag_products(moves[i], seen, taps), edges))
     return out
 
 
@@ -275,16 +276,17 @@ def products_of(
     beside = beside_lags(noise, stems, signals, edges)
     for i in range(valves):
         moves, at = moves_of(stems[i]), i * size
-        past[i] = with_past(whitened(noise, stems[i], stems[i, 0]), taps)[-(taps + count + 1) :]
-        first[i] = step_products(noise, past[i, -1 - count : -1], rows, taps)
+        white = with_past(whitened(noise, stems[i], stems[i, 0]), taps)
+        put(past[i], white[-(taps + count + 1) :])
+        put(first[i], step_products(noise, past[i, -1 - count : -1], rows, taps))
         for j in range(i):
             along, theirs = j * size, moves_of(stems[j])
             begun = (lag_products(moves, first[j], taps), lag_products(theirs, first[i], taps))
             found = lagged_products(past[i], past[j], begun, edges)
-            shared[at : at + size, along : along + size] = found
-            shared[along : along + size, at : at + size] = found.T
+            put_block(shared[at : at + size, along : along + size], found)
+            put_block(shared[along : along + size, at : at + size], found.T)
         own = own_products(past[i], lag_products(moves, first[i], taps), edges)
-        shared[at : at + size, at : at + size] = own
+        put_block(shared[at : at + size, at : at + size], own)
     return Products(past, first, beside, shared)
 
 

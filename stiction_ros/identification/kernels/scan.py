@@ -12,6 +12,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.kernels.copies import put, put_block
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
 from stiction_ros.identification.kernels.filter import Window, filtered_products, tails_of
 from stiction_ros.identification.kernels.row import averaged, driven_rows
@@ -37,7 +38,7 @@ def orthonormal(columns: FloatArray, tolerance: float) -> FloatArray:
             now -= np.dot(np.dot(out[:kept], now), out[:kept])
         size = np.sqrt(np.dot(now, now))
         if size > tolerance:
-            out[kept] = now / size
+            put(out[kept], now / size)
             kept += 1
     return out[:kept].copy()
 
@@ -79,7 +80,7 @@ def remaining_tails(
             rows[i, k] = filtered[signal, first - lag + k]
     basis = orthonormal(rows, tolerance)
     products = np.empty((len(basis) + 1, count - first))
-    products[: len(basis)] = basis
+    put_block(products[: len(basis)], basis)
     target, rest = filtered[0, first:], products[len(basis)]
     explained = np.dot(np.dot(basis, target), basis)
     for k in range(len(rest)):

@@ -28,8 +28,8 @@ def runs(friction: tuple[float, float], gain: float, reset: float) -> Runs:
     return Runs(
         np.array([[friction]]),
         np.array([[[gain, reset, 0.0]]]),
-        np.full((1, 1, PAST), 20.0),
-        np.full((1, 1, PAST), -0.9 * friction[0]),
+        np.full((1, PAST, 1), 20.0),
+        np.full((1, PAST, 1), -0.9 * friction[0]),
         np.zeros((1, 1)),
     )
 
@@ -41,7 +41,7 @@ def test_the_kernel_does_what_a_plain_loop_does(friction: tuple[float, float], l
     plain = known(Kind(friction, noise=0.0, lag=lag), samples=300, load=load).record
     sp = np.full((1, PAST + 300, 1), 20.0)
     outside = np.concatenate([np.zeros(PAST), load])[None, :, None]
-    op, pv = run_loops(PROCESS, controllers(lag), runs(friction, 1.0, 1.0 / 8.0), sp, outside)
+    op, pv = run_loops(PROCESS, controllers(lag), runs(friction, 1.0, 1.0 / 8.0), sp, outside, True)
     assert op[0, :, 0] + 50.0 == pytest.approx(plain.op[:, 0], abs=1e-9)
     assert pv[0, :, 0] == pytest.approx(plain.pv[:, 0], abs=1e-9)
 
@@ -49,7 +49,9 @@ def test_the_kernel_does_what_a_plain_loop_does(friction: tuple[float, float], l
 def test_a_run_that_grows_without_end_is_infinite() -> None:
     sp = np.full((1, PAST + 4000, 1), 20.0)
     sp[:, PAST + 5 :] = 21.0
-    op, pv = run_loops(PROCESS, controllers(), runs((0.0, 0.0), 9.0, 3.0), sp, np.zeros_like(sp))
+    op, pv = run_loops(
+        PROCESS, controllers(), runs((0.0, 0.0), 9.0, 3.0), sp, np.zeros_like(sp), True
+    )
     assert np.isinf(op[0, -1, 0])
     assert np.isinf(pv[0, -1, 0])
 
@@ -58,7 +60,7 @@ def test_op_stays_within_its_limits() -> None:
     limited = controllers()._replace(low=np.array([-2.0]), high=np.array([1.0]))
     sp = np.full((1, PAST + 300, 1), 20.0)
     sp[:, PAST + 5 :] = 23.0
-    op, _ = run_loops(PROCESS, limited, runs((1.0, 0.5), 1.0, 0.1), sp, np.zeros_like(sp))
+    op, _ = run_loops(PROCESS, limited, runs((1.0, 0.5), 1.0, 0.1), sp, np.zeros_like(sp), True)
     assert op.max() == 1.0
     assert op.min() >= -2.0
 
@@ -66,7 +68,7 @@ def test_op_stays_within_its_limits() -> None:
 def test_a_valve_without_a_controller_keeps_its_op() -> None:
     alone = controllers()._replace(output=np.array([-1]))
     sp = np.full((1, PAST + 50, 1), 25.0)
-    op, pv = run_loops(PROCESS, alone, runs((0.0, 0.0), 1.0, 0.1), sp, np.zeros_like(sp))
+    op, pv = run_loops(PROCESS, alone, runs((0.0, 0.0), 1.0, 0.1), sp, np.zeros_like(sp), True)
     assert not op.any()
     assert pv == pytest.approx(20.0)
 
@@ -79,7 +81,7 @@ def test_poles_ring_as_the_simulated_loop_does(gain: float, lag: int) -> None:
     sp = np.full((1, PAST + 600, 1), 20.0)
     sp[:, PAST + 5 :] = 21.0
     _, pv = run_loops(
-        PROCESS, controllers(lag), runs((0.0, 0.0), gain, gain / 10.0), sp, np.zeros_like(sp)
+        PROCESS, controllers(lag), runs((0.0, 0.0), gain, gain / 10.0), sp, np.zeros_like(sp), True
     )
     apart = pv[0, 40:, 0] - 21.0
     peaks = np.flatnonzero((apart[1:-1] > apart[:-2]) & (apart[1:-1] > apart[2:]))[:5] + 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.kernels.copies import add_block, put, put_block
 from stiction_ros.identification.kernels.lags import (
     Moves,
     grouped,
@@ -99,11 +100,12 @@ def evidences_of(
         for w in range(lines):
             factor[1 + w, 1 + w] += known.waves[k, w]
         for begin in range(1 + lines, len(factor), size):
-            factor[begin : begin + size, begin : begin + size] += known.precisions[k]
+            add_block(factor[begin : begin + size, begin : begin + size], known.precisions[k])
         if known.at >= 0:
             end = known.at + size
-            factor[known.at : end, known.at : end] += known.held[k]
-            right[known.at : end] += known.pulls[k]
+            add_block(factor[known.at : end, known.at : end], known.held[k])
+            for i in range(size):
+                right[known.at + i] += known.pulls[k, i]
         determinant = factorised(factor)
         explained = 0.0
         for i in range(len(right)):
@@ -151,7 +153,7 @@ def beside_lines(past: FloatArray, lines: Lines, edges: IntArray) -> FloatArray:
     for i in range(taps):
         lags[i] = level
         level += by * (past[taps - 1 - i] - past[taps - 1 - i + count])
-    out[:, 0] = grouped(lags, edges)
+    put(out[:, 0], grouped(lags, edges))
     for h in range(1, lasting + 1):
         sine, cosine = begun[h], begun[lasting + h]
         enters = lines.before[h], lines.before[lasting + h]
@@ -163,7 +165,8 @@ def beside_lines(past: FloatArray, lines: Lines, edges: IntArray) -> FloatArray:
             sine += enters[0] * new - leaves[0] * old
             cosine += enters[1] * new - leaves[1] * old
             sine, cosine = along * sine + across * cosine, along * cosine - across * sine
-        out[:, h], out[:, lasting + h] = grouped(lags, edges), grouped(others, edges)
+        put(out[:, h], grouped(lags, edges))
+        put(out[:, lasting + h], grouped(others, edges))
     return out
 
 
@@ -221,7 +224,7 @@ def evidence(
     first = step_products(given.noise, signal[-1 - count : -1], len(stem), taps)
     gram = own_products(signal, lag_products(moves, first, taps), edges)
     shared = np.empty((size, len(given.root)))
-    shared[:, :known] = beside_lines(signal, given.lines, edges)
+    put_block(shared[:, :known], beside_lines(signal, given.lines, edges))
     for other in range(len(given.others)):
         at, theirs = known + other * size, moves_of(given.others[other])
         begun = (
@@ -229,7 +232,7 @@ def evidence(
             lag_products(theirs, first, taps),
         )
         beside = given.beside[other]
-        shared[:, at : at + size] = lagged_products(signal, beside, begun, edges)
+        put_block(shared[:, at : at + size], lagged_products(signal, beside, begun, edges))
     shared = np.dot(shared, given.root.T)
     gram -= np.dot(shared, shared.T)
     gram += precision
