@@ -32,7 +32,7 @@ from stiction_ros.discrepancy.fit.uncertainty import (
     likelihood_intervals,
     otherwise,
 )
-from stiction_ros.discrepancy.gap.measure import closed_share, measure_gap
+from stiction_ros.discrepancy.gap.measure import closed_share, free_run_gap
 from stiction_ros.discrepancy.gap.noise_check import (
     OutputNoise,
     check_noise,
@@ -68,7 +68,7 @@ def closing(task: Task, looked: State) -> Discrepancy:
         assert state.doubted is not None
         looked = settle(task, state.doubted)
         state, found = _named(task, looked)
-    before, after = measure_gap(state.before), measure_gap(state.base)
+    before, after = free_run_gap(state.before), free_run_gap(state.base)
     louder = [] if _explained_by_no_name(task, looked, state) else _louder(task, state)
     shown, answers = [of_data(finding) for finding in task.data], [*found, *louder]
     effects = [*shown, *answers]
