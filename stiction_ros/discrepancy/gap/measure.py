@@ -40,8 +40,8 @@ class OutputGap:
         }
 
 
-def free_run_gap(base: Baseline) -> tuple[OutputGap, ...]:
-    """Return the gap as a reader sees it: level and start are those that suit the free run best.
+def levelled(base: Baseline) -> Baseline:
+    """Return the model with the level and the start that suit the free run best.
 
     The likelihood of noise with a long memory hardly sees them, and a free run with its figures may
     stand anywhere.
@@ -49,17 +49,18 @@ def free_run_gap(base: Baseline) -> tuple[OutputGap, ...]:
     Args:
         base: the model.
     """
-    seen = []
+    noises = []
     for noise, columns, blocks in zip(base.noise, base.columns, base.blocks, strict=True):
         rows = blocks.train
         shift = np.linalg.lstsq(columns[rows], noise.residual[rows], rcond=None)[0]
-        seen.append(dataclasses.replace(noise, residual=noise.residual - columns @ shift))
-    innovations = measure_gap(base)
-    runs = measure_gap(dataclasses.replace(base, noise=tuple(seen)))
-    return tuple(
-        dataclasses.replace(run, one_step_rmse=own.one_step_rmse)
-        for run, own in zip(runs, innovations, strict=True)
-    )
+        noises.append(dataclasses.replace(noise, residual=noise.residual - columns @ shift))
+    return dataclasses.replace(base, noise=tuple(noises))
+
+
+def free_run_gap(base: Baseline) -> tuple[OutputGap, ...]:
+    """Return the gap of every output as a reader sees it: its free run is :func:`levelled`."""
+    pairs = zip(measure_gap(levelled(base)), measure_gap(base), strict=True)
+    return tuple(dataclasses.replace(run, one_step_rmse=own.one_step_rmse) for run, own in pairs)
 
 
 def measure_gap(
