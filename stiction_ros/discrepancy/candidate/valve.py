@@ -34,6 +34,7 @@ SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best
 LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
 STATIONS = 101  # of the travel of a valve, at which its curve has to rise
 LEAST_TRAVEL = 0.05  # of the span of OP
+AT_REST = 1.0 - 1e-9  # of f_S, how far off OP a stem may stand: it comes to rest at the edge
 LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two samples
 _NEGLIGIBLE = 1e-9
 
@@ -139,7 +140,7 @@ class StictionCandidate(ValveCandidate):
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
     def lead(self, point: FloatArray) -> float:
-        return 0.98 * float(point[0] * point[2])
+        return AT_REST * float(point[0] * point[2])
 
     def count(self, point: FloatArray) -> int:
         return 2
@@ -187,7 +188,7 @@ class BacklashCandidate(ValveCandidate):
         return points[:, :1]
 
     def lead(self, point: FloatArray) -> float:
-        return 0.49 * float(point[0] * point[1])
+        return 0.5 * AT_REST * float(point[0] * point[1])
 
     def count(self, point: FloatArray) -> int:
         return 1

@@ -1,0 +1,45 @@
+"""Where a stem stands before the first sample."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gap_loops import loop, record
+
+from stiction_ros.blind.scores.world_scores import claims_of
+from stiction_ros.discrepancy import GapOptions, find_discrepancy
+from stiction_ros.discrepancy.candidate.valve import ValveCandidate
+from stiction_ros.discrepancy.data.gate import open_gate
+from stiction_ros.discrepancy.decision.scores import all_candidates
+from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.field.hidden import hidden_loop
+from stiction_ros.loop import LoopModel
+
+
+@pytest.mark.parametrize(
+    ("law", "point", "off"),
+    [(None, (3.0, -1.0), -1.5), (None, (3.0, 1.0), 1.5), ("he", (2.0, 0.5, 1.0), 2.0)],
+)
+def test_a_stem_may_stand_at_the_edge_of_its_band(
+    law: str | None, point: tuple[float, ...], off: float
+) -> None:
+    run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
+    effect = "backlash" if law is None else "stiction"
+    (candidate,) = (
+        each
+        for each in all_candidates(Baseline.of(run))
+        if isinstance(each, ValveCandidate) and (each.effect, each.law) == (effect, law)
+    )
+    first = float(run.runs.op[0, 0])
+    points = np.array([point])
+    assert candidate.starts(points, first)[0] == pytest.approx(first + off)
+    assert candidate.stems(run, points)[0, 0] == pytest.approx(first + off, abs=1e-6)
+
+
+def test_backlash_that_rests_at_its_edge_is_no_stiction() -> None:
+    hidden = hidden_loop(750073, "single", "exact")
+    given = LoopModel.from_mapping(hidden.given)
+    answer = find_discrepancy(given, [hidden.record], GapOptions(quick=True)).to_json()
+    friction = [claim for claim in claims_of(answer) if ("valve:V1", "backlash") in claim.names]
+    assert friction
