@@ -13,12 +13,7 @@ from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.measure import (
-    closed_share,
-    gap_in_one_step,
-    levelled,
-    measure_gap,
-)
+from stiction_ros.discrepancy.gap.measure import closed_share, gap_in_one_step, measure_gap
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.effects import Behaviour, FloatArray
@@ -154,8 +149,7 @@ def own_closed(without: Baseline, base: Baseline, dated: bool, given: bool) -> f
         fit.ar if (forms or given) and not fit.enlarged else NO_MEMORY
         for fit, forms in zip(base.noise, base.declared, strict=True)
     ]
-    runs = (levelled(each) for each in (without, base))
-    closed = closed_share(*(measure_gap(each, weights, dated) for each in runs))
+    closed = closed_share(*(measure_gap(each, weights, dated) for each in (without, base)))
     floors = [
         noise.std if noise is not None and fit.enlarged else math.nan
         for fit, noise in zip(base.noise, declared_noise(base.run.model), strict=True)
