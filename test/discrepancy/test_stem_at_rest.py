@@ -37,6 +37,7 @@ def test_a_stem_may_stand_at_the_edge_of_its_band(
     assert candidate.stems(run, points)[0, 0] == pytest.approx(first + off, abs=1e-6)
 
 
+@pytest.mark.trial
 def test_backlash_that_rests_at_its_edge_is_no_stiction() -> None:
     hidden = hidden_loop(750073, "single", "exact")
     given = LoopModel.from_mapping(hidden.given)

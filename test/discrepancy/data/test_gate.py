@@ -154,7 +154,9 @@ def test_op_of_an_operator_is_left_unexplained() -> None:
     assert check.status is ControllerStatus.UNEXPLAINED
 
 
-@pytest.mark.parametrize("kind", ["still", "two levels", "frozen", "at its ends"])
+@pytest.mark.parametrize(
+    "kind", ["still", pytest.param("two levels", marks=pytest.mark.trial), "frozen", "at its ends"]
+)
 def test_a_pv_that_shows_next_to_nothing_is_answered(kind: str) -> None:
     seen, _ = blind_loop(1)
     short = seen.record.part(0, 600)
