@@ -19,9 +19,9 @@ from stiction_ros.loop import LoopModel
 
 @pytest.mark.parametrize(
     ("law", "point", "off"),
-    [(None, (3.0, -1.0), -1.5), (None, (3.0, 1.0), 1.5), ("he", (2.0, 0.5, 1.0), 2.0)],
+    [(None, (3.0, -1.0), -1.5), (None, (3.0, 1.0), 1.5), ("he", (2.0, 0.5, 1.0), 1.96)],
 )
-def test_a_stem_may_stand_at_the_edge_of_its_band(
+def test_a_stem_may_stand_at_the_edge_of_a_deadband_and_short_of_a_slip(
     law: str | None, point: tuple[float, ...], off: float
 ) -> None:
     run = FreeRun(loop(), open_gate(loop(), [record(loop(), samples=300)])[0])
@@ -39,8 +39,7 @@ def test_a_stem_may_stand_at_the_edge_of_its_band(
 
 @pytest.mark.trial
 def test_backlash_that_rests_at_its_edge_is_no_stiction() -> None:
-    hidden = hidden_loop(750073, "single", "exact")
+    hidden = hidden_loop(698023, "two", "exact")
     given = LoopModel.from_mapping(hidden.given)
     answer = find_discrepancy(given, [hidden.record], GapOptions(quick=True)).to_json()
-    friction = [claim for claim in claims_of(answer) if ("valve:V1", "backlash") in claim.names]
-    assert friction
+    assert any(("valve:V1", "backlash") in claim.names for claim in claims_of(answer))

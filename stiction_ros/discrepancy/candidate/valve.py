@@ -34,7 +34,8 @@ SUM_BOX, JUMP_BOX = 0.15, 0.4  # half the width of the largest box around a best
 LEAST_BEND = 0.01  # of what a valve travels: straighter is a gain
 STATIONS = 101  # of the travel of a valve, at which its curve has to rise
 LEAST_TRAVEL = 0.05  # of the span of OP
-AT_REST = 1.0 - 1e-9  # of f_S, how far off OP a stem may stand: it comes to rest at the edge
+AT_REST = 1.0 - 1e-9  # of half a deadband, how far off OP a stem may stand: it rests at the edge
+SHORT_OF_A_SLIP = 0.98  # of f_S; where there is a jump it rests at f_D, well inside
 LEAST_JUMP = 0.05  # of the band: less may be what the stem moves between two samples
 _NEGLIGIBLE = 1e-9
 
@@ -140,7 +141,7 @@ class StictionCandidate(ValveCandidate):
         return np.column_stack([points[:, 0], points[:, 0] * points[:, 1]])
 
     def lead(self, point: FloatArray) -> float:
-        return AT_REST * float(point[0] * point[2])
+        return SHORT_OF_A_SLIP * float(point[0] * point[2])
 
     def count(self, point: FloatArray) -> int:
         return 2
