@@ -128,7 +128,7 @@ def of_noise(laws: Sequence[NoiseEffect], declared: float, margin: float) -> Fou
     )
 
 
-def own_closed(without: Baseline, base: Baseline, dated: bool, given: bool) -> float:
+def own_closed(without: Baseline, base: Baseline, *, dated: bool, given: bool) -> float:
     """Return the share of the excess that is gone with an effect and not without it.
 
     Where an answer leaves the noise that the model declares, both free runs are whitened by that

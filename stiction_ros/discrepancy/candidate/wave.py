@@ -67,7 +67,7 @@ class WaveCandidate(Candidate):
         )
 
     def count(self, point: FloatArray) -> int:
-        return self.wave.figures
+        return super().count(point) + self.wave.further
 
     def grid(self) -> FloatArray:
         return self.wave.grid()

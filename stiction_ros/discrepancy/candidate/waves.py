@@ -42,17 +42,14 @@ class Wave(ABC):
         axes: of the figures that are searched.
         factors: number of figures that least squares finds.
         dated: whether its first axis is a moment of the record.
+        further: figures that it counts as for BIC, beyond those that it has.
     """
 
     effect: str
     axes: tuple[Axis, ...] = ()
     factors: int = 1
     dated: bool = False
-
-    @property
-    def figures(self) -> int:
-        """How many figures it counts as, for BIC."""
-        return len(self.axes) + self.factors
+    further: int = 0
 
     @abstractmethod
     def columns(self, run: FreeRun, points: FloatArray) -> FloatArray:
@@ -129,13 +126,10 @@ class LineWave(Wave):
         lines: of the gap, cycles per sample.
     """
 
+    further: int = A_FREQUENCY - 1
     sample_time: float
     length: int
     lines: FloatArray
-
-    @property
-    def figures(self) -> int:
-        return super().figures + A_FREQUENCY - 1
 
     @property
     def width(self) -> float:

@@ -207,7 +207,12 @@ def _effect(
         units_of(effect.behaviour, effect.place),
         _intervals(task, state, k, effect, without, beside),
         state.gains.get((effect.place, effect.effect), effect.fit.delta_bic),
-        own_closed(without, state.base, effect.fit.candidate.dated, not task.options.free_process),
+        own_closed(
+            without,
+            state.base,
+            dated=effect.fit.candidate.dated,
+            given=not task.options.free_process,
+        ),
         GapVerdict.AMBIGUOUS if effect.alternatives else GapVerdict.NAMED,
         effect.alternatives,
         reason_for(effect, state.looks),
