@@ -13,7 +13,12 @@ from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.measure import closed_share, gap_in_one_step, measure_gap
+from stiction_ros.discrepancy.gap.measure import (
+    closed_share,
+    gap_in_one_step,
+    levelled,
+    measure_gap,
+)
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.effects import Behaviour, FloatArray
@@ -159,8 +164,8 @@ def own_closed(without: Baseline, base: Baseline, *, dated: bool, given: bool) -
 
 
 def moved_by(without: Baseline, base: Baseline) -> FloatArray:
-    """Return what an effect adds to the free run, start and level fitted anew, shape (N, p)."""
-    pairs = zip(without.noise, base.noise, strict=True)
+    """Return what an effect adds to the free run that is shown, shape (N, p)."""
+    pairs = zip(levelled(without).noise, levelled(base).noise, strict=True)
     return np.column_stack([old.residual - new.residual for old, new in pairs])
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict
 from stiction_ros.discrepancy.answer.preview import Preview
+from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.report.drawing import (
     BLUE,
     GREEN,
@@ -53,7 +54,7 @@ def effect_drawings(found: Discrepancy) -> list[Drawing]:
 
 def _effect(found: Discrepancy, effect: FoundEffect, k: int) -> Drawing:
     assert effect.moves is not None
-    base = found.base_after
+    base = levelled(found.base_after)
     scored = np.column_stack([blocks.scored for blocks in base.blocks])
     moves = np.where(scored, effect.moves, np.nan)
     i = int(np.argmax(np.nanstd(moves, axis=0)))

@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
 from stiction_ros.discrepancy.answer.preview import preview
+from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.effects import FloatArray
 from stiction_ros.report.drawing import (
     BLUE,
@@ -205,12 +206,10 @@ def _before_and_after(found: Discrepancy) -> Drawing:
     names = found.model_before.outputs
     figure, axes = panels(2 * len(names), 0.8 + 3.6 * len(names), sharex=True)
     at, axis_of_time = _time(found)
+    shown = levelled(found.base_before), levelled(found.base_after)
     for i, name in enumerate(names):
         scored = found.base_before.blocks[i].scored
-        old, new = (
-            np.where(scored, base.noise[i].residual, np.nan)
-            for base in (found.base_before, found.base_after)
-        )
+        old, new = (np.where(scored, base.noise[i].residual, np.nan) for base in shown)
         pv = found.base_after.run.runs.pv[:, i]
         top, low = axes[2 * i, 0], axes[2 * i + 1, 0]
         top.plot(at, pv, color=GREY, linewidth=0.8, label=f"{name} measured")
