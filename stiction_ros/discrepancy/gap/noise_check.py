@@ -11,6 +11,7 @@ import numpy as np
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
+from stiction_ros.durations import spoken
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
 LAGS = 20
@@ -25,6 +26,8 @@ class OutputNoise:
         name: tag.
         declared: standard deviation of the innovations as the model has it; NaN where the
             model declares none.
+        expected: of those that the declared noise and what the sensor does to the values, such as
+            rounding, make together; NaN where none is declared.
         found: of those that the answer leaves, under the declared form.
         disagrees: whether they are larger than declared, or depend on each other.
         memory: samples after which the strongest dependence comes; 0 where there is none.
@@ -32,6 +35,7 @@ class OutputNoise:
 
     name: str
     declared: float
+    expected: float
     found: float
     disagrees: bool
     memory: int
@@ -55,14 +59,14 @@ def check_noise(base: Baseline) -> tuple[OutputNoise, ...]:
     ):
         fit, quantum = base.noise[i], runs.quanta[i]
         if declared is None:
-            found.append(OutputNoise(name, math.nan, fit.innovation_std, False, 0))
+            found.append(OutputNoise(name, math.nan, math.nan, fit.innovation_std, False, 0))
             continue
         shown = max(seen[i], key=lambda form: form.std)
         expected = math.sqrt(shown.std**2 + (0.0 if len(shown.ar) else quantum**2 / 12.0))
-        larger = fit.innovation_std > LARGER * expected
         memory = _memory(base, i) if fit.enlarged else 0
+        disagrees = fit.enlarged or fit.innovation_std > LARGER * expected
         found.append(
-            OutputNoise(name, declared.std, fit.innovation_std, fit.enlarged or larger, memory)
+            OutputNoise(name, declared.std, expected, fit.innovation_std, disagrees, memory)
         )
     return tuple(found)
 
@@ -99,6 +103,6 @@ def noise_sentences(noises: tuple[OutputNoise, ...], sample_time: float) -> list
         size = f"{each.name}: innovations of {each.found:.3g} where the model declares "
         size += f"{each.declared:.3g}"
         if each.memory:
-            size += f", and they depend on each other over {each.memory * sample_time:.3g} s"
+            size += f", and they depend on each other over {spoken(each.memory * sample_time)}"
         said.append(size)
     return said

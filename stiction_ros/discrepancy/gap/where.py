@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import BoolArray, left_by, projector
+from stiction_ros.durations import spoken
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop.set_points import set_point_moves
 
@@ -61,7 +62,7 @@ def locate(base: Baseline) -> Where:
         lines.append(period)
         if share > STRONG:
             sentences.append(
-                f"{name}: {100 * share:.0f} % of the gap has a period of {period:.4g} s"
+                f"{name}: {100 * share:.0f} % of the gap has a period of {spoken(period)}"
             )
     if tracks and tracks[0].gain > 10.0:
         first = tracks[0]
@@ -89,8 +90,8 @@ def _at_moments(base: Baseline, output: int, name: str) -> list[str]:
                 found.append(f"{name}: innovations are {ratio:.1f} times larger {what}")
     moment, ratio = _change(noise.residual, scored)
     if ratio > STRONG:
-        at = base.run.runs.time[moment]
-        found.append(f"{name}: the gap's level changes at {at:.4g} s")
+        at = spoken(base.run.runs.time[moment])
+        found.append(f"{name}: the gap's level changes at {at}")
     return found
 
 

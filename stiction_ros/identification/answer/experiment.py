@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from stiction_ros.durations import spoken
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.identification.closed_loop.explanation import (
@@ -35,9 +36,6 @@ INTEGRATED = 20
 
 CLEAR = 4.0
 """Standard deviations of PV's noise that the answer to a step must make."""
-
-HOUR, DAY = 3600.0, 86400.0
-"""Seconds."""
 
 CENTRED = 1e-3
 """Share of OP's range below which its mean is what a computer leaves of 0."""
@@ -139,7 +137,7 @@ def _travel_test(record: Record, found: Identification, valve: int) -> str:
     again = f", {times} times over" if times > 1 else ""
     return (
         f"In manual, move OP of {name} by {band:.2g} % up from {_middle(op):.3g} %, back "
-        f"down and up again{again}, in steps of {band / parts:.2g} % held for {_duration(hold)} "
+        f"down and up again{again}, in steps of {band / parts:.2g} % held for {spoken(hold)} "
         f"each: without friction {shows} at every step, with friction only after OP has gone back "
         "by the band."
     )
@@ -153,8 +151,7 @@ def _more(estimate: ValveEstimate, short: float, seconds: float) -> str:
         return ""
     factor = 1.0 + short / gained
     return (
-        f"Or record {factor:.1f} times as long, {_duration(factor * seconds)}, with the loop as "
-        "it is."
+        f"Or record {factor:.1f} times as long, {spoken(factor * seconds)}, with the loop as it is."
     )
 
 
@@ -162,11 +159,3 @@ def _middle(op: FloatArray) -> float:
     """Return the mean of OP, shape (N,); of one that was centred what is left of it is none."""
     mean = float(op.mean())
     return mean if abs(mean) >= CENTRED * float(np.ptp(op)) else 0.0
-
-
-def _duration(seconds: float) -> str:
-    """Return a time as people say it."""
-    if seconds < HOUR:
-        return f"{seconds:.3g} s" if seconds < 1000.0 else f"{seconds:.0f} s"
-    size, unit = (HOUR, "h") if seconds < 2.0 * DAY else (DAY, "d")
-    return f"{seconds / size:.3g} {unit}"

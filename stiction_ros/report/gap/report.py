@@ -35,6 +35,7 @@ from stiction_ros.report.gap.words import CONTROLLER, called, candidate_of, name
 from stiction_ros.report.page import Cell, embedded, folded, number, page, table, text
 
 SHOWN = 12  # candidates in the picture
+SHOWS = 1.1  # times the declared noise from which what the sensor adds to it is told
 
 _HEADLINES = {
     GapVerdict.NAMED: "The simulation lacks {what}",
@@ -101,8 +102,10 @@ def _headline(found: Discrepancy) -> str:
 
 
 def _called(effect: FoundEffect) -> str:
-    every = [(effect.place, effect.effect), *effect.alternatives]
-    return " or ".join(called(*name) for name in every)
+    named = called(effect.place, effect.effect)
+    if not effect.alternatives:
+        return named
+    return f"{named} (or {' or '.join(called(*name) for name in effect.alternatives)})"
 
 
 def _decides(found: Discrepancy, pictures: dict[str, str]) -> list[str]:
@@ -118,10 +121,13 @@ def _noise(found: Discrepancy) -> str:
         if math.isnan(each.declared):
             lines.append(f"{each.name}: the model declares no noise; found {number(each.found)}")
             continue
-        agrees = "which is more or other than" if each.disagrees else "as"
+        seen = ""
+        if each.expected > SHOWS * each.declared:
+            seen = f"; what the sensor does to PV makes {number(each.expected)} of them"
+        agrees = "more or other than" if each.disagrees else "as"
         lines.append(
             f"{each.name}: innovations of {number(each.found)}, {agrees} the model declares "
-            f"({number(each.declared)})"
+            f"({number(each.declared)}{seen})"
         )
     return _listed(lines)
 

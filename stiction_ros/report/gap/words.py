@@ -8,6 +8,7 @@ import re
 from stiction_ros.discrepancy import Discrepancy, FoundEffect
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.durations import HOUR, spoken
 from stiction_ros.effects import behaviours
 from stiction_ros.report.page import number
 
@@ -65,8 +66,7 @@ def plain(sentence: str) -> str:
 
 def called(place: str, effect: str) -> str:
     """Return an effect and its place, such as ``stiction in valve V1``."""
-    joint = "," if place.startswith(("load:", "disturbance:")) else ""
-    return f"{word_of(effect)}{joint} {place_of(place)}"
+    return f"{word_of(effect)} {place_of(place)}"
 
 
 def figures_with_units(effect: FoundEffect) -> list[str]:
@@ -86,6 +86,8 @@ def figures_with_units(effect: FoundEffect) -> list[str]:
         if ends is not None:
             digits = _digits(value, ends)
             between = f", 95 % between {number(ends[0], digits)} and {number(ends[1], digits)}"
+        if unit == "s" and value >= HOUR:
+            shown += f" ({spoken(value)})"
         said = f"{key} = {number(value, digits)}{shown}{between}"
         meaning = meanings.get(key, "")
         lines.append(said + (f": {meaning}" * bool(meaning)))

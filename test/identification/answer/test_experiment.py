@@ -167,8 +167,3 @@ def test_an_op_that_was_centred_has_its_mean_at_nothing() -> None:
     op = np.array([-1.0, 1.0, -1.0, 1.0]) + 4.05e-9
     assert module._middle(op) == 0.0
     assert module._middle(op + 40.0) == pytest.approx(40.0)
-
-
-def test_durations_are_told_as_people_say_them() -> None:
-    said = [module._duration(seconds) for seconds in (48.0, 1200.0, 5100.0, 1_478_251.0)]
-    assert said == ["48 s", "1200 s", "1.42 h", "17.1 d"]
