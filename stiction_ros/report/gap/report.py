@@ -123,7 +123,7 @@ def _noise(found: Discrepancy) -> str:
             continue
         seen = ""
         if each.expected > SHOWS * each.declared:
-            seen = f"; what the sensor does to PV makes {number(each.expected)} of them"
+            seen = f"; {number(each.expected)} with what the sensor does to PV"
         agrees = "more or other than" if each.disagrees else "as"
         lines.append(
             f"{each.name}: innovations of {number(each.found)}, {agrees} the model declares "
