@@ -22,6 +22,7 @@ One = TypeVar("One")
 Two = TypeVar("Two")
 
 KEPT = 1 << 21  # numbers, 16 MB
+CORES = os.cpu_count() or 1  # asked once: every part of a search would ask again
 
 _free = threading.Lock()  # held as long as the helper has work
 
@@ -39,7 +40,7 @@ def _may_help() -> bool:
 
     A process that another one started has none: such processes share the cores already.
     """
-    return (os.cpu_count() or 1) > 1 and multiprocessing.parent_process() is None
+    return CORES > 1 and multiprocessing.parent_process() is None
 
 
 def at_once(one: Callable[[], One], two: Callable[[], Two]) -> tuple[One, Two]:

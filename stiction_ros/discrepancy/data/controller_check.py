@@ -11,7 +11,7 @@ import numpy as np
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
 from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
-from stiction_ros.discrepancy.data.unrounded import unrounded
+from stiction_ros.discrepancy.data.unrounded import left_out, unrounded
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
@@ -24,6 +24,8 @@ ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
 COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem smaller
+REFUTED = 0.02  # of the samples, at which no OP within its step follows a law
+FACTORS = 2.0 ** np.linspace(-2.5, 2.5, 61)  # of gain and integral time, tried for another tuning
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
@@ -150,7 +152,64 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
         return NOT_ASKED
     if any(record.sp is None for record in runs.records):
         return _told(model, runs)
-    return _asked(model, runs)
+    return _refuted(model, runs) or _asked(model, runs)
+
+
+def _refuted(model: LoopModel, runs: Runs) -> ControllerCheck | None:
+    """Return that another tuning gives a rounded OP, which the recorded one cannot give; or None.
+
+    Where rounding is as large as the moves of OP, squares of what is left tell little, and a gain
+    that is fitted by them is too small. Each recorded OP still lies within half a step of its
+    value: a law that leads out of many steps was not at work, and the tunings that lead out of the
+    fewest are those that may have been. Their middle is told.
+    """
+    recorded = model.controller
+    if recorded is None or runs.lattices[0] > 0.0 or quantum_of(runs.op[:, 0]) <= 0.0:
+        return None
+    steps = _Steps.of(model, runs)
+    if steps.led_out(recorded.gain, recorded.integral_time) <= REFUTED:
+        return None
+    gains, times = recorded.gain * FACTORS, recorded.integral_time * FACTORS
+    out = np.array([[steps.led_out(gain, time) for time in times] for gain in gains])
+    if out.min() > REFUTED:
+        return None
+    best = np.nonzero(out == out.min())
+    middle = PiTuning(
+        recorded.gain * float(np.exp(np.log(FACTORS[best[0]]).mean())),
+        recorded.integral_time * float(np.exp(np.log(FACTORS[best[1]]).mean())),
+    )
+    own, left = (_left(model, runs, each, 0) for each in (recorded, middle))
+    law = _Law(middle.gain, middle.integral_time, left, len(runs.op))
+    if _alike(recorded, law):
+        return None
+    finding = _finding("tuning", Tuning(law.gain, law.integral_time), own, None, law)
+    return ControllerCheck(ControllerStatus.OTHER, finding, left, True)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Steps:
+    """The steps within which a rounded OP lies, and (e_k − e_{k−1}, T_s e_k) of each record."""
+
+    parts: list[tuple[FloatArray, FloatArray]]
+    quantum: float
+    limits: tuple[float, float]
+
+    @classmethod
+    def of(cls, model: LoopModel, runs: Runs) -> _Steps:
+        parts = [
+            (runs.op[rows, 0], _terms(model, runs, record, rows))
+            for record, rows in zip(runs.records, runs.slices, strict=True)
+        ]
+        low, high = model.limits[0].tolist()
+        return cls(parts, quantum_of(runs.op[:, 0]), (low, high))
+
+    def led_out(self, gain: float, time: float) -> float:
+        """Return the share of moves by which a tuning leaves the steps."""
+        law = np.array([gain, gain / time])
+        out = [
+            left_out(op, terms @ law, 0.0, self.quantum, self.limits) for op, terms in self.parts
+        ]
+        return sum(out) / max(sum(len(terms) for _, terms in self.parts), 1)
 
 
 def _told(model: LoopModel, runs: Runs) -> ControllerCheck:

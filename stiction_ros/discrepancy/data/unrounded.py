@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiction_ros.compiled import compiled
 from stiction_ros.effects import FloatArray
 
 FINER = 0.25  # of the step of the recorded values, that is left at most on average
@@ -37,18 +38,43 @@ def unrounded(
         quantum: distance of the recorded values, %.
         limits: at which OP is what it is recorded to be.
     """
+    low, high = _steps(op, quantum, limits)
+    _follow(low, high, moves, slack)
+    if float(np.mean(high - low)) > FINER * quantum:
+        return None
+    return np.asarray(0.5 * (low + high))
+
+
+def left_out(
+    op: FloatArray,
+    moves: FloatArray,
+    slack: float,
+    quantum: float,
+    limits: tuple[float, float],
+) -> int:
+    """Return at how many samples no OP within its step follows a law; as :func:`unrounded`."""
+    low, high = _steps(op, quantum, limits)
+    return int(_follow(low, high, moves, slack))
+
+
+def _steps(
+    op: FloatArray, quantum: float, limits: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
     half = np.where((op <= limits[0]) | (op >= limits[1]), 0.0, 0.5 * quantum)
-    low, high = op - half, op + half
-    joined = np.zeros(len(op), dtype=bool)  # whether the law has led from the sample before
-    for k in range(1, len(op)):
+    return op - half, op + half
+
+
+@compiled
+def _follow(low: FloatArray, high: FloatArray, moves: FloatArray, slack: float) -> int:
+    """Cut intervals to what a law allows, in place; return how many it cuts to nothing."""
+    joined = np.zeros(len(low), dtype=np.bool_)  # whether the law has led from the sample before
+    for k in range(1, len(low)):
         least = max(low[k], low[k - 1] + moves[k - 1] - slack)
         most = min(high[k], high[k - 1] + moves[k - 1] + slack)
         if least <= most:
             low[k], high[k], joined[k] = least, most, True
-    for k in range(len(op) - 1, 0, -1):
+    for k in range(len(low) - 1, 0, -1):
         if joined[k]:
             low[k - 1] = max(low[k - 1], low[k] - moves[k - 1] - slack)
             high[k - 1] = min(high[k - 1], high[k] - moves[k - 1] + slack)
-    if float(np.mean(high - low)) > FINER * quantum:
-        return None
-    return np.asarray(0.5 * (low + high))
+    return int(len(low) - 1 - np.sum(joined))

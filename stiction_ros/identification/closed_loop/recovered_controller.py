@@ -326,12 +326,13 @@ def _covariance(data: _Data, fit: _Fit) -> FloatArray:
 
 def _solved(gram: FloatArray, side: FloatArray, kept: BoolArray) -> FloatArray:
     """Return the least-squares solution, shape (q,), zero where a column is not kept."""
-    part = gram[np.ix_(kept, kept)]
-    scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
-    scaled = np.linalg.lstsq(part / np.outer(scale, scale), side[kept] / scale, rcond=1e-12)[0]
-    theta = np.zeros(len(side))
-    theta[kept] = scaled / scale
-    return theta
+    if not kept.all():
+        theta = np.zeros(len(side))
+        theta[kept] = _solved(gram[np.ix_(kept, kept)], side[kept], kept[kept])
+        return theta
+    scale = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
+    scaled = gram / (scale[:, None] * scale)
+    return np.asarray(np.linalg.lstsq(scaled, side / scale, rcond=1e-12)[0] / scale)
 
 
 def _told(

@@ -291,7 +291,7 @@ class Repeated:
             np.array([start.stem for start in begins]),
             np.array([start.op for start in begins]),
         )
-        op, _ = run_loops(self.process, self.controllers, runs, sp, np.zeros_like(sp), False)
+        op, _ = run_loops(self.process, self.controllers, runs, sp, np.zeros_like(sp[:1]), False)
         return np.ascontiguousarray(op[:, :, valve])
 
     def _starts(self, valve: int) -> list[_Start]:
