@@ -17,7 +17,9 @@ from stiction_ros.identification.exact.one_step_best import one_step_best, seen
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
-from stiction_ros.identification.inference.intervals import friction_intervals
+from stiction_ros.identification.inference.intervals import (
+    friction_intervals,
+)
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
@@ -100,9 +102,38 @@ def judged_valves(
     orders: Orders,
     options: IdentificationOptions,
 ) -> tuple[tuple[ValveEstimate, ...], Model]:
-    """Return the estimates and the final model, judged against the friction-free rivals."""
-    rivals = [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))]
-    return estimate_valves(record, data, model, orders, rivals, options)
+    """Return the estimates and the final model, judged against the friction-free rivals.
+
+    Frictions are in the middle of their intervals. Those of the first valve are found beside the
+    rivals; those of another begin where the one before ends.
+    """
+    rivals, first = at_once(
+        lambda: [linear_rivals(data, model, linear, orders, j) for j in range(len(data.u))],
+        lambda: friction_intervals(data, model, orders, 0, options.confidence),
+    )
+    found = []
+    for j in range(len(data.u)):
+        intervals = friction_intervals(data, model, orders, j, options.confidence) if j else first
+        model = intervals.model
+        span = float(np.ptp(data.u[j]))
+        figures = evidence(data, model, rivals[j], j, span)
+        figures["deadband_loss"] = intervals.deadband_loss
+        doubted = figures["delta_bic"] <= options.bic_margin
+        static = (0.0, intervals.static[1]) if doubted else intervals.static
+        dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
+        verdict = judge(figures, static, dynamic, span, options)
+        estimate = (intervals.static_estimate, intervals.dynamic_estimate)
+        if doubted and (figures["delta_bic"] < 0.0 or verdict is VerdictKind.HEALTHY):
+            estimate = (0.0, 0.0)
+            model = without_friction(data, model, orders, j)
+        if record.stem is not None:
+            error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
+            figures["stem_error"] = float(np.mean(error**2))
+        figures["patterns"] = float(intervals.patterns)
+        figures["patterns_closed"] = float(intervals.closed)
+        found.append((estimate, static, dynamic, verdict, figures, intervals.profile))
+    valves = tuple(_valve(record, model, j, *entry, options) for j, entry in enumerate(found))
+    return valves, model
 
 
 def least_one_step(
@@ -199,40 +230,6 @@ def linear_rivals(
     rivals = [freed, *together(*(partial(of_order, extra) for extra in (2, 1, 0)))]
     best = min(rivals, key=lambda rival: rival.bic)
     return [*rivals, improve_delays(data, best, best.fits[0].orders)]
-
-
-def estimate_valves(
-    record: Record,
-    data: Data,
-    model: Model,
-    orders: Orders,
-    rivals: list[list[Model]],
-    options: IdentificationOptions,
-) -> tuple[tuple[ValveEstimate, ...], Model]:
-    """Return the estimates and the final model, frictions in the middle of their intervals."""
-    found = []
-    for j in range(len(data.u)):
-        intervals = friction_intervals(data, model, orders, j, options.confidence)
-        model = intervals.model
-        span = float(np.ptp(data.u[j]))
-        figures = evidence(data, model, rivals[j], j, span)
-        figures["deadband_loss"] = intervals.deadband_loss
-        doubted = figures["delta_bic"] <= options.bic_margin
-        static = (0.0, intervals.static[1]) if doubted else intervals.static
-        dynamic = (0.0, intervals.dynamic[1]) if doubted else intervals.dynamic
-        verdict = judge(figures, static, dynamic, span, options)
-        estimate = (intervals.static_estimate, intervals.dynamic_estimate)
-        if doubted and (figures["delta_bic"] < 0.0 or verdict is VerdictKind.HEALTHY):
-            estimate = (0.0, 0.0)
-            model = without_friction(data, model, orders, j)
-        if record.stem is not None:
-            error = model.stems[j] + record.op[:, j].mean() - record.stem[:, j]
-            figures["stem_error"] = float(np.mean(error**2))
-        figures["patterns"] = float(intervals.patterns)
-        figures["patterns_closed"] = float(intervals.closed)
-        found.append((estimate, static, dynamic, verdict, figures, intervals.profile))
-    valves = tuple(_valve(record, model, j, *entry, options) for j, entry in enumerate(found))
-    return valves, model
 
 
 def without_friction(data: Data, model: Model, orders: Orders, valve: int) -> Model:

@@ -208,7 +208,11 @@ def refuse_swapped(block: Block) -> None:
 
 
 def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether ``one`` is :data:`CLOSER` to the set-point, and without a lasting offset."""
+    """Return whether ``one`` is :data:`CLOSER` to the set-point, and it alone without an offset.
+
+    Where neither has a lasting offset, as in signals without their means, the unit alone may make
+    the one smaller.
+    """
     there = np.isfinite(sp) & np.isfinite(one) & np.isfinite(other)
     if np.count_nonzero(there) < FEWEST:
         return False
@@ -216,8 +220,13 @@ def _stays_near(sp: FloatArray, one: FloatArray, other: FloatArray) -> bool:
     size = float(np.sqrt(np.mean(near**2)))
     if size > CLOSER * float(np.sqrt(np.mean(far**2))) or not np.ptp(other[there]) > 0.0:
         return False
-    centred = abs(float(near.mean())) <= OFFSET * float(near.std())
-    return centred or size <= TRACKED * float(sp[there].std())
+    if _centred(far):
+        return False
+    return _centred(near) or size <= TRACKED * float(sp[there].std())
+
+
+def _centred(error: FloatArray) -> bool:
+    return abs(float(error.mean())) <= OFFSET * float(error.std())
 
 
 def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:

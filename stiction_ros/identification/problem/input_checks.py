@@ -168,7 +168,11 @@ def refuse_swapped(record: Record, evidence: Evidence | None) -> None:
 
 
 def _set_point_ratio(record: Record) -> float | None:
-    """Return the ratio of distances from SP: ≤ CLOSER swapped, ≥ 1 / CLOSER not; else None."""
+    """Return the ratio of distances from SP: ≤ CLOSER swapped, ≥ 1 / CLOSER not; else None.
+
+    Where both columns lie about SP, as those without their means do, the nearer one may be so by
+    its unit alone: that is no sign of a swap.
+    """
     if record.sp is None or len(record.valves) != len(record.outputs):
         return None
     ratios = []
@@ -176,7 +180,7 @@ def _set_point_ratio(record: Record) -> float | None:
         sp = record.sp[:, i]
         op_error, pv_error = record.op[:, i] - sp, record.pv[:, i] - sp
         far, near = _size(pv_error), _size(op_error)
-        if near <= CLOSER * far and _tracks(op_error, sp):
+        if near <= CLOSER * far and _tracks(op_error, sp) and not _tracks(pv_error, sp):
             ratios.append(near / far)
         elif far <= CLOSER * near and _tracks(pv_error, sp):
             ratios.append(_over(near, far))

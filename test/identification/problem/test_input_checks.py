@@ -92,6 +92,15 @@ def test_the_set_point_shows_a_swap_where_op_is_rounded() -> None:
     assert found.ratio < 0.1
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1.0, -40.0])
+def test_signals_without_their_means_are_not_swapped_by_their_unit(unit: float) -> None:
+    record = pi_loop(1, move=0.0)
+    assert record.sp is not None
+    op = np.round(record.op - record.op.mean(), 1)
+    pv, sp = unit * (record.pv - record.sp), 0.0 * record.sp
+    assert swapped_columns(dataclasses.replace(record, op=op, pv=pv, sp=sp)) is None
+
+
 @pytest.mark.parametrize("decimals", [1, 3])
 def test_a_rounded_op_without_set_point_says_nothing(decimals: int) -> None:
     record = without_sp(pi_loop(1))
