@@ -72,6 +72,15 @@ def test_headers_exchanged_are_called_swapped(tmp_path: Path) -> None:
     assert "name them, --op TIC1=TIC1.PV --pv TIC1=TIC1.OP" in problem
 
 
+def test_a_small_op_without_its_mean_is_not_called_swapped(tmp_path: Path) -> None:
+    rows = [
+        [iso(k), f"{small:.5f}", f"{large:.4f}", "0"]
+        for k, (small, large) in enumerate(zip(around(0.0, 0.05), around(0.0, 2.0), strict=True))
+    ]
+    path = write(tmp_path / "a.csv", text(rows, HEADER))
+    assert "swapped" not in str(one(path, op_unit=OpUnit.OTHER).problem)
+
+
 def test_without_a_unit_and_a_set_point_a_swap_is_asked_about(tmp_path: Path) -> None:
     random = np.random.default_rng(3)
     rows = [[iso(k), f"{314 + random.random():.3f}", str(op(k))] for k in range(120)]
