@@ -17,9 +17,7 @@ from stiction_ros.identification.exact.one_step_best import one_step_best, seen
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
-from stiction_ros.identification.inference.intervals import (
-    friction_intervals,
-)
+from stiction_ros.identification.inference.intervals import friction_intervals
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
 from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (

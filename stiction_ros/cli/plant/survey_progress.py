@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from stiction_ros.cli.output.progress import bar
-from stiction_ros.durations import spoken
 
 if TYPE_CHECKING:
     from stiction_ros.survey.survey import Reached
@@ -81,7 +80,7 @@ class Forecast:
         words = f"{reached.done} of {total} loops"
         if here and reached.done < total:
             left = (self._clock() - self._begun) / here * (total - reached.done)
-            words += f", about {spoken(left)} left"
+            words += f", about {_duration(left)} left"
         self._show(reached.done / total, f"{words}: {reached.entry.name}")
 
 
@@ -118,3 +117,9 @@ def progress(found: Iterable[object] | None) -> Iterator[Forecast]:
     finally:
         if counted is not None:
             counted.end()
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

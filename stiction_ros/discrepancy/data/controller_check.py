@@ -9,14 +9,13 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
+from stiction_ros.discrepancy.data.op_steps import OpSteps, law_terms, other_tuning
 from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
-from stiction_ros.discrepancy.data.unrounded import left_out, unrounded
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray, TimeShift, Tuning
 from stiction_ros.loop import LoopModel, PiTuning
-from stiction_ros.records import Record
 
 LONGEST_SHIFT = 30
 EXACT = 0.02  # of the moves of OP, that a law may leave which gives them
@@ -24,8 +23,6 @@ ONCE = 5e-3  # of the moves of OP, that a law leaves which scans once
 TWICE = 0.1  # of the moves of OP, that one scan leaves of a law which scans twice
 ROUNDED = 1.2  # times what rounding of the signals leaves
 COARSEST = 0.2  # of the moves of OP: coarser rounding makes the gain seem smaller
-REFUTED = 0.02  # of the samples, at which no OP within its step follows a law
-FACTORS = 2.0 ** np.linspace(-2.5, 2.5, 61)  # of gain and integral time, tried for another tuning
 MANY = 0.2  # of the samples: where OP moves less often, somebody moves it
 FINE = 0.02  # of the span of OP: values that are chosen are rounder than what rounding shows
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
@@ -156,60 +153,19 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
 
 
 def _refuted(model: LoopModel, runs: Runs) -> ControllerCheck | None:
-    """Return that another tuning gives a rounded OP, which the recorded one cannot give; or None.
-
-    Where rounding is as large as the moves of OP, squares of what is left tell little, and a gain
-    that is fitted by them is too small. Each recorded OP still lies within half a step of its
-    value: a law that leads out of many steps was not at work, and the tunings that lead out of the
-    fewest are those that may have been. Their middle is told.
-    """
+    """Return that another tuning gives a rounded OP, and the recorded one cannot; or None."""
     recorded = model.controller
     if recorded is None or runs.lattices[0] > 0.0 or quantum_of(runs.op[:, 0]) <= 0.0:
         return None
-    steps = _Steps.of(model, runs)
-    if steps.led_out(recorded.gain, recorded.integral_time) <= REFUTED:
+    found = other_tuning(OpSteps.of(model, runs), recorded)
+    if found is None:
         return None
-    gains, times = recorded.gain * FACTORS, recorded.integral_time * FACTORS
-    out = np.array([[steps.led_out(gain, time) for time in times] for gain in gains])
-    if out.min() > REFUTED:
-        return None
-    best = np.nonzero(out == out.min())
-    middle = PiTuning(
-        recorded.gain * float(np.exp(np.log(FACTORS[best[0]]).mean())),
-        recorded.integral_time * float(np.exp(np.log(FACTORS[best[1]]).mean())),
-    )
-    own, left = (_left(model, runs, each, 0) for each in (recorded, middle))
-    law = _Law(middle.gain, middle.integral_time, left, len(runs.op))
+    own, left = (_left(model, runs, each, 0) for each in (recorded, found))
+    law = _Law(found.gain, found.integral_time, left, len(runs.op))
     if _alike(recorded, law):
         return None
     finding = _finding("tuning", Tuning(law.gain, law.integral_time), own, None, law)
     return ControllerCheck(ControllerStatus.OTHER, finding, left, True)
-
-
-@dataclasses.dataclass(frozen=True)
-class _Steps:
-    """The steps within which a rounded OP lies, and (e_k − e_{k−1}, T_s e_k) of each record."""
-
-    parts: list[tuple[FloatArray, FloatArray]]
-    quantum: float
-    limits: tuple[float, float]
-
-    @classmethod
-    def of(cls, model: LoopModel, runs: Runs) -> _Steps:
-        parts = [
-            (runs.op[rows, 0], _terms(model, runs, record, rows))
-            for record, rows in zip(runs.records, runs.slices, strict=True)
-        ]
-        low, high = model.limits[0].tolist()
-        return cls(parts, quantum_of(runs.op[:, 0]), (low, high))
-
-    def led_out(self, gain: float, time: float) -> float:
-        """Return the share of moves by which a tuning leaves the steps."""
-        law = np.array([gain, gain / time])
-        out = [
-            left_out(op, terms @ law, 0.0, self.quantum, self.limits) for op, terms in self.parts
-        ]
-        return sum(out) / max(sum(len(terms) for _, terms in self.parts), 1)
 
 
 def _told(model: LoopModel, runs: Runs) -> ControllerCheck:
@@ -243,26 +199,11 @@ def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:
     if model.controller is not None:
         if rather_twice(model, runs, model.controller):
             return dataclasses.replace(check, between=True)
-        return dataclasses.replace(check, finer=_finer(model, runs, model.controller))
+        return dataclasses.replace(check, finer=OpSteps.of(model, runs).finer(model.controller))
     law = _fit(model, runs, 0)
-    finer = _finer(model, runs, PiTuning(law.gain, law.integral_time))
+    finer = OpSteps.of(model, runs).finer(PiTuning(law.gain, law.integral_time))
     unsure = None if finer is None else Unseen((FITTED * quantum) ** 2, LASTING)
     return dataclasses.replace(check, finer=finer, unsure=unsure, between=True)
-
-
-def _finer(model: LoopModel, runs: Runs, tuning: PiTuning) -> FloatArray | None:
-    """Return a rounded OP as a law tells it, shape (N, 1); None where it does not."""
-    found, quantum = [], quantum_of(runs.op[:, 0])
-    low, high = model.limits[0].tolist()
-    slack = abs(tuning.gain) * (1.0 + runs.sample_time / tuning.integral_time) * runs.lattices[0]
-    law = np.array([tuning.gain, tuning.gain / tuning.integral_time])
-    for record, rows in zip(runs.records, runs.slices, strict=True):
-        moves = _terms(model, runs, record, rows) @ law
-        finer = unrounded(runs.op[rows, 0], moves, slack, quantum, (low, high))
-        if finer is None:
-            return None
-        found.append(finer)
-    return np.concatenate(found)[:, None]
 
 
 def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
@@ -360,19 +301,10 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
         told = told[: count - 1] & told[shift:]
         inside = (op[1:count] > low) & (op[1:count] < high) & told
         moves.append(np.diff(op[:count])[inside])
-        columns.append(_terms(model, runs, record, rows, shift)[inside])
+        columns.append(law_terms(model, runs, record, rows, shift)[inside])
     if not moves:
         return np.zeros(0), np.zeros((0, 2))
     return np.concatenate(moves), np.vstack(columns)
-
-
-def _terms(model: LoopModel, runs: Runs, record: Record, rows: slice, shift: int = 0) -> FloatArray:
-    """Return (e_k − e_{k−1}, T_s e_k) of one record from its second sample on, shape (n, 2)."""
-    assert record.sp is not None
-    pv = runs.pv[rows, 0]
-    sp = record.sp[: len(pv) - shift, record.outputs.index(model.outputs[0])]
-    error = sp - pv[shift:]
-    return np.column_stack([np.diff(error), runs.sample_time * error[1:]])
 
 
 def _fit(model: LoopModel, runs: Runs, shift: int) -> _Law:
