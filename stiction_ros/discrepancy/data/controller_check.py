@@ -288,7 +288,8 @@ def _finding(
 def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, FloatArray]:
     """Return the moves of OP, shape (n,), and (e_k − e_{k−1}, T_s e_k), shape (n, 2).
 
-    Moves to or from a sample that was carried over or drawn in say nothing of a law.
+    Moves to or from a sample that was carried over or drawn in, by whoever made the record or by a
+    historian, say nothing of a law.
     """
     low, high = model.limits[0]
     moves, columns = [], []
@@ -298,7 +299,8 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
         if count < 2:
             continue
         told = record.measured[1:] & record.measured[:-1]
-        told = told[: count - 1] & told[shift:]
+        known = told & ~(runs.filled[0, rows][1:] | runs.filled[0, rows][:-1])
+        told = told[: count - 1] & known[shift:]
         inside = (op[1:count] > low) & (op[1:count] < high) & told
         moves.append(np.diff(op[:count])[inside])
         columns.append(law_terms(model, runs, record, rows, shift)[inside])

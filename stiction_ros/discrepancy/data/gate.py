@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.data.filled import OFTEN, drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, BoolArray, autoregression, whiten
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
@@ -20,9 +21,6 @@ LONGEST_REST = 12
 ENDS = 6
 MOST_CLIPPED = 0.5  # of the rows: what stands at its ends more often is no clipped measurement
 ALIKE = 0.02  # share by which two quanta, or two ends over the range of PV, may differ
-OFTEN = 0.05  # of the samples: held or interpolated values, from which on a record is thinned out
-FLOAT = 2e-7  # of the largest value: digits that a difference of three has by itself
-NEARLY = 5.0  # digits: noise is as often nearly nothing as that is wider than nothing
 LATTICE = 1e-3  # of the range of PV: coarser rounding makes single values stand out
 ALONE = 8.0  # usual distances from the mean of both neighbours, beyond which one is a spike
 COARSE = 1.8  # innovations of PV in quanta, below which a quantum is worth a finding
@@ -53,7 +51,8 @@ class Gate:
     Attributes:
         usable: per output the rows whose PV is a measurement, shape (p, N).
         findings: frozen, clipped and rounded PVs, but for what the model has already.
-        thinned: per output the share of values that were held or interpolated; 0 where none were.
+        filled: per output the rows whose PV a historian held or drew between the values that it
+            kept, shape (p, N).
         quantum: per output the distance of PV's values; 0 where they are as good as continuous.
         rounding: the same, where it is coarse enough to matter; 0 elsewhere.
         set_point_moves: per output, over all records; None where SP is not recorded.
@@ -64,7 +63,7 @@ class Gate:
 
     usable: BoolArray
     findings: tuple[DataFinding, ...]
-    thinned: tuple[float, ...]
+    filled: BoolArray
     quantum: tuple[float, ...]
     rounding: tuple[float, ...]
     set_point_moves: tuple[int, ...] | None
@@ -85,7 +84,7 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
         runs,
         usable=gate.usable,
         quanta=gate.rounding,
-        thinned=gate.thinned,
+        filled=gate.filled,
         lattices=gate.quantum,
     )
     return seen, gate
@@ -94,8 +93,9 @@ def open_gate(model: LoopModel, records: Sequence[Record]) -> tuple[Runs, Gate]:
 def look_at_data(model: LoopModel, runs: Runs) -> Gate:
     """Return what the recorded values allow, before any model is asked."""
     usable = np.ones((len(model.outputs), len(runs)), dtype=bool)
+    filled = np.zeros_like(usable)
     findings: list[DataFinding] = []
-    quanta, rounding, notes, thinned = [], [], [], []
+    quanta, rounding, notes = [], [], []
     lonely = [0] * len(model.outputs)
     for i, name in enumerate(model.outputs):
         quantum = quantum_of(runs.pv[:, i])
@@ -121,16 +121,17 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                     f"{int(again.sum())} samples of {name} repeat the one before to the last digit "
                     "and are not scored"
                 )
-            if not rounded and _compressed(values, quantum):
+            if rounded:
+                continue
+            lines = drawn(values, quantum)
+            filled[i, rows] = lines | held(values, quantum, usable[i, rows])
+            if lines.any():
                 notes.append(
                     f"{name} lies on straight lines: a historian has thinned it out, small "
                     "effects are lost"
                 )
         findings += rounded
         rounding.append(quantum if rounded else 0.0)
-        whole = [(runs.pv[rows, i], usable[i, rows]) for rows in runs.slices]
-        shares = [max(_compressed(v, quantum), _held(v, quantum, u)) for v, u in whole]
-        thinned.append(0.0 if rounded else max(shares))
     findings = [finding for finding in findings if not known_already(model, runs, finding)]
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
@@ -138,7 +139,7 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
     return Gate(
         usable,
         tuple(findings),
-        tuple(thinned),
+        filled,
         tuple(quanta),
         tuple(rounding),
         _moves(model, runs),
@@ -276,15 +277,6 @@ def _surprise(runs: Runs, output: int) -> float:
     return float(np.std(whiten(values, autoregression(values, rows))[rows]))
 
 
-def _held(values: FloatArray, quantum: float, usable: BoolArray) -> float:
-    """Return the share of values that are exactly those before them: reported by exception.
-
-    Values that are frozen or clipped are not asked.
-    """
-    moves = np.abs(np.diff(values))[usable[1:] & usable[:-1]]
-    return _too_often(moves, 0.5 * quantum, values)
-
-
 def _again(values: FloatArray, quantum: float, usable: BoolArray) -> BoolArray:
     """Return samples that repeat the one before, of values that hardly ever do: they were held.
 
@@ -313,33 +305,6 @@ def _alone(values: FloatArray) -> BoolArray:
     found[1:-2] |= pairs
     found[2:-1] |= pairs
     return found
-
-
-def _compressed(values: FloatArray, quantum: float) -> float:
-    """Return the share of values on the straight line of their neighbours: drawn by lines."""
-    bends, moved = np.abs(np.diff(values, 2)), np.abs(np.diff(values))[1:] > 0.0
-    return _too_often(np.where(moved, bends, np.inf), 2.0 * quantum, values)
-
-
-def _too_often(sizes: FloatArray, digits: float, values: FloatArray) -> float:
-    """Return the share of sizes that are nothing, as far as digits tell.
-
-    0 where they are not so more often than they are small.
-
-    Args:
-        sizes: that would be spread about nothing smoothly by noise, shape (n,).
-        digits: that a size of nothing may seem to have by the rounding of the values.
-        values: of which they are the differences.
-    """
-    digits = max(digits, FLOAT * float(np.abs(values).max()))
-    nothing, small = sizes <= digits, sizes <= NEARLY * digits
-    share = float(np.mean(nothing)) if len(sizes) else 0.0
-    if share <= OFTEN or share <= float(np.mean(small)) - share:
-        return 0.0
-    others = sizes[~nothing & np.isfinite(sizes)]
-    if not len(others) or float(np.median(others)) <= NEARLY * digits:
-        return 0.0
-    return share
 
 
 def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:

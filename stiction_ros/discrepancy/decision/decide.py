@@ -135,6 +135,21 @@ def decide(
     return Decision(GapVerdict.NAMED, best, (), True, "it beats no effect and its rivals")
 
 
+def thinned_away(decision: Decision, measured: float) -> Decision:
+    """Return what may be said where too few values were measured for an answer.
+
+    Args:
+        decision: what could be said if all had been.
+        measured: share of the values that were.
+    """
+    if decision.verdict is GapVerdict.NONE:
+        return decision
+    best = decision.chosen
+    told = decision.reason if best is None else _would_explain(best)
+    left = f"{100.0 * measured:.0f} % of the values were measured, too few for a name"
+    return Decision(GapVerdict.UNKNOWN, None, (), False, f"{told}; {left}")
+
+
 def confirmed(fit: CandidateFit) -> bool:
     """Tell whether the held-out rows bear an effect out, chance allowed for."""
     return borne_out(fit.delta_bic, fit.held_gain, fit.candidate.dated)
@@ -174,9 +189,13 @@ def _unknown(stranger: CandidateFit, reason: str, lent: CandidateFit | None) -> 
         None,
         (),
         False,
-        f"{stranger.candidate.name} would explain the gap by {stranger.evidence:.0f}; {reason}",
+        f"{_would_explain(stranger)}; {reason}",
         lent,
     )
+
+
+def _would_explain(fit: CandidateFit) -> str:
+    return f"{fit.candidate.name} would explain the gap by {fit.evidence:.0f}"
 
 
 def _beats(fit: CandidateFit | None, other: CandidateFit) -> bool:

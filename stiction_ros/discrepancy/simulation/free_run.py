@@ -44,8 +44,8 @@ class Runs:
         usable: per output the rows whose PV can be scored, shape (p, N).
         quanta: per output the step of a coarse rounding; 0 where there is none.
         lattices: per output the distance of PV's values, however fine; 0 where there is none.
-        thinned: per output the share of values that were held or interpolated, so that their
-            noise is no longer that of the loop; 0 where none were.
+        filled: per output the rows whose PV a historian filled in between the values that it kept,
+            shape (p, N).
         unseen: per valve what may act beside the recorded OP; empty where nothing does.
         between: per valve whether it is left open how late within a sample an effect that is added
             moves its stem; empty where that is not asked.
@@ -62,7 +62,7 @@ class Runs:
     slices: tuple[slice, ...]
     usable: BoolArray
     quanta: tuple[float, ...]
-    thinned: tuple[float, ...]
+    filled: BoolArray
     lattices: tuple[float, ...]
     unseen: tuple[tuple[Unseen, ...], ...] = ()
     between: tuple[bool, ...] = ()
@@ -73,6 +73,13 @@ class Runs:
         if not self.phases:
             phases = tuple(PHASES[r % len(PHASES)] for r in range(len(self.slices)))
             object.__setattr__(self, "phases", phases)
+
+    @property
+    def thinned(self) -> tuple[float, ...]:
+        """Per output the share of values that were filled in; their noise is not the loop's."""
+        return tuple(
+            max(float(np.mean(filled[rows])) for rows in self.slices) for filled in self.filled
+        )
 
     @property
     def scanned(self) -> int:
@@ -132,8 +139,9 @@ def join_records(
     time = np.concatenate([r.time for r in records])
     count = pv.shape[1]
     op = np.clip(op, low, high)
-    none = (0.0,) * count, (0.0,) * count, (0.0,) * count
-    return Runs(tuple(records), op, pv, time, slices, usable, *none)
+    none = (0.0,) * count
+    filled = np.zeros_like(usable)
+    return Runs(tuple(records), op, pv, time, slices, usable, none, filled, none)
 
 
 def _check(model: LoopModel, record: Record) -> None:

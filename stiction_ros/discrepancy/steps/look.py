@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.decision.chance import stored_threshold
-from stiction_ros.discrepancy.decision.decide import Decision, decide
+from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, decide, thinned_away
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
@@ -165,18 +165,20 @@ def decided(task: Task, state: State, scored: Scored) -> Decision:
     """Return what the scores allow to say.
 
     Values between those that were kept are none that were measured: all evidence counts by the
-    share of the others.
+    share of the others. What would be an answer if all had been measured is not nothing.
     """
     base = scored.scores.base
-    margin = task.options.margin / (1.0 - min(max(task.runs.thinned), MOST_THINNED))
+    measured = 1.0 - min(max(task.runs.thinned), MOST_THINNED)
     if task.options.quick:
         chance = stored_threshold(sum(each.inside for each in scored.candidates))
     else:
         chance = chance_threshold(base, scored.candidates, task.random)
     possible = not_contradicted(base.run, scored.scores.fits)
     allowed = [fit for fit in possible if not told_already(state.added, fit)]
-    chance *= margin / task.options.margin
-    decision = decide(allowed, margin, max(margin, chance), rests_left(base.run))
+    margin, threshold = task.options.margin, max(task.options.margin, chance)
+    decision = decide(allowed, margin / measured, threshold / measured, rests_left(base.run))
+    if measured < 1.0 and decision.verdict is GapVerdict.NONE:
+        decision = thinned_away(decide(allowed, margin, threshold, rests_left(base.run)), measured)
     if task.options.free_process:
         decision = in_doubt_of_place(base, decision)
     return told_by_stem(base.run, decision, allowed)

@@ -125,6 +125,21 @@ def test_another_tuning_is_named_with_its_figures() -> None:
     assert check.finding.behaviour.gain == pytest.approx(1.1, rel=1e-3)
 
 
+def test_another_tuning_is_told_by_the_values_that_a_historian_kept() -> None:
+    model = loop()
+    recorded = record(dataclasses.replace(model, controller=PiTuning(1.1, 9.0)))
+    at, keeping = np.arange(len(recorded)), np.random.default_rng(1).random(len(recorded)) < 0.6
+    keeping[0] = keeping[-1] = True
+    pv = np.interp(at, at[keeping], recorded.pv[keeping, 0])[:, None]
+    runs, _ = open_gate(model, [dataclasses.replace(recorded, pv=pv)])
+    check = check_controller(model, runs)
+    assert check.finding is not None
+    assert isinstance(check.finding.behaviour, Tuning)
+    assert check.finding.behaviour.gain == pytest.approx(1.1, rel=1e-3)
+    assert check.finding.behaviour.integral_time == pytest.approx(9.0, rel=1e-3)
+    assert check.left < 1e-3
+
+
 @pytest.mark.parametrize(("step", "told"), [(0.05, True), (0.8, False)])
 def test_rounding_leaves_what_rounding_leaves(step: float, told: bool) -> None:
     model = loop()
@@ -213,7 +228,7 @@ def thinned(values: np.ndarray[tuple[int], np.dtype[np.float64]], digits: float)
     model, recorded = loop(), record(loop())
     shown = np.round(values / digits) * digits
     kept = dataclasses.replace(recorded, pv=shown[: len(recorded), None])
-    return look_at_data(model, join_records(model, [kept])).thinned[0] > 0.0
+    return open_gate(model, [kept])[0].thinned[0] > 0.0
 
 
 @pytest.mark.parametrize("digits", [1e-12, 1e-4])

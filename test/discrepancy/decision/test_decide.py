@@ -5,9 +5,16 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
 
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
-from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, borne_out, decide
+from stiction_ros.discrepancy.decision.decide import (
+    Decision,
+    GapVerdict,
+    borne_out,
+    decide,
+    thinned_away,
+)
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Axis, Behaviour, FloatArray
@@ -185,3 +192,21 @@ def test_a_step_is_looked_at_before_a_change_that_contains_it() -> None:
 def test_what_comes_at_one_moment_need_not_show_on_held_out_rows() -> None:
     assert not borne_out(700.0, -5.0, dated=False)
     assert borne_out(700.0, -5.0, dated=True)
+
+
+@pytest.mark.parametrize("rival", [20.0, 32.0])
+def test_what_too_few_values_were_measured_for_is_unknown_and_never_lent(rival: float) -> None:
+    answer = thinned_away(said(fit("process:PV1", "gain", 30.0), fit("v", "slew", rival)), 0.14)
+    assert answer.verdict is GapVerdict.UNKNOWN
+    assert answer.tried is None
+    assert "14 % of the values were measured" in answer.reason
+
+
+def test_a_refused_effect_of_thinned_values_is_not_lent() -> None:
+    refused = said(fit("process:PV1", "gain", 90.0, held=-40.0))
+    assert refused.lent is not None
+    assert thinned_away(refused, 0.14).tried is None
+
+
+def test_nothing_in_thinned_values_is_nothing() -> None:
+    assert thinned_away(said(fit("process:PV1", "gain", 2.0)), 0.14).verdict is GapVerdict.NONE
