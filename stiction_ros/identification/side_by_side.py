@@ -35,8 +35,8 @@ def _helper() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(1, thread_name_prefix="identification")
 
 
-def _may_help() -> bool:
-    """Return whether there is a core for a second thread.
+def may_help() -> bool:
+    """Return whether there is a core for a second thread, or a process that helps.
 
     A process that another one started has none: such processes share the cores already.
     """
@@ -59,7 +59,7 @@ def together(*parts: Callable[[], Result]) -> list[Result]:
     Raises:
         Exception: of the first part, in their order, that raised one.
     """
-    if len(parts) < 2 or not _may_help() or not _free.acquire(blocking=False):
+    if len(parts) < 2 or not may_help() or not _free.acquire(blocking=False):
         return [part() for part in parts]
     results: list[Future[Result]] = [Future() for _ in parts]
     waiting = collections.deque(zip(parts, results, strict=True))

@@ -19,18 +19,18 @@ def test_results_come_in_the_order_of_the_parts() -> None:
 
 
 def test_two_parts_run_at_the_same_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(side_by_side, "_may_help", lambda: True)
+    monkeypatch.setattr(side_by_side, "may_help", lambda: True)
     met = threading.Barrier(2)
     assert sorted(together(partial(met.wait, PATIENCE), partial(met.wait, PATIENCE))) == [0, 1]
 
 
 def test_without_a_second_core_all_runs_in_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(side_by_side, "_may_help", lambda: False)
+    monkeypatch.setattr(side_by_side, "may_help", lambda: False)
     assert set(together(*[threading.get_ident] * 9)) == {threading.get_ident()}
 
 
 def test_the_first_part_runs_in_the_calling_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(side_by_side, "_may_help", lambda: True)
+    monkeypatch.setattr(side_by_side, "may_help", lambda: True)
     for _ in range(50):
         assert at_once(threading.get_ident, lambda: None)[0] == threading.get_ident()
 
@@ -58,7 +58,7 @@ def test_one_thread_identifies_what_two_do(monkeypatch: pytest.MonkeyPatch) -> N
     options = IdentificationOptions(output_order=3, input_order=3, delay=(4, 6))
 
     def found(two: bool) -> dict[str, object]:
-        monkeypatch.setattr(side_by_side, "_may_help", lambda: two)
+        monkeypatch.setattr(side_by_side, "may_help", lambda: two)
         return identify(record, options).to_json() | {"seconds": 0.0}
 
     assert found(two=True) == found(two=False)
