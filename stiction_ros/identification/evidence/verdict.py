@@ -30,7 +30,7 @@ REJECTED = 3.0
 """−2 log likelihood that all bands that would matter must lose at two rates: a twentieth of the
 likelihood of none at both together."""
 REJECTING = 2  # rates that do
-SURELY = 10.0  # what they must lose where one rate alone rejects them and none gains
+SURELY = 10.0  # what they must lose where one rate alone rejects them
 GAINED = 5.0  # −2 log likelihood that such a band may gain where another rate rejects it, at most
 HARDLY = 0.05  # share of the movement that goes away, at most, with one that does not matter
 AS_RECORDED = 1.3  # factor within which its loop moves as recorded
@@ -117,7 +117,7 @@ def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
 
     No rate finds any, and without any the loop moves as recorded, hardly less than with what the
     record does not reject. Its controller rings with the process, or its set-point cycles; or
-    nothing cycles, one rate rejects all that matters, and none gains much by it. A wave from
+    nothing cycles, one rate surely rejects all that matters, and none gains much by it. A wave from
     outside acquits no valve: a stem that goes to and fro with it may be missed.
     """
     if any(look.beyond_price(valve) > 0.0 for look in seen):
@@ -132,7 +132,7 @@ def acquits(found: Identification, seen: tuple[Look, ...], valve: int) -> bool:
     if all(kind in OWN for kind in causes):
         return gone < CAUSES
     lost = _lost(seen, valve)
-    rejected = max(lost, default=0.0) >= REJECTED and min(lost, default=0.0) > -GAINED
+    rejected = max(lost, default=0.0) >= SURELY and min(lost, default=0.0) > -GAINED
     return gone < HARDLY and rejected
 
 

@@ -18,7 +18,7 @@ from stiction_ros.identification.evidence.verdict import (
     HARDLY,
     LEAST_GONE,
     MATTERS,
-    REJECTED,
+    SURELY,
     WIDER,
     acquits,
     confirms,
@@ -189,7 +189,7 @@ def test_a_friction_that_one_rate_shows_counts_where_its_loop_confirms_it(
 def quiet() -> Look:
     """A rate at which every friction that matters is rejected."""
     look = looks(pi_loop(0.0, 0.0, samples=200), IdentificationOptions())[0]
-    lost = dataclasses.replace(look.accepted[0], gain=0.0, material_gain=-1.1 * REJECTED)
+    lost = dataclasses.replace(look.accepted[0], gain=0.0, material_gain=-1.1 * SURELY)
     return dataclasses.replace(look, accepted=(lost,))
 
 
@@ -222,7 +222,7 @@ def test_a_loop_that_does_not_cycle_acquits_no_valve_alone(
 ) -> None:
     plain = {"moved_without": 1.0, "loop_gone": 0.0}
     found, rings = with_loop(told, **plain), with_loop(told, kind=CauseKind.TUNING, **plain)
-    open_ = dataclasses.replace(quiet.accepted[0], material_gain=-0.9 * REJECTED)
+    open_ = dataclasses.replace(quiet.accepted[0], material_gain=-0.9 * SURELY)
     seen = (dataclasses.replace(quiet, accepted=(open_,)),)
     assert not acquits(found, seen, 0)
     assert acquits(rings, seen, 0)
