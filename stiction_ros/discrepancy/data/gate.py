@@ -211,8 +211,9 @@ def _frozen(
     longest = int(np.argmax(lengths))
     length = int(lengths[longest])
     level = values[begins[longest]]
-    # What stands at the end of all values is an end of the sensor's range, not a frozen value.
+    # What stands at the end of all values is an end of the sensor's range, unless it leaps away.
     at_an_end = level in (values.min(), values.max())
+    at_an_end = at_an_end and not _leaps(values, int(ends[longest]) - 1)
     if length >= LONGEST_REST + 3.0 * natural and not at_an_end:
         where = np.zeros(len(values), dtype=bool)
         where[begins[longest] : ends[longest]] = True
@@ -222,6 +223,16 @@ def _frozen(
         gain = bits - 2.0 * math.log(len(values))
         found.append((DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where))
     return found
+
+
+def _leaps(values: FloatArray, last: int) -> bool:
+    """Tell whether values move farther behind ``last`` than anywhere else.
+
+    A measurement comes back to the end of its range by and by; one that was frozen is at once where
+    it would have been.
+    """
+    steps = np.abs(np.diff(values))
+    return last < len(steps) and steps[last] > np.delete(steps, last).max(initial=0.0)
 
 
 def _clipped(
@@ -241,6 +252,8 @@ def _clipped(
         if quantum:
             beside = int((np.abs(values - limits[k] - (1 - 2 * k) * quantum) < 0.5 * quantum).sum())
         visits = int((np.diff(at.astype(int)) == 1).sum())
+        if visits == 1 and _leaps(values, int(np.flatnonzero(at)[-1])):
+            visits, count = 0, 0  # it was frozen there
         if count >= ENDS and (visits >= 2 or count >= LONGEST_REST) and count > 3 * beside:
             where |= at
             ends += 1

@@ -82,6 +82,20 @@ def test_a_frozen_while_is_timed() -> None:
     assert (behaviour.onset, behaviour.duration) == pytest.approx((300.0, 60.0), abs=1.0)
 
 
+@pytest.mark.parametrize("leaps", [True, False])
+def test_a_rest_at_the_end_of_all_values_was_frozen_where_it_leaps_away(leaps: bool) -> None:
+    model, sound = loop(), record(loop())
+    pv = sound.pv.copy()
+    top = pv.max() + 0.5
+    pv[260:300, 0] = np.linspace(pv[259, 0], top, 40)
+    pv[300:340] = top
+    if not leaps:
+        pv[340:380, 0] = np.linspace(top, pv[380, 0], 41)[1:]
+    gate = look_at_data(model, join_records(model, [dataclasses.replace(sound, pv=pv)]))
+    assert [finding.effect for finding in gate.findings] == ["freeze" if leaps else "clip"]
+    assert not gate.usable[0, 302:338].any()
+
+
 def test_frozen_rows_are_not_scored() -> None:
     usable = gate_of(Freeze(300.0, 60.0)).usable
     assert not usable[0, 302:358].any()
