@@ -15,7 +15,7 @@ import numpy as np
 from stiction_ros.compiled import at_next_compilation
 from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
 from stiction_ros.identification.problem.output_error import Orders, fit_output
-from stiction_ros.identification.side_by_side import may_help
+from stiction_ros.identification.side_by_side import CORES, may_help
 from stiction_ros.orphans import die_with_parent
 
 SAMPLES = 120
@@ -24,12 +24,18 @@ CODE = f"from {__name__} import in_this_process; in_this_process(%d)"
 
 @functools.cache
 def offer() -> None:
+    """Let another process help, as :func:`ask`, unless this is one of many that may compile."""
+    if may_help():
+        ask()
+
+
+def ask() -> None:
     """Let another process help if anything has to be compiled and there is a core for it.
 
     Its machine code is found where any is kept; what is not yet there when it is needed is compiled
     here as well. The process ends with this one.
     """
-    if may_help():
+    if CORES > 1:
         at_next_compilation(_begin)
 
 

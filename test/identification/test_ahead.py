@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from stiction_ros.identification import warm_up
+
 NEEDED = """
 from stiction_ros.identification.ahead import compile_end
 from stiction_ros.identification.closed_loop.loop_run import run_loops
@@ -68,3 +70,14 @@ print("goes on")
 
 def test_without_a_process_the_search_goes_on() -> None:
     assert told_by(NO_PROCESS) == "goes on\n"
+
+
+@pytest.mark.parametrize("helped", [True, False])
+def test_a_process_that_compiles_for_another_asks_for_help_where_it_is_told_to(
+    monkeypatch: pytest.MonkeyPatch, helped: bool
+) -> None:
+    asked: list[bool] = []
+    monkeypatch.setattr(warm_up, "ask", lambda: asked.append(True))
+    monkeypatch.setattr(warm_up, "identify", lambda record, options: None)
+    warm_up.compile_loops(["exact"], helped=helped)
+    assert asked == [True] * helped

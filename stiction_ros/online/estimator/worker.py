@@ -40,7 +40,7 @@ class FitWorker:
         self._ready = self._pool.submit(os.getpid)
         self._processes = set(multiprocessing.active_children()) - others
         # Before the first window is full.
-        self._compiled = self._pool.submit(compile_loops, (METHOD,))
+        self._compiled = self._pool.submit(compile_loops, (METHOD,), helped=True)
 
     @property
     def pid(self) -> int:
