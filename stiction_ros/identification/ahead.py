@@ -61,7 +61,7 @@ def compile_end() -> None:
 def _begin() -> None:
     try:
         helper = subprocess.Popen(
-            [sys.executable, "-c", CODE % os.getpid()],
+            [sys.executable, "-P", "-c", CODE % os.getpid()],
             env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
