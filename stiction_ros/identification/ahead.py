@@ -62,7 +62,7 @@ def _begin() -> None:
     try:
         helper = subprocess.Popen(
             [sys.executable, "-P", "-c", CODE % os.getpid()],
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
