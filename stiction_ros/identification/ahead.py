@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import numpy as np
 
@@ -70,6 +71,7 @@ def _begin() -> None:
     except OSError as error:
         logging.getLogger(__name__).info("nothing helps with compiling: %s", error)
         return
+    threading.Thread(target=helper.wait, daemon=True).start()  # so that it is gone when it ends
     atexit.register(_end, helper)
 
 
