@@ -15,6 +15,8 @@ from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisati
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
 SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
 LONGEST_REST = 12
@@ -123,16 +125,19 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                 )
             if rounded:
                 continue
-            lines = drawn(values, quantum)
-            filled[i, rows] = lines | held(values, quantum, usable[i, rows])
-            if lines.any():
-                notes.append(
-                    f"{name} lies on straight lines: a historian has thinned it out, small "
-                    "effects are lost"
-                )
+            lines, rests = drawn(values, quantum), held(values, quantum, usable[i, rows])
+            filled[i, rows] = lines | rests
+            for found, does in ((lines, "lies on straight lines"), (rests, "repeats itself")):
+                if found.any():
+                    notes.append(
+                        f"{name} {does}: a historian has thinned it out, small effects are lost"
+                    )
         findings += rounded
         rounding.append(quantum if rounded else 0.0)
     findings = [finding for finding in findings if not known_already(model, runs, finding)]
+    for i, name in enumerate(model.outputs):
+        if np.ptp(runs.pv[:, i]) == 0.0:
+            notes.append(f"{name} never moves: whatever OP does, it shows nothing")
     for j, valve in enumerate(model.valve_names):
         if np.ptp(runs.op[:, j]) == 0.0:
             notes.append(f"OP of {valve} never moves: nothing can be said of that valve")
@@ -198,41 +203,58 @@ def _frozen(
     values: FloatArray, name: str, record: int, sample_time: float
 ) -> list[tuple[DataFinding, BoolArray]]:
     """Return each rest of PV that is too long for its noise, with its rows."""
-    same = np.concatenate([[False], np.diff(values) == 0.0])
-    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    begins, ends = _runs(np.concatenate([[False], np.diff(values) == 0.0]))
     if not len(begins):
         return []
     lengths = ends - begins
-    usual = np.delete(lengths, int(np.argmax(lengths)))
-    share = min(usual.sum() / max(len(values) - lengths.max(), 1), 0.99)
-    natural = math.log(max(len(values), 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
-    found = []
     longest = int(np.argmax(lengths))
-    length = int(lengths[longest])
-    level = values[begins[longest]]
-    # What stands at the end of all values is an end of the sensor's range, unless it leaps away.
-    at_an_end = level in (values.min(), values.max())
-    at_an_end = at_an_end and not _leaps(values, int(ends[longest]) - 1)
-    if length >= LONGEST_REST + 3.0 * natural and not at_an_end:
-        where = np.zeros(len(values), dtype=bool)
-        where[begins[longest] : ends[longest]] = True
-        onset, duration = begins[longest] * sample_time, length * sample_time
-        behaviour = Freeze(float(onset), float(duration))
-        bits = length * 2.0 * math.log(1.0 / max(share, 1.0 / len(values)))
-        gain = bits - 2.0 * math.log(len(values))
-        found.append((DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where))
-    return found
+    first, last, length = int(begins[longest]) - 1, int(ends[longest]) - 1, int(lengths[longest])
+    # What stands at the end of all values is an end of the sensor's range, unless it leaps there.
+    at_an_end = values[last] in (values.min(), values.max())
+    if length < _by_no_chance(values) or (at_an_end and not _leaps(values, first, last)):
+        return []
+    where = np.zeros(len(values), dtype=bool)
+    where[first + 1 : last + 1] = True
+    behaviour = Freeze(float((first + 1) * sample_time), float(length * sample_time))
+    share = max(_resting(lengths, len(values)), 1.0 / len(values))
+    gain = 2.0 * length * math.log(1.0 / share) - 2.0 * math.log(len(values))
+    return [(DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where)]
 
 
-def _leaps(values: FloatArray, last: int) -> bool:
-    """Tell whether values move farther behind ``last`` than anywhere else.
+def _by_no_chance(values: FloatArray) -> float:
+    """Return how many samples a value rests that rests longer than by chance."""
+    begins, ends = _runs(np.diff(values) == 0.0)
+    share = _resting(ends - begins, len(values)) if len(begins) else 0.0
+    natural = math.log(max(len(values), 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
+    return LONGEST_REST + 3.0 * natural
 
-    A measurement comes back to the end of its range by and by; one that was frozen is at once where
-    it would have been.
+
+def _resting(lengths: IntArray, count: int) -> float:
+    """Return the share of samples that repeat the one before, but for the longest rest.
+
+    Args:
+        lengths: of the rests.
+        count: of all samples.
+    """
+    longest = int(lengths.max())
+    return float(min((int(lengths.sum()) - longest) / max(count - longest, 1), 0.99))
+
+
+def _runs(there: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return where runs of True begin and the places behind their ends."""
+    edges = np.diff(np.concatenate([[0], there.astype(int), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def _leaps(values: FloatArray, first: int, last: int) -> bool:
+    """Tell whether values leap to what stands from ``first`` to ``last``, or from there.
+
+    They move farther there than anywhere else. A measurement goes to the end of its range, and
+    comes back, by and by; one that was frozen is at once where it would have been.
     """
     steps = np.abs(np.diff(values))
-    return last < len(steps) and steps[last] > np.delete(steps, last).max(initial=0.0)
+    at = [k for k in (first - 1, last) if 0 <= k < len(steps)]
+    return bool(at) and float(steps[at].max()) > np.delete(steps, at).max(initial=0.0)
 
 
 def _clipped(
@@ -251,10 +273,10 @@ def _clipped(
         beside = 0
         if quantum:
             beside = int((np.abs(values - limits[k] - (1 - 2 * k) * quantum) < 0.5 * quantum).sum())
-        visits = int((np.diff(at.astype(int)) == 1).sum())
-        if visits == 1 and _leaps(values, int(np.flatnonzero(at)[-1])):
-            visits, count = 0, 0  # it was frozen there
-        if count >= ENDS and (visits >= 2 or count >= LONGEST_REST) and count > 3 * beside:
+        begins, behind = _runs(at)
+        once = len(begins) == 1  # one that leaps was frozen
+        stands = count >= _by_no_chance(values) and not _leaps(values, begins[0], behind[0] - 1)
+        if count >= ENDS and (stands or not once) and count > 3 * beside:
             where |= at
             ends += 1
             gain += 2.0 * count * math.log(len(values) / 10.0)

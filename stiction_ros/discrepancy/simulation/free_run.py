@@ -78,7 +78,8 @@ class Runs:
     def thinned(self) -> tuple[float, ...]:
         """Per output the share of values that were filled in; their noise is not the loop's."""
         return tuple(
-            max(float(np.mean(filled[rows])) for rows in self.slices) for filled in self.filled
+            float(np.mean(filled[usable | filled])) if filled.any() else 0.0
+            for usable, filled in zip(self.usable, self.filled, strict=True)
         )
 
     @property

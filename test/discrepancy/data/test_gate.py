@@ -96,6 +96,43 @@ def test_a_rest_at_the_end_of_all_values_was_frozen_where_it_leaps_away(leaps: b
     assert not gate.usable[0, 302:338].any()
 
 
+@pytest.mark.parametrize("rows", [slice(0, 50), slice(200, 250), slice(-50, None)])
+def test_a_sensor_that_fails_to_its_end_was_frozen_wherever_in_the_record(rows: slice) -> None:
+    model, sound = loop(), record(loop())
+    pv = sound.pv.copy()
+    pv[rows] = pv.max() + 5.0
+    gate = look_at_data(model, join_records(model, [dataclasses.replace(sound, pv=pv)]))
+    assert [finding.effect for finding in gate.findings] == ["freeze"]
+
+
+@pytest.mark.parametrize("keeping", [0.5, 0.05])
+def test_held_values_are_neither_clipped_nor_frozen_and_it_is_said(keeping: float) -> None:
+    model, sound = loop(), record(loop())
+    at, kept = np.arange(len(sound)), np.random.default_rng(1).random(len(sound)) < keeping
+    kept[0] = True
+    pv = sound.pv[np.maximum.accumulate(np.where(kept, at, 0))]
+    runs, gate = open_gate(model, [dataclasses.replace(sound, pv=pv)])
+    assert gate.findings == ()
+    assert any("repeats itself" in note for note in gate.notes)
+    assert runs.thinned[0] == pytest.approx(1.0 - keeping, abs=0.05)
+
+
+def test_a_short_thinned_record_beside_a_long_one_counts_by_its_length() -> None:
+    model, sound = loop(), record(loop())
+    at, kept = np.arange(60), np.arange(60) % 3 == 0
+    drawn = np.interp(at, at[kept], sound.pv[:60, 0][kept])[:, None]
+    short = dataclasses.replace(sound.part(0, 60), pv=drawn)
+    runs, _ = open_gate(model, [sound, short])
+    assert runs.thinned[0] == pytest.approx(40 / (len(sound) + 60), rel=0.1)
+
+
+def test_a_pv_that_never_moves_is_said() -> None:
+    model, sound = loop(), record(loop())
+    still = dataclasses.replace(sound, pv=np.full_like(sound.pv, 50.0))
+    _, gate = open_gate(model, [still])
+    assert "PV1 never moves: whatever OP does, it shows nothing" in gate.notes
+
+
 def test_frozen_rows_are_not_scored() -> None:
     usable = gate_of(Freeze(300.0, 60.0)).usable
     assert not usable[0, 302:358].any()
