@@ -29,7 +29,7 @@ IMPORTS = re.compile(rb"^(?:from|import) ([\w.]+)", re.MULTILINE)
 HERE = __name__.encode()
 ONE_AT_A_TIME = threading.RLock()  # numba's settings are those of the process, threads import
 DIGITS = 12  # of what stands for a content
-COMPILING = "compiling, once on this machine: less than a minute"
+COMPILING = "compiling what this needs, once on this machine: less than a minute"
 
 
 _helping: list[Callable[[], None]] = []

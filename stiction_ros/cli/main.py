@@ -16,6 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from stiction_ros import __version__
 from stiction_ros.errors import InputError
+from stiction_ros.interrupts import waiting_for_compiler
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
@@ -179,7 +180,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if command and command not in COMMANDS:
             parser("").error(f"there is no command {command}{_meant(command, COMMANDS)}")
         options = parser(command).parse_args(given, argparse.Namespace(words=given))
-        return int(options.run(options))
+        with waiting_for_compiler():
+            return int(options.run(options))
     except InputError as error:
         print(f"stiction: {error}", file=sys.stderr)
         return USAGE

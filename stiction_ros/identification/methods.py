@@ -71,8 +71,8 @@ def identify(
         >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=600)
         >>> found = identify(record, IdentificationOptions(output_order=1, delay=(0, 4)))
         >>> valve = found.valves[0]
-        >>> print(valve.verdict, round(valve.static_friction), round(valve.dynamic_friction))
-        sticky 4 2
+        >>> print(valve.verdict, round(valve.static_friction), round(valve.dynamic_friction, 1))
+        sticky 4 1.6
     """
     with one_thread():
         return _identify(record, options or IdentificationOptions(), progress)

@@ -158,7 +158,7 @@ def test_a_file_that_is_not_there_is_told(
     tags = write(tmp_path / "tags.csv", "file,op_unit\na.csv,percent\nc.csv,share\n")
     assert main(["survey", str(tmp_path), "--tags", str(tags), "--dry-run"]) == 0
     shown = capsys.readouterr()
-    assert "1 loops, 1 can be read" in shown.out
+    assert "1 loop, 1 can be read" in shown.out
     assert f"{tags}: no export is called c.csv\n" in shown.err
 
 
