@@ -159,8 +159,8 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
             print(f"  {line}")
         for note in loop.notes:
             print(f"  note: {note}")
-    loops = "1 loop" if known == 1 else f"{known} loops"
-    print(f"{loops}, {readable} can be read" if known else "no file of a loop")
+    all_loops = "1 loop" if known == 1 else f"{known} loops"
+    print(f"{all_loops}, {readable} can be read" if known else "no file of a loop")
     if len(paths) > 1 or paths[0].is_dir():
         tell_strangers(options.tags, "export", strange_files(paths, options))
     return 0 if readable else 1
