@@ -15,8 +15,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from stiction_ros import __version__
+from stiction_ros.cli.interrupts import waiting_for_compiler
 from stiction_ros.errors import InputError
-from stiction_ros.interrupts import waiting_for_compiler
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 

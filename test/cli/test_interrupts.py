@@ -11,11 +11,11 @@ import time
 
 import pytest
 
-from stiction_ros.interrupts import waiting_for_compiler
+from stiction_ros.cli.interrupts import waiting_for_compiler
 
 COMPILING = """
 import os, signal, sys, types
-from stiction_ros.interrupts import waiting_for_compiler
+from stiction_ros.cli.interrupts import waiting_for_compiler
 
 inside = types.ModuleType("llvmlite.inside")
 exec("def called_back(told):\\n    told()\\n    print('went on')\\n", inside.__dict__)
