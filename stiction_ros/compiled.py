@@ -31,7 +31,6 @@ ONE_AT_A_TIME = threading.RLock()  # numba's settings are those of the process, 
 DIGITS = 12  # of what stands for a content
 COMPILING = "compiling what this needs, once on this machine: less than a minute"
 
-
 _helping: list[Callable[[], None]] = []
 
 

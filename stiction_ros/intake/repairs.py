@@ -20,6 +20,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.records.quality import Quality, QualityArray
+from stiction_ros.records.stretches import stretches
 
 IndexArray = NDArray[np.intp]
 
@@ -328,9 +329,8 @@ def _isolated(stray: FlagArray, there: FlagArray) -> bool:
     """Return whether stray values come alone, so that no signal was that far out."""
     if not stray.any():
         return False
-    edges = np.diff(np.concatenate([[0], stray[there].astype(np.int8), [0]]))
-    lengths = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
-    return bool(lengths.max() <= HELD and stray.sum() <= 0.02 * there.sum())
+    begins, ends = stretches(stray[there])
+    return bool((ends - begins).max() <= HELD and stray.sum() <= 0.02 * there.sum())
 
 
 def filled(block: Block, rules: Rules) -> Block:
@@ -378,8 +378,7 @@ def filled(block: Block, rules: Rules) -> Block:
 
 def _short(missing: FlagArray) -> FlagArray:
     """Return which missing values stand in stretches that are held, shape (N,)."""
-    edges = np.diff(np.concatenate([[0], missing.astype(np.int8), [0]]))
-    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    begins, ends = stretches(missing)
     found = np.zeros(len(missing), dtype=np.bool_)
     for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
         inside = first > 0 and last < len(missing)

@@ -25,7 +25,6 @@ print(*(len(each.signatures) for each in asked))
 """
 
 LEFT = """
-import os
 from stiction_ros.identification import ahead
 
 ahead.CODE = "import time, sys; print(%d); time.sleep(60)"

@@ -12,6 +12,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
 from stiction_ros.intake.intake import is_bag, strange_files
 from stiction_ros.intake.options import OpUnit, TimeUnit
+from stiction_ros.intake.repairs import plural
 from stiction_ros.intake.sheets.stamps import DateOrder
 
 NAMED = 8
@@ -159,8 +160,7 @@ def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
             print(f"  {line}")
         for note in loop.notes:
             print(f"  note: {note}")
-    all_loops = "1 loop" if known == 1 else f"{known} loops"
-    print(f"{all_loops}, {readable} can be read" if known else "no file of a loop")
+    print(f"{plural(known, 'loop')}, {readable} can be read" if known else "no file of a loop")
     if len(paths) > 1 or paths[0].is_dir():
         tell_strangers(options.tags, "export", strange_files(paths, options))
     return 0 if readable else 1

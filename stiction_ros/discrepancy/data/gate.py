@@ -12,10 +12,10 @@ from stiction_ros.discrepancy.data.filled import OFTEN, drawn, held
 from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, BoolArray, autoregression, whiten
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
+from stiction_ros.effects.behaviour import IntArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-
-IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+from stiction_ros.records.stretches import stretches
 
 SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
@@ -106,8 +106,9 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
         for r, rows in enumerate(runs.slices):
             values = runs.pv[rows, i]
             if not rounded:  # values on a coarse lattice rest, and meet at its ends, anyway
-                frozen = _frozen(values, name, r, runs.sample_time)
-                clipped = _clipped(values, name, r, quantum)
+                rests = _Rests.of(values)
+                frozen = _frozen(values, rests, name, r, runs.sample_time)
+                clipped = _clipped(values, rests, name, r, quantum)
                 for finding, where in (*frozen, *clipped):
                     usable[i, rows] &= ~where
                     findings.append(finding)
@@ -125,9 +126,9 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
                 )
             if rounded:
                 continue
-            lines, rests = drawn(values, quantum), held(values, quantum, usable[i, rows])
-            filled[i, rows] = lines | rests
-            for found, does in ((lines, "lies on straight lines"), (rests, "repeats itself")):
+            lines, again = drawn(values, quantum), held(values, quantum, usable[i, rows])
+            filled[i, rows] = lines | again
+            for found, does in ((lines, "lies on straight lines"), (again, "repeats itself")):
                 if found.any():
                     notes.append(
                         f"{name} {does}: a historian has thinned it out, small effects are lost"
@@ -199,51 +200,61 @@ def quantum_of(values: FloatArray) -> float:
     return smallest
 
 
+@dataclasses.dataclass(frozen=True)
+class _Rests:
+    """Where the values of a record rest.
+
+    Attributes:
+        first, last: sample of each rest, shape (R,).
+        count: N, of the record.
+    """
+
+    first: IntArray
+    last: IntArray
+    count: int
+
+    @classmethod
+    def of(cls, values: FloatArray) -> _Rests:
+        return cls(*stretches(np.diff(values) == 0.0), len(values))
+
+    @property
+    def repeats(self) -> IntArray:
+        """How often each repeats its value, shape (R,)."""
+        return self.last - self.first
+
+    @property
+    def share(self) -> float:
+        """Share of the samples that repeat the one before, but for the longest rest."""
+        longest = int(self.repeats.max(initial=0))
+        others = int(self.repeats.sum()) - longest
+        return min(others / max(self.count - longest, 1), 0.99)
+
+    @property
+    def by_no_chance(self) -> float:
+        """How often a value is repeated that rests longer than by chance."""
+        share = self.share
+        natural = math.log(max(self.count, 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
+        return LONGEST_REST + 3.0 * natural
+
+
 def _frozen(
-    values: FloatArray, name: str, record: int, sample_time: float
+    values: FloatArray, rests: _Rests, name: str, record: int, sample_time: float
 ) -> list[tuple[DataFinding, BoolArray]]:
     """Return each rest of PV that is too long for its noise, with its rows."""
-    begins, ends = _runs(np.concatenate([[False], np.diff(values) == 0.0]))
-    if not len(begins):
+    if not len(rests.first):
         return []
-    lengths = ends - begins
-    longest = int(np.argmax(lengths))
-    first, last, length = int(begins[longest]) - 1, int(ends[longest]) - 1, int(lengths[longest])
+    longest = int(np.argmax(rests.repeats))
+    first, last = int(rests.first[longest]), int(rests.last[longest])
     # What stands at the end of all values is an end of the sensor's range, unless it leaps there.
     at_an_end = values[last] in (values.min(), values.max())
-    if length < _by_no_chance(values) or (at_an_end and not _leaps(values, first, last)):
+    if last - first < rests.by_no_chance or (at_an_end and not _leaps(values, first, last)):
         return []
     where = np.zeros(len(values), dtype=bool)
     where[first + 1 : last + 1] = True
-    behaviour = Freeze(float((first + 1) * sample_time), float(length * sample_time))
-    share = max(_resting(lengths, len(values)), 1.0 / len(values))
-    gain = 2.0 * length * math.log(1.0 / share) - 2.0 * math.log(len(values))
+    behaviour = Freeze(float((first + 1) * sample_time), float((last - first) * sample_time))
+    share = max(rests.share, 1.0 / len(values))
+    gain = 2.0 * (last - first) * math.log(1.0 / share) - 2.0 * math.log(len(values))
     return [(DataFinding(f"sensor:{name}", "freeze", behaviour, gain, record), where)]
-
-
-def _by_no_chance(values: FloatArray) -> float:
-    """Return how many samples a value rests that rests longer than by chance."""
-    begins, ends = _runs(np.diff(values) == 0.0)
-    share = _resting(ends - begins, len(values)) if len(begins) else 0.0
-    natural = math.log(max(len(values), 3)) / math.log(1.0 / share) if share > 0.0 else 0.0
-    return LONGEST_REST + 3.0 * natural
-
-
-def _resting(lengths: IntArray, count: int) -> float:
-    """Return the share of samples that repeat the one before, but for the longest rest.
-
-    Args:
-        lengths: of the rests.
-        count: of all samples.
-    """
-    longest = int(lengths.max())
-    return float(min((int(lengths.sum()) - longest) / max(count - longest, 1), 0.99))
-
-
-def _runs(there: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return where runs of True begin and the places behind their ends."""
-    edges = np.diff(np.concatenate([[0], there.astype(int), [0]]))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
 def _leaps(values: FloatArray, first: int, last: int) -> bool:
@@ -258,7 +269,7 @@ def _leaps(values: FloatArray, first: int, last: int) -> bool:
 
 
 def _clipped(
-    values: FloatArray, name: str, record: int, quantum: float
+    values: FloatArray, rests: _Rests, name: str, record: int, quantum: float
 ) -> list[tuple[DataFinding, BoolArray]]:
     """Return the ends of the range at which PV stands again and again, with their rows."""
     low, high = float(values.min()), float(values.max())
@@ -273,10 +284,11 @@ def _clipped(
         beside = 0
         if quantum:
             beside = int((np.abs(values - limits[k] - (1 - 2 * k) * quantum) < 0.5 * quantum).sum())
-        begins, behind = _runs(at)
-        once = len(begins) == 1  # one that leaps was frozen
-        stands = count >= _by_no_chance(values) and not _leaps(values, begins[0], behind[0] - 1)
-        if count >= ENDS and (stands or not once) and count > 3 * beside:
+        begins, behind = stretches(at)
+        stands = len(begins) > 1 or (  # one that leaps was frozen
+            count >= rests.by_no_chance and not _leaps(values, begins[0], behind[0] - 1)
+        )
+        if count >= ENDS and stands and count > 3 * beside:
             where |= at
             ends += 1
             gain += 2.0 * count * math.log(len(values) / 10.0)

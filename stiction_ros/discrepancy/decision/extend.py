@@ -18,6 +18,7 @@ from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
+from stiction_ros.records.stretches import stretches
 
 ROUNDS = 2
 GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow
@@ -243,7 +244,7 @@ def moved_away(base: Baseline, after_base: Baseline) -> bool:
     for old, new, blocks in zip(base.noise, after_base.noise, base.blocks, strict=True):
         unit = max(old.innovation_std, 1e-300)
         growth = np.where(blocks.held, (new.residual / unit) ** 2 - (old.residual / unit) ** 2, 0.0)
-        begins = np.flatnonzero(np.diff(np.concatenate([[0], blocks.held.astype(int)])) == 1)
+        begins, _ = stretches(blocks.held)
         if len(begins):
             growths.append(np.add.reduceat(growth, begins))
     if not growths:

@@ -26,6 +26,7 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.kernels.polynomials import recursion
+from stiction_ros.records.stretches import stretches
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 Stretches = list[tuple[int, int]]
@@ -406,5 +407,5 @@ def _limits(op: FloatArray) -> tuple[float, float]:
 
 
 def _longest_run(there: BoolArray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    begins, ends = stretches(there)
+    return int((ends - begins).max(initial=0))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.records.stretches import stretches
 from stiction_ros.survey.pages.frame import text
 
 WIDTH, HEIGHT = 960, 240
@@ -188,10 +189,9 @@ def _range(values: Sequence[FloatArray]) -> tuple[float, float]:
 
 def _parts(x: FloatArray, y: FloatArray, steps: bool) -> list[str]:
     """Return the points of each stretch without a gap."""
-    there = np.isfinite(y)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    begins, ends = stretches(np.isfinite(y))
     found = []
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
         a, b = _thinned(x[first:last], y[first:last], MOST * (last - first) // len(x) + 4)
         if steps:
             a, b = np.repeat(a, 2)[1:], np.repeat(b, 2)[:-1]
