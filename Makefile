@@ -17,14 +17,14 @@ BIN := $(VENV)/bin
 # that was copied or moved elsewhere does not work there.
 DONE := $(VENV)/installed$(subst /,-,$(subst $() $(),-,$(CURDIR)))
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
-SOURCES := setup.py setup.cfg pyproject.toml package.xml stiction_ros/__init__.py \
+SOURCES := setup.py setup.cfg pyproject.toml package.xml stiction_ros/__init__.py studies/pyproject.toml \
     $(wildcard resource/* launchers/* launch/* config/*)
 
 setup: $(DONE)
 
 # A first or broken-off installation starts from an empty environment; after that only what
-# has changed is installed. The package itself is installed editable, so that the command
-# and the nodes follow the tree; install_data adds what an editable installation leaves out:
+# has changed is installed. The package and its studies are installed editable, so that the
+# command and the nodes follow the tree; install_data adds what an editable installation leaves out:
 # launchers, marker and config files. $(BIN)/python is missing when its Python has gone.
 $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@test -e $@ -a -x $(BIN)/python || { $(find-python); \
@@ -34,7 +34,8 @@ $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@rm -f $@
 	@echo "setup: installing"
 	@$(PIP) install -c constraints.txt "setuptools<80" wheel && \
-	$(PIP) install -c constraints.txt --no-build-isolation -e ".[ros,opcua,survey,dask,docs,test]" && \
+	$(PIP) install -c constraints.txt --no-build-isolation \
+	    -e ".[ros,opcua,survey,dask,docs,test]" -e studies && \
 	$(BIN)/python -W ignore setup.py -q install_data --install-dir $(VENV) || \
 	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
 	  exit 1; }
@@ -89,5 +90,5 @@ docs: setup
 	@echo "docs: out/site/index.html"
 
 clean:
-	rm -rf $(VENV) build dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
-	find stiction_ros test examples tools -name __pycache__ -prune -exec rm -rf {} +
+	rm -rf $(VENV) build dist install log *.egg-info studies/*.egg-info studies/build .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find stiction_ros studies test examples tools -name __pycache__ -prune -exec rm -rf {} +

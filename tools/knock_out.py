@@ -24,8 +24,6 @@ import numpy as np
 
 from stiction_ros.cli.options.choices import MANY
 from stiction_ros.cli.runs.seeds import add_jobs, run_each, seed_range
-from stiction_ros.examples.paper import example1, example2
-from stiction_ros.field import field_loop
 from stiction_ros.identification.evidence.engine import answered
 from stiction_ros.identification.evidence.rates import liveliest, looks
 from stiction_ros.identification.evidence.search import ALL, Parts
@@ -33,6 +31,8 @@ from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.preparation import prepare
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
+from stiction_studies.examples.paper import example1, example2
+from stiction_studies.field import field_loop
 
 LOST = 15.0
 JUDGED = ("waves", "tuning")  # parts that change what is judged

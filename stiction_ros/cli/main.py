@@ -7,7 +7,7 @@ import importlib
 import logging
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 # Two cores are shared with the nodes: linear algebra gets one thread unless told otherwise.
@@ -15,6 +15,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from stiction_ros import __version__
+from stiction_ros.cli import extensions
 from stiction_ros.cli.interrupts import waiting_for_compiler
 from stiction_ros.errors import InputError
 
@@ -30,7 +31,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "gain": ("loop.gain", "what service, embedding or retuning would bring"),
     "gap": ("loop.gap", "find, name and add the effect that a simulation misses"),
     "simulate": ("loop.simulate", "simulate a loop model under its own controller"),
-    "example": ("studies.example", "identify a loop whose truth is known, and compare"),
     "experiment": (
         "loop.experiment",
         "simulate an identification experiment, or the exports of a plant",
@@ -39,26 +39,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "replay": ("bags.replay", "run estimator and controller over a bag as they ran live"),
     "report": ("bags.report", "make the report of a bag or a record"),
     "repair": ("bags.repair", "finish a bag whose recorder was killed, or salvage a damaged one"),
-    "study": ("studies.scenario", "run a scenario over many seeds, without ROS"),
-    "study-change": (
-        "studies.change",
-        "run a scenario whose sticky valve changes after the swap, without ROS",
-    ),
-    "study-control": (
-        "studies.control",
-        "the exact embedding on the tank when friction or inputs are not as known",
-    ),
-    "study-monitor": (
-        "studies.monitor",
-        "the estimator's monitor over loops in which an effect sets in half-way",
-    ),
-    "study-wear": (
-        "studies.wear",
-        "IAE against moves of the stem, over controllers and the worth of a move",
-    ),
     "survey": ("plant.survey", "every loop of a plant, ranked by what to service first"),
-    "faults": ("live.faults", "put faults into a running graph and judge what becomes of it"),
-    "soak": ("live.soak", "a long run with the real nodes: missed samples, growth of memory"),
     "certificates": ("plant.certificates", "certificates of the link to a control system (OPC UA)"),
     "browse-tags": ("plant.browse_tags", "make a tag map by browsing a control system (OPC UA)"),
     "fetch-history": (
@@ -66,14 +47,18 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "read history from a control system (OPC UA) into CSV records",
     ),
     "listen": ("plant.listen", "fill the windows of all loops in the graph, in one process"),
-    "paper": ("studies.paper", "every figure and table of the paper, printed beside ours"),
-    "bench": ("benches.command", "measure speed, side by side"),
     "completion": (
         "options.completion",
         "a script by which a shell ends commands and options at Tab",
     ),
 }
 """Module of each command below this package, loaded when it is called, and what ``--help`` says."""
+
+
+def _known(command: str | None) -> Mapping[str, tuple[str, str]]:
+    """Return module and help of every command; of other distributions where they are needed."""
+    own = {name: (f"{__package__}.{module}", text) for name, (module, text) in COMMANDS.items()}
+    return own if command in own else {**own, **extensions.commands()}
 
 
 class _OnError(logging.Handler):
@@ -149,9 +134,9 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"stiction_ros {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, (module, text) in COMMANDS.items():
+    for name, (module, text) in _known(only).items():
         if only is None or name == only:
-            importlib.import_module(f"stiction_ros.cli.{module}").add(commands)
+            importlib.import_module(module).add(commands)
         else:
             commands.add_parser(name, help=text)
     return top
@@ -177,8 +162,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser("").print_help(sys.stderr)
         return USAGE
     try:
-        if command and command not in COMMANDS:
-            parser("").error(f"there is no command {command}{_meant(command, COMMANDS)}")
+        known = _known(command)
+        if command and command not in known:
+            if command in extensions.OF_STUDIES:
+                extensions.refuse(command)
+            parser("").error(f"there is no command {command}{_meant(command, known)}")
         options = parser(command).parse_args(given, argparse.Namespace(words=given))
         with waiting_for_compiler():
             return int(options.run(options))

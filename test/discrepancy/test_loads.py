@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from gap_loops import loop, record
 
-from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import Discrepancy, GapOptions, find_discrepancy
 from stiction_ros.discrepancy.candidate.wave import LoadCandidate, disturbance_candidates
 from stiction_ros.discrepancy.candidate.waves import A_FREQUENCY, StepWave
@@ -19,6 +18,7 @@ from stiction_ros.effects import (
     StepDisturbance,
     TriangleDisturbance,
 )
+from stiction_studies.blind.loops.generator import blind_loop
 
 QUICK = GapOptions(quick=True)
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from gap_loops import loop, record
 
-from stiction_ros.blind.scores.world_scores import claims_of
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.decision.scores import all_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
-from stiction_ros.field.hidden import hidden_loop
 from stiction_ros.loop import LoopModel
+from stiction_studies.blind.scores.world_scores import claims_of
+from stiction_studies.field.hidden import hidden_loop
 
 
 @pytest.mark.parametrize(

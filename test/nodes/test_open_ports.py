@@ -84,7 +84,7 @@ def test_the_demonstration_of_the_bridge_opens_one_port_of_this_machine(tmp_path
     server = yaml.safe_load((tmp_path / "opcua" / "tank.tags.yaml").read_text())["server"]
     address = re.fullmatch(r"opc\.tcp://127\.0\.0\.1:(\d+)/plant", server)
     assert address is not None
-    (plant,) = [command for command in found if "stiction_ros.opcua.plant" in command]
+    (plant,) = [command for command in found if "stiction_studies.control_system" in command]
     assert found.pop(plant) == [f"0100007F:{int(address[1]):04X}"]
     assert {command: ports for command, ports in found.items() if ports} == {}
     assert len(nodes) >= 4

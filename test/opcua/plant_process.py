@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.opcua.plant import process
-from stiction_ros.opcua.plant.process import ACCOUNTS, PlantOptions
+from stiction_studies.control_system import process
+from stiction_studies.control_system.process import ACCOUNTS, PlantOptions
 
 BUDGET = 60.0  # s for anything to happen, on a busy machine
 USERS = tuple(ACCOUNTS)

@@ -10,8 +10,8 @@ from plant_process import PlantProcess
 
 from stiction_ros.cli.main import main
 from stiction_ros.opcua.intake.browsing import TagNames, loops_of
-from stiction_ros.opcua.plant.tags import NAMESPACE
 from stiction_ros.opcua.tag_map import TagMap
+from stiction_studies.control_system.tags import NAMESPACE
 
 
 @pytest.fixture(scope="module")

@@ -25,12 +25,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from stiction_ros.faults.bridge.relay import Relay
 from stiction_ros.nodes.opcua import OpcuaNode
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state, to_ns
 from stiction_ros.opcua.grant import GrantState
-from stiction_ros.opcua.plant.journal import UNDER_WAY
+from stiction_studies.control_system.journal import UNDER_WAY
+from stiction_studies.faults.bridge.relay import Relay
 
 OPS = (55.0, 45.0)
 

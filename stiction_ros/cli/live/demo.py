@@ -11,19 +11,23 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli.live import demo_opcua
+from stiction_ros.cli import extensions
 from stiction_ros.cli.output.progress import Bar, bar
 from stiction_ros.cli.runs.node_processes import NodeError, NodeProcesses, require_ros
 from stiction_ros.cli.runs.scenarios import SCENARIOS, find, loop_nodes
-from stiction_ros.cli.studies import compare
 from stiction_ros.errors import InputError, storing
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
 
 
+OPCUA = "opcua"
+OPCUA_HELP = "; opcua: the tank behind a control system"
+
+
 def add(commands: Any) -> None:
     """Add the command to the parser."""
+    opcua, compare = extensions.part("demo opcua"), extensions.part("demo --compare")
     parser = commands.add_parser(
         "demo",
         help="run a live loop: cycle, identify, swap, record, report",
@@ -34,7 +38,7 @@ def add(commands: Any) -> None:
         "scenario",
         nargs="*",
         metavar="SCENARIO",
-        help="tank, siso, or a file (default: both); opcua: the tank behind a control system",
+        help="tank, siso, or a file (default: both)" + (OPCUA_HELP if opcua else ""),
     )
     parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
@@ -45,29 +49,35 @@ def add(commands: Any) -> None:
         metavar="max|N",
         help="lockstep as fast as possible, or N simulated seconds per second (default: max)",
     )
-    compare.add_options(parser)
+    if compare is None:
+        parser.add_argument("--compare", action=extensions.Missing)
+    else:
+        compare.add_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.compare:
-        return compare.run(options)
-    compare.refuse_options(options)
+    compare = extensions.part("demo --compare")
+    if compare is not None:
+        if options.compare:
+            return int(compare.run(options))
+        compare.refuse_options(options)
     names = options.scenario or SCENARIOS
-    paths = [find(name) for name in names if name != demo_opcua.NAME]
+    paths = [find(name) for name in names if name != OPCUA]
+    opcua = extensions.needed_part("demo opcua") if OPCUA in names else None
     from stiction_ros.online.session import Scenario
 
     scenarios = [Scenario.load(path) for path in paths]
     require_ros()
     signal.signal(signal.SIGTERM, _interrupt)
     good = True
-    if demo_opcua.NAME in names:
-        directory = Path(options.out) / demo_opcua.NAME
-        demo_opcua.require()
+    if opcua is not None:
+        directory = Path(options.out) / OPCUA
+        opcua.require()
         _make_empty(directory)
-        with bar(f"{demo_opcua.NAME}: starting") as show:
-            good = demo_opcua.run(directory, options.seed, options.speed, show)
+        with bar(f"{OPCUA}: starting") as show:
+            good = opcua.run(directory, options.seed, options.speed, show)
     for scenario in scenarios:
         directory = Path(options.out) / scenario.name
         _make_empty(directory)

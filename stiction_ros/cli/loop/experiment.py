@@ -1,4 +1,4 @@
-"""``stiction experiment``: simulated experiments and plants, written as records."""
+"""``stiction experiment``: simulated identification experiments, written as records."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import shlex
 import sys
 from typing import Any
 
+from stiction_ros.cli import extensions
 from stiction_ros.cli.loop.fit_linear import limits_range
-from stiction_ros.cli.runs.seeds import add_jobs
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, prbs_experiment
@@ -16,20 +16,21 @@ from stiction_ros.loop.excitation import LEVELS, SWITCH_PROBABILITY
 from stiction_ros.records.csv.writer import write_csv
 
 DEFAULT_MODEL = "tank.loop.yaml"
+PRBS = (
+    "prbs: simulate an open-loop experiment on a loop model, in which every valve moves by a "
+    "random binary sequence of its own, as in Appendix A, and write its record."
+)
 
 
 def add(commands: Any) -> None:
     """Add the command to the parser."""
+    plant = extensions.part("experiment plant")
+    text = PRBS if plant is None else f"{PRBS} {plant.DESCRIPTION}"
     parser = commands.add_parser(
-        "experiment",
-        help="simulate an identification experiment, or the exports of a plant",
-        description="prbs: simulate an open-loop experiment on a loop model, in which every "
-        "valve moves by a random binary sequence of its own, as in Appendix A, and write its "
-        "record. plant: simulate many loops of a plant and write the exports of its historian, "
-        "in five forms and with everything wrong that exports have; the truth stands beside "
-        "the folder.",
+        "experiment", help="simulate an identification experiment", description=text
     )
-    parser.add_argument("name", choices=("prbs", "plant"), help="the experiment")
+    names = ("prbs",) if plant is None else ("prbs", "plant")
+    parser.add_argument("name", metavar=f"{{{','.join(names)}}}", help="the experiment")
     parser.add_argument(
         "--model", default=DEFAULT_MODEL, metavar="F", help=f"loop model ({DEFAULT_MODEL})"
     )
@@ -44,20 +45,20 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--keep-effects", action="store_true", help="valves as in the model (default: ideal)"
     )
-    parser.add_argument(
-        "--out", required=True, metavar="F", help="the record, F.csv, or the plant's folder"
-    )
-    parser.add_argument("--loops", type=int, default=500, metavar="N", help="of a plant (500)")
-    add_jobs(parser)
+    parser.add_argument("--out", required=True, metavar="F", help="where the result is written")
+    if plant is not None:
+        plant.add_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    if options.name not in ("prbs", "plant"):
+        raise InputError(
+            f"unknown experiment {options.name!r}", where="stiction experiment", fix="use prbs"
+        )
     if options.name == "plant":
-        from stiction_ros.cli.loop.experiment_plant import run_plant
-
-        return run_plant(options)
+        return int(extensions.needed_part("experiment plant").run_plant(options))
     if options.samples < 2:
         raise InputError(f"{options.samples} is too few", where="--samples", fix="use 2 or more")
     model = LoopModel.load(find_config(options.model))

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from stiction_ros import paper
-from stiction_ros.blind.loops.truth import FAMILIES as BLIND
 from stiction_ros.cli.loop import gap
 from stiction_ros.cli.options import choices
 from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart, WeightPreset
 from stiction_ros.discrepancy import GapVerdict
-from stiction_ros.examples import FAMILIES, NOISES, PLANTS, control_study
-from stiction_ros.examples.control_cases import CASES
-from stiction_ros.examples.control_study import SCHEDULES
-from stiction_ros.field import MANY
-from stiction_ros.field.hidden import FAMILIES as HIDDEN
-from stiction_ros.field.hidden import GIVEN
 from stiction_ros.identification import METHODS
 from stiction_ros.identification.answer.loop_kind import LoopKind
 from stiction_ros.identification.friction.grid import laws
 from stiction_ros.identification.linear.data import LinearKind, OrderCriterion
 from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
 from stiction_ros.identification.options import LOOP_KINDS
+from stiction_studies.blind.loops.truth import FAMILIES as BLIND
+from stiction_studies.examples import FAMILIES, NOISES, PLANTS, control_study
+from stiction_studies.examples.control_cases import CASES
+from stiction_studies.examples.control_study import SCHEDULES
+from stiction_studies.field import MANY
+from stiction_studies.field.hidden import FAMILIES as HIDDEN
+from stiction_studies.field.hidden import GIVEN
 
 
 def test_every_choice_is_known_and_none_is_missing() -> None:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from gap_loops import loop, record, without_controller
 
-from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
 from stiction_ros.discrepancy.data.gate import Gate, look_at_data, open_gate, quantum_of
 from stiction_ros.discrepancy.simulation.free_run import join_records
 from stiction_ros.effects import Behaviour, Clip, Freeze, Quantisation, TimeShift, Tuning
 from stiction_ros.loop import PiTuning
+from stiction_studies.blind.loops.generator import blind_loop
 
 
 def gate_of(effect: Behaviour | None) -> Gate:

@@ -7,14 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from stiction_ros.blind.loops.generator import blind_loop
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus, check_controller
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.effects import Tuning
-from stiction_ros.field.hidden import hidden_loop
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.model import PiTuning
+from stiction_studies.blind.loops.generator import blind_loop
+from stiction_studies.field.hidden import hidden_loop
 
 QUICK = GapOptions(quick=True)
 

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 from evidence_loops import pi_loop
 
-from stiction_ros.field import field_loop
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
 from stiction_ros.identification.closed_loop.explanation import MATERIAL
 from stiction_ros.identification.evidence import engine
@@ -27,6 +26,7 @@ from stiction_ros.identification.evidence.verdict import (
 from stiction_ros.identification.result.cause import Cause, CauseKind
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.parts import longest_part
+from stiction_studies.field import field_loop
 
 
 def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from evidence_loops import FloatArray, pi_loop
 
-from stiction_ros.field import field_loop
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.fit.problem import Problem
@@ -15,6 +14,7 @@ from stiction_ros.identification.evidence.rates import looks
 from stiction_ros.identification.evidence.search import better, search
 from stiction_ros.records import Record
 from stiction_ros.records.parts import longest_part
+from stiction_studies.field import field_loop
 
 PERIOD = 43.7
 

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.effects import FloatArray, HeStiction
-from stiction_ros.examples import example2
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.exact.growing_patterns import (
     Branch,
@@ -34,6 +33,7 @@ from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, window
 from stiction_ros.identification.switching.patterns import Beginning, beginning_of, cells_at
 from stiction_ros.identification.switching.rectangles import area
+from stiction_studies.examples import example2
 
 
 def random_walk(seed: int, samples: int = 200) -> FloatArray:

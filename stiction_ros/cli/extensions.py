@@ -1,0 +1,80 @@
+"""Commands, and parts of commands, that another distribution brings.
+
+A distribution names a table under an entry point of the group ``stiction.commands``. Its keys are
+the names of commands, or of parts of a command as they are typed (``demo opcua``, ``demo
+--compare``); its values are the module and what ``--help`` says.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from collections.abc import Mapping
+from importlib import metadata
+from typing import Any, NoReturn
+
+from stiction_ros.errors import InputError
+
+GROUP = "stiction.commands"
+STUDIES = "stiction-studies"
+OF_STUDIES = (
+    *("bench", "example", "faults", "paper", "soak", "study", "study-change", "study-control"),
+    *("study-monitor", "study-wear", "demo opcua", "demo --compare", "experiment plant"),
+)
+"""What ``stiction-studies`` brings, so that the command can say so where it is not installed."""
+
+Table = Mapping[str, tuple[str, str]]
+
+
+def brought() -> Table:
+    """Return module and help of all that other distributions bring, by name."""
+    found: dict[str, tuple[str, str]] = {}
+    for entry in metadata.entry_points(group=GROUP):
+        found |= entry.load()
+    return found
+
+
+def commands() -> Table:
+    """Return module and help of the whole commands among them, by name."""
+    return {name: told for name, told in brought().items() if " " not in name}
+
+
+def part(name: str) -> Any | None:
+    """Return the module of a part of a command; None where nothing brings it."""
+    table = brought()
+    return importlib.import_module(table[name][0]) if name in table else None
+
+
+def needed_part(name: str) -> Any:
+    """Return the module of a part of a command.
+
+    Raises:
+        InputError: nothing that is installed brings it.
+    """
+    module = part(name)
+    if module is None:
+        refuse(name)
+    return module
+
+
+def refuse(name: str) -> NoReturn:
+    """Raise InputError: the command, or the part of one, comes with the studies."""
+    raise InputError(
+        f"comes with the distribution {STUDIES}, which is not installed",
+        where=f"stiction {name}",
+        fix=f"install {STUDIES} beside stiction_ros",
+    )
+
+
+class Missing(argparse.Action):
+    """An option that comes with another distribution, which is not installed."""
+
+    def __init__(self, option_strings: Any, dest: str, **_: Any) -> None:
+        """Take no value, and show nothing in ``--help``."""
+        super().__init__(option_strings, dest, nargs=0, default=False, help=argparse.SUPPRESS)
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: Any = None
+    ) -> NoReturn:
+        """Raise InputError with what brings it."""
+        refuse(f"{parser.prog.rpartition(' ')[2]} {option}")

@@ -1,1 +1,0 @@
-"""Commands of the studies: examples, the paper, scenarios over many seeds."""

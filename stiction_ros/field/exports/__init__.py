@@ -1,5 +1,0 @@
-"""A plant of loops of the field, exported as historians do, with everything wrong."""
-
-from stiction_ros.field.exports.plant import export_plant
-
-__all__ = ["export_plant"]

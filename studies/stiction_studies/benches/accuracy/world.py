@@ -1,0 +1,204 @@
+"""``stiction bench world``: the discrepancy workflow over loops that share nothing with it."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.output.as_json import hand_over
+from stiction_ros.cli.runs.seeds import run_each
+from stiction_ros.errors import InputError, storing
+from stiction_ros.json_values import json_text
+from stiction_studies.benches.accuracy.gap import matrix_table, rate_table
+from stiction_studies.benches.accuracy.judged import check_seeds, logged_rows, start_log
+from stiction_studies.commands import choices
+
+if TYPE_CHECKING:
+    from stiction_studies.blind.scores.world_scores import WorldScore
+
+FIRST_SEED = 100_000  # seeds below 1000 are for tuning
+LOOPS = 20
+LOG = "bench_world.jsonl"
+
+Case = tuple[str, str, int]  # family, kind of model, seed
+
+
+@dataclasses.dataclass(frozen=True)
+class WorldBench:
+    """What is run.
+
+    Attributes:
+        families, givens: of the loops.
+        first, loops: seeds of each, ``loops`` of them from ``first`` on.
+        full: bootstraps instead of stored thresholds.
+    """
+
+    families: tuple[str, ...] = ("single",)
+    givens: tuple[str, ...] = ("exact",)
+    first: int = FIRST_SEED
+    loops: int = LOOPS
+    full: bool = False
+
+    def __post_init__(self) -> None:
+        check_seeds(self.first, self.loops)
+        if "outside" in self.families:
+            raise InputError(
+                "no loop of the field lies outside the catalogue",
+                where="--family outside",
+                fix="use stiction bench gap for it",
+            )
+
+    @property
+    def cases(self) -> list[Case]:
+        """Family, kind of model and seed of every loop."""
+        seeds = range(self.first, self.first + self.loops)
+        return [(f, g, seed) for f in self.families for g in self.givens for seed in seeds]
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the option that ``bench gap`` has not."""
+    group = parser.add_argument_group("world; --family to --resume as for gap")
+    group.add_argument(
+        "--given",
+        action="append",
+        choices=choices.GIVEN,
+        help="the loop model knows the plant exactly, or is off by 3 to 10 %%; may be repeated "
+        "(exact)",
+    )
+
+
+def run(options: argparse.Namespace, machine: str) -> int:
+    """Run the benchmark."""
+    from stiction_studies.blind.scores.world_tally import report
+
+    chosen = {
+        "families": tuple(dict.fromkeys(options.family)) if options.family else None,
+        "givens": tuple(dict.fromkeys(options.given)) if options.given else None,
+        "first": options.first,
+        "loops": options.loops,
+        "full": options.full,
+    }
+    bench = WorldBench(**{key: value for key, value in chosen.items() if value is not None})
+    if options.write is not None:
+        write_loops(bench, Path(options.write))
+        return 0
+    log = Path(options.log or LOG)
+    rows = _read_log(log, bench) if options.resume else {}
+    if not options.resume:
+        start_log(log)
+    todo = [case for case in bench.cases if case not in rows]
+    judged = run_each(
+        functools.partial(judge, bench.full, log), todo, options.jobs or 1, f"{len(todo)} loops"
+    )
+    rows |= dict(zip(todo, judged, strict=True))
+    ordered = [rows[case] for case in bench.cases]
+    hand_over(
+        options.json, {"name": "world", "machine": machine} | report(ordered), lambda: show(ordered)
+    )
+    return 0
+
+
+def judge(full: bool, log: Path, case: Case) -> WorldScore:
+    """Run the workflow on one loop and compare; it sees model and record alone."""
+    from stiction_ros.discrepancy import GapOptions, find_discrepancy
+    from stiction_ros.loop import LoopModel
+    from stiction_studies.blind.scores.world_scores import score
+    from stiction_studies.field.hidden import hidden_loop
+    from stiction_studies.field.hidden.oracle import oracle
+
+    family, given, seed = case
+    loop = hidden_loop(seed, family, given)
+    model = LoopModel.from_mapping(loop.given)
+    begun = time.process_time()
+    found = find_discrepancy(model, [loop.record], GapOptions(quick=not full))
+    seconds = time.process_time() - begun
+    row = score(loop, given, found.to_json(), oracle(loop), seconds)
+    line = json_text({"full": full} | row.to_mapping(), indent=None) + "\n"
+    with log.open("ab", buffering=0) as file:  # one write: workers share the file
+        file.write(line.encode())
+    return row
+
+
+def write_loops(bench: WorldBench, folder: Path) -> None:
+    """Write every loop to ``folder/loops/FAMILY_MODEL_SEED``, its answer to ``folder/answers``."""
+    from stiction_ros.loop import LoopModel
+    from stiction_ros.records.csv.writer import write_csv
+    from stiction_studies.field.hidden import hidden_loop
+
+    for family, given, seed in bench.cases:
+        loop = hidden_loop(seed, family, given)
+        name = f"{family}_{given}_{seed}"
+        seen, answers = folder / "loops" / name, folder / "answers"
+        answer = {
+            "cause": loop.cause,
+            "hidden": [dataclasses.asdict(effect) for effect in loop.hidden],
+            "also": sorted(loop.also),
+            "surroundings": dataclasses.asdict(loop.surroundings),
+        }
+        with storing(seen):
+            seen.mkdir(parents=True, exist_ok=True)
+            answers.mkdir(parents=True, exist_ok=True)
+            write_csv(loop.record, seen / "record.csv")
+            LoopModel.from_mapping(loop.given).save(seen / "model.loop.yaml")
+            (answers / f"{name}.json").write_text(json_text(answer) + "\n", encoding="utf-8")
+
+
+def show(rows: Sequence[WorldScore]) -> None:
+    """Print the matrix and the rates of every family and kind of model."""
+    from stiction_studies.blind.scores.tally import matrix
+    from stiction_studies.blind.scores.world_tally import median_closed, rates, seconds
+
+    console = Console()
+    for family, given in dict.fromkeys((row.family, row.given) for row in rows):
+        part = [row for row in rows if (row.family, row.given) == (family, given)]
+        console.print(f"family {family}, model {given}")
+        console.print(matrix_table(matrix(part)))
+        console.print(rate_table(rates(part)))
+        console.print(_split_table(part))
+        console.print(_misses(part))
+        middle, largest = seconds(part)
+        console.print(
+            f"closed by what was right, median: {median_closed(part):.3f} (>= 0.9); "
+            f"seconds of CPU: {middle:.1f} in the median, {largest:.1f} at most"
+        )
+
+
+def _split_table(rows: Sequence[WorldScore]) -> Table:
+    """Return what is wrong and right by plant and circumstance."""
+    from stiction_studies.blind.scores.world_tally import TESTABLE, splits
+
+    table = Table("", "loops", "claims what is not there", "right, oracle gains 20", box=SIMPLE)
+    for name, part in splits(rows).items():
+        testable = [row for row in part if row.gain() >= TESTABLE]
+        right = f"{sum(row.right for row in testable)} of {len(testable)}"
+        table.add_row(name, str(len(part)), str(sum(row.alarm for row in part)), right)
+    return table
+
+
+def _misses(rows: Sequence[WorldScore]) -> Table:
+    """Return the loops in which something is said that is not there, or nothing at all."""
+    table = Table("seed", "hidden", "said", "oracle", "plant and circumstances")
+    for row in rows:
+        if row.alarm or (not row.healthy and not row.right):
+            gains = f"{row.gain_over_none():.0f} / {row.gain():.0f}"
+            place = " ".join((row.plant, *row.circumstances))
+            table.add_row(str(row.seed), row.cause, row.said, gains, place)
+    return table
+
+
+def _read_log(log: Path, bench: WorldBench) -> dict[Case, WorldScore]:
+    """Return the rows of ``bench`` that the log has."""
+    from stiction_studies.blind.scores.world_scores import WorldScore
+
+    rows = logged_rows(log, bench.full, WorldScore.from_mapping)
+    by_case = {(row.family, row.given, row.seed): row for row in rows}
+    return {case: by_case[case] for case in bench.cases if case in by_case}

@@ -1,0 +1,209 @@
+"""The score of one answer about a loop of the field in which something is hidden."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from stiction_studies.blind.scores.scoring import Claim, claims_of
+from stiction_studies.field.hidden import Effect, HiddenLoop, Name
+from stiction_studies.field.hidden.effect import PROCESS, SENSOR, VALVE
+from stiction_studies.field.hidden.oracle import Gain, family
+
+_TURN = 2.0 * math.pi
+FRICTION = frozenset({(VALVE, "stiction"), (VALVE, "backlash")})
+LAGS = frozenset({(VALVE, "lag"), (PROCESS, "pole"), (SENSOR, "lag")})
+KEPT = ("verdict", "effects", "alternatives", "process_changes", "noise", "untestable", "notes")
+
+
+@dataclasses.dataclass(frozen=True)
+class WorldScore:
+    """One loop, judged.
+
+    Attributes:
+        family, given, seed: of the loop.
+        cause: what was hidden, for tables.
+        plant, circumstances: of the loop.
+        oracle: gains in ln L of each hidden effect, over no effect and over the best rival
+            outside its family.
+        wrong: names of what was named and is not there.
+        right: whether all that is hidden is named, or in doubt with its family, and nothing else.
+        silent: whether nothing was found but what the record holds besides.
+        sets: sets that were left in doubt.
+        held: of those, how many hold a truth.
+        said: in words.
+        closed: share of the held-out excess that is gone; NaN where nothing was found.
+        covered: per figure of a hidden effect that was found, whether its interval holds it.
+        seconds: processor time of the workflow.
+        answer: what the workflow said, abridged.
+    """
+
+    family: str
+    given: str
+    seed: int
+    cause: str
+    plant: str
+    circumstances: tuple[str, ...]
+    oracle: tuple[Mapping[str, Any], ...]
+    wrong: tuple[str, ...]
+    right: bool
+    silent: bool
+    sets: int
+    held: int
+    said: str
+    closed: float
+    covered: Mapping[str, bool]
+    seconds: float
+    answer: Mapping[str, Any]
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing was hidden."""
+        return self.cause == "none"
+
+    @property
+    def alarm(self) -> bool:
+        """Whether something was claimed that is not there: named, or a set without a truth."""
+        return bool(self.wrong) or self.held < self.sets
+
+    def gain(self) -> float:
+        """Return what the oracle gains by the least of the hidden effects, over all rivals."""
+        gains = [min(entry["none"], entry["rival"]) for entry in self.oracle]
+        return min(gains, default=math.nan)
+
+    def gain_over_none(self) -> float:
+        """Return what it gains by the largest of them over no effect."""
+        gains = [entry["none"] for entry in self.oracle]
+        return max(gains, default=math.nan)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the JSON mapping; a missing ``closed`` is null."""
+        values = dataclasses.asdict(self)
+        values["closed"] = None if math.isnan(self.closed) else self.closed
+        return values
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> WorldScore:
+        """Read what :meth:`to_mapping` wrote."""
+        closed = math.nan if values["closed"] is None else float(values["closed"])
+        lists = {key: tuple(values[key]) for key in ("circumstances", "wrong", "oracle")}
+        return cls(**{**values, **lists, "closed": closed})
+
+
+def score(
+    loop: HiddenLoop,
+    given: str,
+    answer: Mapping[str, Any],
+    oracle: tuple[Gain, ...],
+    seconds: float,
+) -> WorldScore:
+    """Judge one answer.
+
+    Args:
+        loop: with the answer.
+        given: ``exact`` or ``off``.
+        answer: the mapping of ``gap --json``.
+        oracle: of the loop.
+        seconds: processor time of the workflow.
+    """
+    claims = claims_of(answer)
+    may = loop.also | _changes(loop, answer)
+    if any(effect.mechanical for effect in loop.hidden):
+        may |= {(VALVE, "lag")}  # of the stem's actuator
+    families = [family(loop, effect) for effect in loop.hidden]
+    names = [_names(effect) for effect in loop.hidden]
+    there = may.union(*names)
+    wrong = tuple(_word(c.first) for c in claims if c.named and c.first not in there)
+    sets = [c for c in claims if not c.named]
+    gain_is_off = abs(loop.known.gain) != abs(loop.base.plant.gain)
+    in_doubt = there | ({(PROCESS, "gain")} if gain_is_off else set())  # a set says no direction
+    held = sum(bool(c.names & in_doubt) for c in sets)
+    found = [
+        any(_is_right(c, own, alike | may) for c in claims)
+        for own, alike in zip(names, families, strict=True)
+    ]
+    unknown = answer["verdict"] == "unknown"
+    closed = float(answer["gap"]["closed"]) if claims else math.nan
+    return WorldScore(
+        family=loop.family,
+        given=given,
+        seed=loop.seed,
+        cause=loop.cause,
+        plant=loop.surroundings.plant,
+        circumstances=loop.surroundings.names,
+        oracle=tuple(gain.to_mapping() for gain in oracle),
+        wrong=wrong,
+        right=not wrong and held == len(sets) and all(found) and not unknown,
+        silent=all(c.names <= loop.also for c in claims) and not unknown,
+        sets=len(sets),
+        held=held,
+        said=_said(claims, str(answer["verdict"])),
+        closed=closed,
+        covered=_covered(loop.hidden, claims),
+        seconds=seconds,
+        answer={key: answer[key] for key in KEPT if key in answer},
+    )
+
+
+def _names(effect: Effect) -> frozenset[Name]:
+    """Return the names under which an effect is right by itself."""
+    return FRICTION if effect.mechanical else frozenset({effect.key})
+
+
+def _changes(loop: HiddenLoop, answer: Mapping[str, Any]) -> frozenset[Name]:
+    """Return what is claimed of the process and mends an error of the model's process."""
+    true, known = loop.base.plant, loop.known
+    if true == known:
+        return frozenset()
+    later = true.slow + true.dead_time > known.slow + known.dead_time
+    found: set[Name] = set()
+    if later or true.slow > known.slow:
+        found |= LAGS
+    if later or true.dead_time > known.dead_time:
+        found |= {(PROCESS, "delay"), ("data", "time_shift")}
+    for entry in answer["effects"]:
+        if entry["effect"] == "gain":
+            larger = float(entry["parameters"]["factor"]) > 1.0
+            if larger is (abs(true.gain) > abs(known.gain)):
+                found.add((PROCESS, "gain"))
+    return frozenset(found)
+
+
+def _is_right(claim: Claim, own: frozenset[Name], alike: frozenset[Name]) -> bool:
+    if claim.named:
+        return claim.first in own
+    return bool(claim.names & own) and claim.names <= own | alike
+
+
+def _said(claims: tuple[Claim, ...], verdict: str) -> str:
+    words = [
+        _word(c.first) if c.named else "{" + ", ".join(sorted(map(_word, c.names))) + "}"
+        for c in claims
+    ]
+    if not words or verdict == "unknown":
+        words.append(verdict)
+    return " + ".join(words)
+
+
+def _word(name: Name) -> str:
+    return f"{name[0].partition(':')[0]} {name[1]}"
+
+
+def _covered(hidden: tuple[Effect, ...], claims: tuple[Claim, ...]) -> dict[str, bool]:
+    found = {}
+    for effect in hidden:
+        if effect.mechanical:
+            continue  # the mechanics of a stem have no figures of a loop model
+        for claim in claims:
+            if claim.first != effect.key:
+                continue
+            for key, (low, high) in claim.intervals.items():
+                if key not in effect.figures or key in effect.untold:
+                    continue
+                true, slack = effect.figures[key], effect.slack.get(key, 0.0)
+                if key == "phase":
+                    true += _TURN * round(((low + high) / 2.0 - true) / _TURN)
+                found[f"{effect.name}.{key}"] = low - slack <= true <= high + slack
+    return found

@@ -1,0 +1,66 @@
+"""What options of the studies may be, as words; studies/test/commands/test_choices.py checks them.
+
+The modules that give these words their meaning load slowly, and a mistyped option should be told
+at once.
+"""
+
+from __future__ import annotations
+
+from stiction_ros.cli.options.choices import METHODS
+
+COUNTED = METHODS
+"""Methods that ``stiction paper --success`` counts."""
+
+FIGURES = (1, 2, 3, 4, 5, 6)
+TABLES = (
+    "1",
+    "2",
+    "A.3",
+    "times",
+    "wells",
+    "success",
+    "laws",
+    "retuning",
+    "ablation",
+    "identified",
+)
+"""Exhibits of the paper."""
+
+NOISES = ("measurement", "equation")
+"""Where noise enters Example 1."""
+
+PLANTS = ("linear", "tank")
+"""Plants of Example 2."""
+
+HEALTHY = ("tight", "sine", "coloured")
+"""Why a loop without friction oscillates."""
+
+PRESETS = ("own", "corrected", "printed")
+WARM_STARTS = ("compensation", "search", "none")
+PROGRAMME_COSTS = ("revised", "plain")
+PRINTED_LAWS = ("he", "kano", "xch")
+SCHEDULES = ("held-out", "scenario")
+BLIND_FAMILIES = ("single", "two", "outside")
+PHYSICS = "physics"
+"""The family of loops of the field whose friction is by the mechanics of the stem."""
+
+GIVEN = ("exact", "off")
+
+CONTROL_CASES = (
+    "nominal",
+    "own_weights",
+    "both_20_low",
+    "both_20_high",
+    "low_and_high",
+    "high_and_low",
+    "true_50_more",
+    "known_50_more",
+    "C_B",
+    "T_A",
+    "F_B",
+    "two_valves",
+)
+"""What is not as known in ``study-control``."""
+
+MANY = 6
+"""Slips from which on a valve of the field has many."""

@@ -1,0 +1,42 @@
+"""``stiction experiment plant``: a folder of exports whose truth is known."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import sys
+from pathlib import Path
+
+from stiction_ros.cli.runs.seeds import add_jobs, run_each
+from stiction_ros.errors import InputError
+from stiction_studies.field import field_loop
+from stiction_studies.field.exports.plant import PlantLoop, export_plant, loop_seed, plant_loop
+
+DESCRIPTION = (
+    "plant: simulate many loops of a plant and write the exports of its historian, in five forms "
+    "and with everything wrong that exports have; the truth stands beside the folder."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a plant to those of ``stiction experiment``."""
+    parser.add_argument("--loops", type=int, default=500, metavar="N", help="of a plant (500)")
+    add_jobs(parser)
+
+
+def made(seed: int, number: int) -> PlantLoop:
+    """Return one loop of a plant; a worker process can run it."""
+    return plant_loop(field_loop(loop_seed(seed, number)), seed, number)
+
+
+def run_plant(options: argparse.Namespace) -> int:
+    """Make a plant and write it."""
+    if options.loops < 1:
+        raise InputError(f"{options.loops} is too few", where="--loops", fix="use 1 or more")
+    if options.seed < 0:
+        raise InputError(f"{options.seed} is negative", where="--seed", fix="use 0 or more")
+    work = functools.partial(made, options.seed)
+    loops = run_each(work, range(options.loops), options.jobs, f"plant: {options.loops} loops")
+    truth = export_plant(loops, options.seed, Path(options.out))
+    print(f"{options.out}: {len(loops)} loops; the truth: {truth}", file=sys.stderr)
+    return 0

@@ -1,0 +1,284 @@
+"""A long run of the nodes: what is missed, and whether memory grows."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.online.controller.live import HISTORY_SAMPLES
+from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.settings import from_mapping
+from stiction_studies.faults.loop.node_process import NodeProcess
+
+STARTED = ("recorder", "estimator", "controller", "plant")
+ENDED = ("plant", "controller", "estimator", "recorder")
+TENTH = 0.1
+READINGS = 5  # of memory, of which the median counts
+LOOK = 1.0  # s between two readings
+GROWTH = 1.02  # largest ratio of the memory at the end to that at a tenth
+# Keys of the statuses: what must be 0, and what is told besides.
+MISSED = (
+    ("controller", "missing"),
+    ("controller", "passed_over"),
+    ("estimator", "missed_samples"),
+    ("estimator", "bridged_samples"),
+)
+TOLD = (
+    ("plant", "late_op"),
+    ("plant", "unanswered"),
+    ("plant", "missed_ticks"),
+    ("plant", "shown_again"),
+    ("plant", "pv_to_op_ms_p999"),
+    ("plant", "pv_to_op_ms_max"),
+)
+STALL = 300.0  # s without a sample
+STAT = Path("/proc/stat")
+LONG = 2  # samples: the host has taken enough that one is missed
+TOLD_AFTER = 3  # looks within which a node tells of what it missed
+
+
+@dataclasses.dataclass(frozen=True)
+class Memory:
+    """Resident memory of one node, bytes: at a tenth of the run, and at its end."""
+
+    tenth: float
+    end: float
+
+    @property
+    def ratio(self) -> float:
+        """The end over the tenth."""
+        return self.end / self.tenth if self.tenth > 0.0 else math.nan
+
+
+@dataclasses.dataclass(frozen=True)
+class Soaked:
+    """How a long run went.
+
+    Attributes:
+        samples, seconds: how long it was.
+        missed: samples that were missed, by node and key.
+        told: what else the nodes have counted, by node and key.
+        kept: most samples of the past that a node keeps.
+        memory: of every node.
+        stolen: what the host has taken, see :class:`Stolen`; None where the system does not tell.
+        failures: nodes that ended when they should not have, a run that stood still.
+    """
+
+    samples: int
+    seconds: float
+    missed: Mapping[str, int]
+    told: Mapping[str, str]
+    kept: Mapping[str, int]
+    memory: Mapping[str, Memory]
+    failures: tuple[str, ...] = ()
+    stolen: Stolen | None = None
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why it fails; empty for a pass."""
+        found = list(self.failures)
+        if not self.samples:
+            found.append("no sample was seen")
+        if not self.missed:
+            found.append("no node has told what it missed")
+        found += [f"{key}: {count}" for key, count in self.missed.items() if count]
+        if not self.memory:
+            found.append("the memory of no node was seen")
+        for name, memory in self.memory.items():
+            if not memory.ratio <= GROWTH:
+                found.append(f"the memory of {name} is {memory.ratio:.3f} of that at a tenth")
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values."""
+        memory = {
+            name: {"tenth": one.tenth, "end": one.end, "ratio": one.ratio}
+            for name, one in self.memory.items()
+        }
+        plain = dataclasses.asdict(self) | {"memory": memory}
+        return plain | {"passed": not self.reasons, "reasons": self.reasons}
+
+
+@dataclasses.dataclass(frozen=True)
+class Stolen:
+    """Time that the host of a virtual machine has taken from its processors (``steal``).
+
+    What it takes no program can make up for: a sample of 10 ms does not outlast 20 ms without a
+    processor. It is told beside what was missed, and excuses nothing.
+
+    Attributes:
+        seconds: in all, of all processors.
+        largest: in one look, s.
+        looks: how often it was looked.
+        long: looks in which it took two samples or more.
+        missed: samples that were missed.
+        missed_then: of these, in or right after such looks.
+    """
+
+    seconds: float = 0.0
+    largest: float = 0.0
+    looks: int = 0
+    long: int = 0
+    missed: int = 0
+    missed_then: int = 0
+
+
+class StolenWatch:
+    """Follows what the host takes, and what is missed meanwhile."""
+
+    def __init__(self, period: float) -> None:
+        """Begin; ``period`` is the wall time of a sample, s."""
+        self.found = Stolen()
+        self._least = LONG * period
+        self._last: tuple[float, int] | None = None
+        self._recent = [False] * TOLD_AFTER
+
+    def look(self, stolen: float | None, missed: int) -> None:
+        """Note seconds taken since the system began, and samples missed since the run did."""
+        if stolen is None:
+            return
+        if self._last is not None:
+            taken, more = stolen - self._last[0], missed - self._last[1]
+            long = taken >= self._least > 0.0
+            self._recent = [*self._recent[1:], long]
+            self.found = Stolen(
+                self.found.seconds + taken,
+                max(self.found.largest, taken),
+                self.found.looks + 1,
+                self.found.long + long,
+                missed,
+                self.found.missed_then + (more if any(self._recent) else 0),
+            )
+        self._last = stolen, missed
+
+
+def stolen_seconds(stat: Path = STAT) -> float | None:
+    """Return the seconds that the host has taken so far; None where the system does not tell."""
+    try:
+        fields = stat.read_text(encoding="ascii").splitlines()[0].split()
+        return int(fields[8]) / os.sysconf("SC_CLK_TCK")
+    except (OSError, IndexError, ValueError):
+        return None
+
+
+class Readings:
+    """Memory of every node over a run, by the share of it that is done."""
+
+    def __init__(self) -> None:
+        """Start without readings."""
+        self._found: dict[str, list[tuple[float, int]]] = {}
+
+    def add(self, share: float, name: str, resident: int | None) -> None:
+        """Note one reading; None for a node that has ended."""
+        if resident is not None:
+            self._found.setdefault(name, []).append((share, resident))
+
+    def memory(self) -> dict[str, Memory]:
+        """Return each node's memory at a tenth and at the end; none where either is missing."""
+        found = {}
+        for name, readings in self._found.items():
+            later = [size for share, size in readings if share >= TENTH]
+            if len(later) < 2 * READINGS:
+                continue
+            first = statistics.median(later[:READINGS])
+            found[name] = Memory(first, statistics.median(later[-READINGS:]))
+        return found
+
+
+def soak(
+    nodes: Mapping[str, Mapping[str, Any]],
+    directory: Path,
+    seconds: float,
+    period: float,
+    progress: Callable[[float], None],
+) -> Soaked:
+    """Run the nodes until the plant has run its samples, or for ``seconds``.
+
+    Args:
+        nodes: parameters by node.
+        directory: for parameters, logs and the bag.
+        seconds: wall time; infinite for as long as the samples take.
+        period: wall time of a sample, s; 0 in lockstep, which waits for every one.
+        progress: told the share that is done.
+    """
+    from stiction_studies.faults.loop.fault_probe import Probe
+
+    environment = ros_environment()
+    probe = Probe(environment, topics=())
+    processes = {
+        name: NodeProcess(name, values, directory, environment) for name, values in nodes.items()
+    }
+    wanted = int(nodes["plant"].get("samples", 0))
+    readings, failures, watch = Readings(), list[str](), StolenWatch(period)
+    begun = time.monotonic()
+    last = (begun, 0)
+    try:
+        for name in STARTED:
+            processes[name].start()
+        while True:
+            time.sleep(LOOK)
+            now, sample = time.monotonic(), _number(probe.values, "plant", "sample")
+            share = max((now - begun) / seconds, sample / wanted if wanted else 0.0)
+            if processes["plant"].code is not None or share >= 1.0:
+                break
+            for name, process in processes.items():
+                readings.add(share, name, process.resident())
+                if process.code is not None:
+                    failures.append(f"{name} ended with code {process.code}")
+            watch.look(stolen_seconds(), sum(_missed(probe.values).values()))
+            last = (now, sample) if sample != last[1] else last
+            if now - last[0] > STALL:
+                failures.append(f"no sample for {STALL:g} s at sample {sample}")
+            if failures:
+                break
+            progress(share)
+        code = processes["plant"].code
+        if code:
+            failures.append(f"plant ended with code {code}")
+    finally:
+        took = time.monotonic() - begun
+        for name in ENDED:
+            if not processes[name].end():
+                failures.append(f"{name} did not end when it was asked to")
+        probe.close()
+    return Soaked(
+        _number(probe.values, "plant", "sample"),
+        took,
+        _missed(probe.values),
+        _values(probe.values, TOLD),
+        kept(nodes),
+        readings.memory(),
+        tuple(failures),
+        watch.found if watch.found.looks else None,
+    )
+
+
+def _number(values: Mapping[str, Mapping[str, str]], node: str, key: str) -> int:
+    return int(values.get(f"{node}: status", {}).get(key, 0))
+
+
+def _values(
+    values: Mapping[str, Mapping[str, str]], keys: Sequence[tuple[str, str]]
+) -> dict[str, str]:
+    return {
+        f"{node} {key}": values[f"{node}: status"][key]
+        for node, key in keys
+        if key in values.get(f"{node}: status", {})
+    }
+
+
+def _missed(values: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
+    return {key: int(value) for key, value in _values(values, MISSED).items()}
+
+
+def kept(nodes: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
+    """Return the most samples of the past that controller and estimator keep."""
+    window = from_mapping(EstimatorNodeSettings, nodes["estimator"], "estimator").window
+    return {"controller": HISTORY_SAMPLES, "estimator": window}

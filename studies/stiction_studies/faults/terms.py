@@ -1,0 +1,50 @@
+"""The terms of the suite: pace, phase, what is expected of the bag and of the diagnostics."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+
+class Pace(enum.StrEnum):
+    """Who waits for whom."""
+
+    REALTIME = "realtime"
+    LOCKSTEP = "lockstep"
+
+
+class Phase(enum.StrEnum):
+    """Whether the controller knows the friction when the fault comes."""
+
+    BEFORE = "before"
+    AFTER = "after"
+
+
+class Bag(enum.StrEnum):
+    """What is expected of the bag of the run."""
+
+    WHOLE = "whole"  # every pv and op_applied that was seen, and it can be read
+    READABLE = "readable"  # what it holds can be read
+    LOST = "lost"  # it was taken away
+
+
+BOTH_PACES = (Pace.REALTIME, Pace.LOCKSTEP)
+BOTH_PHASES = (Phase.BEFORE, Phase.AFTER)
+LEVELS = ("ok", "warn", "error")
+
+
+@dataclasses.dataclass(frozen=True)
+class Notice:
+    """A diagnostic that must show the fault, and end with it unless it ``stays``.
+
+    Attributes:
+        node: whose status.
+        level: warn or error; a worse one will do.
+        paces: in which it is expected.
+        stays: whether it may be shown for as long as the run lasts.
+    """
+
+    node: str
+    level: str
+    paces: tuple[Pace, ...] = BOTH_PACES
+    stays: bool = False

@@ -1,0 +1,233 @@
+"""The page of the Example 2 study: Figure 6 with two more columns, and its table."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from stiction_ros.control.problem.paper_weights import ProgrammeCost
+from stiction_ros.report.drawing import (
+    BLUE,
+    DPI,
+    GREY,
+    INK,
+    ORANGE,
+    Drawing,
+    data_limits,
+    style,
+)
+from stiction_ros.report.page import Cell, embedded, number, page, table, text
+from stiction_ros.report.run.story import TANK_UNITS
+from stiction_studies.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
+from stiction_studies.pages.control_scores import ColumnScore, mean_score, score_trial
+
+PLANT_TITLES = {"tank": "the nonlinear tank (A.1)", "linear": "the linear plant (A.3)"}
+_COLUMN_WIDTH, _ROW_HEIGHT = 3.1, 1.75  # inches
+
+
+@dataclasses.dataclass(frozen=True)
+class PlantStudy:
+    """All seeds on one plant.
+
+    Attributes:
+        options: what was compared.
+        trial: of the first seed, which is drawn.
+        scores: one mapping by column key for each seed.
+        seeds: in order.
+    """
+
+    options: StudyOptions
+    trial: Trial
+    scores: tuple[Mapping[str, ColumnScore], ...]
+    seeds: tuple[int, ...]
+
+    @classmethod
+    def of(cls, trials: Sequence[Trial]) -> PlantStudy:
+        """Score ``trials`` of one plant."""
+        scores = tuple(score_trial(trial) for trial in trials)
+        return cls(trials[0].options, trials[0], scores, tuple(trial.seed for trial in trials))
+
+    @property
+    def sticky(self) -> tuple[str, ...]:
+        """Tags of the valves with friction."""
+        return self.trial.sticky
+
+    def means(self) -> dict[str, ColumnScore]:
+        """Return the mean over the seeds by column key."""
+        return {c.key: mean_score([score[c.key] for score in self.scores]) for c in COLUMNS}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return options, means and the figures of every seed."""
+        return {
+            "options": dataclasses.asdict(self.options),
+            "seeds": list(self.seeds),
+            "columns": {
+                column.key: {
+                    "title": column.title,
+                    "mean": self.means()[column.key].to_json(),
+                    "by_seed": [score[column.key].to_json() for score in self.scores],
+                }
+                for column in COLUMNS
+            },
+        }
+
+
+_WORK = ("", "travel", "moves", "turns", "OP step")
+HEAD = ("", "PV", "IAE", "ISE", "offset", "cycle", *_WORK, "ms", "p99")
+
+
+def rows_of(study: PlantStudy, *, short: bool = False) -> list[list[str]]:
+    """Return the table: two rows per controller, each with an output and a valve.
+
+    ``short`` takes the short names of the controllers.
+    """
+    rows = []
+    for column in COLUMNS:
+        mean = study.means()[column.key]
+        sticky = study.sticky if column.sticky else ()
+        head = column.short if short else column.title
+        times = [number(mean.median_ms, 2), number(mean.p99_ms, 2)]
+        pairs = zip(mean.outputs.items(), mean.valves.items(), strict=True)
+        for (tag, score), (valve, moved) in pairs:
+            moves = [number(n) for n in (moved.moves, moved.reversals)]
+            if valve not in sticky:
+                moves = ["–", "–"]
+            sums = [number(score.iae), number(score.ise)]
+            errors = [number(score.offset, 2), number(score.amplitude, 2)]
+            work = [number(moved.travel), *moves, number(moved.op_step)]
+            figures = [*sums, *errors, valve, *work, *times]
+            rows.append([head, tag, *figures])
+            head, times = "", ["", ""]
+    return rows
+
+
+def report_study(studies: Sequence[PlantStudy], directory: Path) -> Path:
+    """Write ``compare.html`` and its figures as PNG and SVG, and return the page."""
+    parts = [
+        "<h1>Example 2: three formulations of the paper, one exact, one without friction</h1>",
+        f'<p class="kicker">{text(describe(studies[0]))}</p>',
+    ]
+    for study in studies:
+        drawing = draw_study(study)
+        drawing.save(directory)
+        (directory / f"{drawing.name}.svg").write_bytes(svg(drawing))
+        title = PLANT_TITLES[study.options.plant]
+        rows: list[list[Cell]] = [list(row) for row in rows_of(study)]
+        parts += [
+            f"<h2>{text(title[0].upper() + title[1:])}</h2>",
+            table(HEAD, rows, texts=2),
+            f"<p>{text(_choices(study))}</p>",
+            embedded(drawing),
+        ]
+    parts.append(f'<p class="note">{text(_NOTE)}</p>')
+    target = directory / "compare.html"
+    page_text = page("Example 2: controllers compared", parts)
+    target.write_text(page_text, encoding="utf-8")
+    return target
+
+
+_NOTE = (
+    "Means over the seeds. IAE, ISE (minutes), offset and cycle are those of the noise-free "
+    "outputs; cycle is the amplitude of the spectral line at the period of the unaware "
+    "controller's cycle, a dash where that has none. Travel of the stem in %, moves and turns of "
+    "a stem that sticks; OP step: the largest move of OP from one sample to the next, %. True "
+    "friction: f_S = 8 and f_D = 1 on V1; controllers know it unless said. Times are of this "
+    "machine and this run."
+)
+
+
+def describe(study: PlantStudy) -> str:
+    """Return what was run, in a line."""
+    options = study.options
+    seeds = f"seed {study.seeds[0]}"
+    if len(study.seeds) > 1:
+        seeds = f"seeds {study.seeds[0]} to {study.seeds[-1]}"
+    moves = "set-points of the scenario"
+    if options.schedule == "held-out":
+        moves = f"held-out set-points, a move every {options.hold} min"
+    told = [
+        seeds,
+        moves,
+        f"weights of SU and SI: {options.preset.value}",
+        f"warm start of SE as printed: {options.warm_start.value}",
+    ]
+    if options.programme_cost is not ProgrammeCost.REVISED:
+        told.append(f"its cost: {options.programme_cost.value}")
+    if options.law != "he":
+        told.append(f"law of the valve: {options.law}")
+    if options.known is not None:
+        pairs = ", ".join(f"{static:g} / {dynamic:g}" for static, dynamic in options.known)
+        told.append(f"controllers take f_S / f_D for {pairs} %")
+    return "; ".join(told)
+
+
+def draw_study(study: PlantStudy) -> Drawing:
+    """Draw outputs, OP and stems of the first seed, one column per controller."""
+    trial = study.trial
+    with style():
+        record = trial.runs["unaware"].run.record
+        rows = len(record.outputs) + len(record.valves)
+        size = (_COLUMN_WIDTH * len(COLUMNS), 0.8 + _ROW_HEIGHT * rows)
+        figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+        axes = figure.subplots(rows, len(COLUMNS), squeeze=False, sharex=True, sharey="row")
+        for j, column in enumerate(COLUMNS):
+            _draw_column(axes[:, j], trial.runs[column.key])
+            axes[0, j].set_title(column.title)
+            axes[-1, j].set_xlabel("time (h)")
+        for i, tag in enumerate(record.outputs):
+            values = [trial.runs[c.key].run.pv_clean[:, i] for c in COLUMNS]
+            data_limits(axes[i, 0], values)
+            axes[i, 0].set_ylabel(f"{tag} ({TANK_UNITS[tag]})")
+        for i, tag in enumerate(record.valves, start=len(record.outputs)):
+            axes[i, 0].set_ylabel(f"{tag} (%)")
+        lines = [*axes[0, 0].get_lines(), *axes[len(record.outputs), 0].get_lines()]
+        named = [line for line in lines if not line.get_label().startswith("_")]
+        figure.legend(handles=named, loc="outside upper left", ncols=len(named))
+    plant = PLANT_TITLES[study.options.plant]
+    return Drawing(
+        f"figure6_{study.options.plant}",
+        f"Figure 6 on {plant}",
+        f"Process outputs, controller outputs and stems; seed {trial.seed}. The columns carry "
+        "the same noise and the same set-points.",
+        figure,
+    )
+
+
+def svg(drawing: Drawing) -> bytes:
+    """Return the figure as SVG."""
+    target = io.BytesIO()
+    with style():
+        canvas: Any = FigureCanvasSVG(drawing.figure)  # type: ignore[no-untyped-call,unused-ignore]
+        canvas.print_svg(target, metadata={"Date": None})
+    return target.getvalue()
+
+
+def _draw_column(axes: Any, column: ColumnRun) -> None:
+    record = column.run.record
+    assert record.sp is not None
+    assert record.stem is not None
+    hours = record.time / 3600.0
+    count = len(record.outputs)
+    for i in range(count):
+        axes[i].plot(hours, record.sp[:, i], color=INK, drawstyle="steps-post", label="SP")
+        axes[i].plot(hours, record.pv[:, i], color=GREY, linewidth=0.5, alpha=0.6)
+        axes[i].plot(hours, column.run.pv_clean[:, i], color=BLUE, label="PV without noise")
+    for j in range(len(record.valves)):
+        axis = axes[count + j]
+        axis.plot(hours, record.op[:, j], color=GREY, linewidth=0.8, label="OP u")
+        axis.plot(hours, record.stem[:, j], color=ORANGE, drawstyle="steps-post", label="stem χ")
+    axes[0].set_xlim(hours[0], hours[-1])
+
+
+def _choices(study: PlantStudy) -> str:
+    share = study.means()["printed"].from_warm_start
+    return (
+        f"SE as printed: IPOPT's answer was applied in {100 * (1 - share):.1f} % of the steps, "
+        f"its warm start, cheaper under the hard model, in {100 * share:.1f} %."
+    )

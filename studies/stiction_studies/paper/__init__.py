@@ -1,0 +1,1 @@
+"""The figures and tables of the paper, printed beside those of this package."""

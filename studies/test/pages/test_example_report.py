@@ -1,0 +1,85 @@
+"""The report of an example."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiction_ros.identification import Identification, IdentificationOptions, identify
+from stiction_ros.report.drawing import style
+from stiction_studies.examples import Example, compare, example1, example2, healthy_loop
+from stiction_studies.pages.example_report import draw_example, report_example, window
+
+FAST = IdentificationOptions(output_order=1, input_order=1, delay=(0, 0))
+
+
+@pytest.fixture(scope="module")
+def tank() -> Example:
+    return example2(1, "tank", 620)
+
+
+@pytest.fixture(scope="module")
+def found(tank: Example) -> Identification:
+    return identify(tank.record, FAST)
+
+
+def test_the_page_stands_alone(tank: Example, found: Identification, tmp_path: Path) -> None:
+    target = tmp_path / "report.html"
+    assert report_example(tank, found, compare(tank, found), target) == target
+    page = target.read_text(encoding="utf-8")
+    links = re.findall(r"""(?:src|href)\s*=\s*["']([^"']+)""", page)
+    assert all(link.startswith("data:") for link in links)
+    assert "Example 2" in page
+    assert "the nonlinear tank (A.1), seed 1" in page
+    assert "Stem error (1/m)" in page
+    assert "true 8" in page
+
+
+def test_a_truth_outside_its_interval_stands_out(
+    tank: Example, found: Identification, tmp_path: Path
+) -> None:
+    valve = dataclasses.replace(found.valves[0], static_interval=(8.5, 9.0))
+    wrong = dataclasses.replace(found, valves=(valve, found.valves[1]))
+    page = report_example(tank, wrong, compare(tank, wrong), tmp_path / "p.html")
+    assert '<td class="bad">8.500 … 9.000</td>' in page.read_text(encoding="utf-8")
+
+
+def test_step_responses_are_drawn_per_channel(tank: Example, found: Identification) -> None:
+    with style():
+        steps, part, whole, curves = draw_example(tank, found)
+    assert [d.name for d in (steps, part, whole, curves)] == [
+        "step_responses",
+        "window",
+        "record",
+        "valve_curves",
+    ]
+    assert [len(axis.lines) for axis in steps.figure.axes] == [2, 2, 2, 2]
+    titles = [axis.get_title(loc="left") for axis in steps.figure.axes]
+    assert titles == ["V1 → C", "V2 → C", "V1 → T", "V2 → T"]
+
+
+def test_trends_show_measured_and_estimated_signals(tank: Example, found: Identification) -> None:
+    with style():
+        part = draw_example(tank, found)[1]
+    output, *_, valve = part.figure.axes
+    labels = [[line.get_label() for line in axis.lines] for axis in (output, valve)]
+    assert labels[0] == ["PV, measured", "SP", "one-step estimate", "free run"]
+    assert labels[1] == ["OP u", "stem χ, true", "stem χ̂, estimated"]
+
+
+def test_the_window_holds_a_set_point_move() -> None:
+    for example in (example1(1), example2(1)):
+        part = window(example)
+        assert part.stop - part.start == len(example.record) // 5
+        assert example.record.sp is not None
+        assert np.ptp(example.record.sp[part], axis=0).max() > 0.0
+
+
+def test_a_record_without_moves_has_a_window_too() -> None:
+    example = healthy_loop(3, "sine")
+    part = window(example)
+    assert 0 <= part.start < part.stop <= len(example.record)
