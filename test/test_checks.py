@@ -7,10 +7,10 @@ import pytest
 
 from stiction_ros import HeStiction
 from stiction_ros.checks import LONGEST, number, shown
-from stiction_ros.control import ControlSettings
 from stiction_ros.errors import InputError
 from stiction_ros.loop.yaml.reading import Section
 from stiction_ros.settings import from_mapping
+from stiction_ros.tuning import ControlSettings
 
 WRONG: dict[str, tuple[Any, dict[str, Any], str]] = {
     "text": ("1e-3", {}, "place: '1e-3' is no number; write 0.001"),

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.control import ControlMode, ControlSettings, FrictionSpread, MpcController
+from stiction_ros.control import ControlMode, FrictionSpread, MpcController
 from stiction_ros.control.design import ControlDesign, History
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
@@ -39,6 +39,7 @@ from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop import LoopModel
+from stiction_ros.tuning import ControlSettings
 
 MOVE_SHARE = 2.0
 """ρ: moves of the stem against what they do to PV."""

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.effects import Behaviour, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, Plant
+from stiction_ros.tuning import ControlSettings
 
 SISO = LoopModel.load(find_config("example1_process.loop.yaml"))
 TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))

@@ -15,7 +15,7 @@ import pytest
 
 from stiction_ros import effects
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.data.gate import SHOWN
@@ -27,6 +27,7 @@ from stiction_ros.identification.friction.grid import find_law, laws
 from stiction_ros.loop import LoopModel, SetPoints, simulate
 from stiction_ros.online.handover.known_friction import frictions_of
 from stiction_ros.records.record import Record
+from stiction_ros.tuning import ControlSettings
 
 LAW = Path(__file__).resolve().parents[2] / "examples" / "10_add_a_friction_law.py"
 EFFECT = '''

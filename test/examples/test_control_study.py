@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.control.problem.paper_weights import WeightPreset
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.examples.control_study import (
@@ -20,6 +19,7 @@ from stiction_ros.examples.control_study import (
     held_out_set_points,
     run_trial,
 )
+from stiction_ros.paper.controllers.weights import WeightPreset
 
 SHORT = StudyOptions(plant="linear", hold=40)
 START = np.array([7.5, 42.324])

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.gain.retuning import frequencies
 from stiction_ros.gain.swiftness import predictive_response
 from stiction_ros.loop import LoopModel
+from stiction_ros.tuning import ControlSettings
 
 MODEL = {
     "loop": "FIC1",

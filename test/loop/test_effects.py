@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlSettings
 from stiction_ros.effects import Behaviour, behaviours, from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, simulate_open_loop
+from stiction_ros.tuning import ControlSettings
 
 PLACES = ("valve", "load", "process", "disturbance", "sensor")
 PAIRS = [(kind, place) for kind in behaviours() for place in PLACES if place in kind.places]

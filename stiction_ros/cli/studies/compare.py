@@ -127,8 +127,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _study(options: argparse.Namespace, plant: str) -> StudyOptions:
-    from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart, WeightPreset
     from stiction_ros.examples.control_study import StudyOptions
+    from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, WeightPreset
 
     chosen: dict[str, Any] = {
         "preset": WeightPreset(options.preset or WeightPreset.OWN),

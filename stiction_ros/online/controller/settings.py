@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 
-from stiction_ros.control import ControlMode, ControlSettings
+from stiction_ros.control import ControlMode
 from stiction_ros.online.handover.offers import OfferRule
 from stiction_ros.online.handover.watch import WatchRule
 from stiction_ros.online.schedule import FitSchedule
 from stiction_ros.settings import setting
+from stiction_ros.tuning import ControlSettings
 
 AUTO = "auto"
 

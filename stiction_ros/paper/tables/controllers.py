@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart
 from stiction_ros.examples import example2_of_one_round
 from stiction_ros.examples.control_study import COLUMNS, Column, StudyOptions, run_trial
 from stiction_ros.identification import Identification
+from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart
 from stiction_ros.paper.exhibit import Exhibit, Row
 from stiction_ros.paper.methods import identify
 from stiction_ros.paper.settings import EXAMPLES

@@ -11,8 +11,8 @@ from typing import Any
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from stiction_ros.control.problem.paper_weights import ProgrammeCost
 from stiction_ros.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
+from stiction_ros.paper.controllers.weights import ProgrammeCost
 from stiction_ros.report.drawing import (
     BLUE,
     DPI,

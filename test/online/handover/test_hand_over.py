@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.control import ControlMode, MpcController
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.handover.background import AtOnce, Beside
 from stiction_ros.online.handover.hand_over import HandOver
 from stiction_ros.online.handover.past import Past
+from stiction_ros.tuning import ControlSettings
 
 PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
 DESIGN = ControlSettings(hand_over_samples=60).design(PROCESS)

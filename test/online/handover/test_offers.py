@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, History, MpcController
+from stiction_ros.control import ControlMode, History, MpcController
 from stiction_ros.effects import HeStiction
 from stiction_ros.loop import LoopModel, SetPoints, simulate_closed_loop
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.handover.offers import Judge, Maker, OfferRule
+from stiction_ros.tuning import ControlSettings
 
 PLANT = LoopModel.load(find_config("example1.loop.yaml"))
 PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlSettings
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
+from stiction_ros.tuning import ControlSettings
 
 TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
 
