@@ -7,7 +7,7 @@ next.
 Floors, lowest first; each imports only what stands below it, and nothing below
 :mod:`stiction_ros.nodes` imports rclpy::
 
-    effects  processes  records  loop  identification  control  online  report  cli  nodes
+    effects  processes  records  loop  identification  control  tuning  online  report  cli  nodes
 
 Examples:
     >>> from stiction_ros import LoopModel, find_config, identify, simulate
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from stiction_ros.control.controller import MpcController as MpcController
     from stiction_ros.control.result import ControlMode as ControlMode
     from stiction_ros.control.result import StepResult as StepResult
-    from stiction_ros.control.settings import ControlSettings as ControlSettings
+    from stiction_ros.control_settings import ControlSettings as ControlSettings
     from stiction_ros.discrepancy.answer.results import Discrepancy as Discrepancy
     from stiction_ros.discrepancy.decision.decide import GapVerdict as GapVerdict
     from stiction_ros.discrepancy.options import GapOptions as GapOptions
@@ -66,7 +66,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Behaviour": "effects.behaviour",
     "ControlMode": "control.result",
-    "ControlSettings": "control.settings",
+    "ControlSettings": "control_settings",
     "CsvColumns": "intake.options",
     "Discrepancy": "discrepancy.answer.results",
     "GapOptions": "discrepancy.options",

@@ -3,13 +3,11 @@
 from stiction_ros.control.controller import MpcController
 from stiction_ros.control.design import ControlDesign, History
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
-from stiction_ros.control.settings import ControlSettings
 from stiction_ros.control.valves.jump_form import FrictionSpread
 
 __all__ = [
     "ControlDesign",
     "ControlMode",
-    "ControlSettings",
     "FrictionSpread",
     "History",
     "MpcController",

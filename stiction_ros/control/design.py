@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
+from stiction_ros.control.formulations.aware import AwareFormulations
 from stiction_ros.control.formulations.embedding import EmbeddingTuning
 from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.problem.paper_weights import PaperTuning
 from stiction_ros.control.state.observer import ObserverTuning
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
@@ -32,7 +32,7 @@ class ControlDesign:
         longest_wait: samples for which a jump waits for the disturbance estimate to come to rest.
         gap_samples: free samples of the optimality gap of each step; 0 leaves it out.
         valve_names, output_names: for messages; numbers stand in where empty.
-        paper: the paper's own embedding and inversion; None for those of this package.
+        others: makes embedding and inversion in place of the exact ones; None for these.
     """
 
     model: LinearModel
@@ -49,7 +49,7 @@ class ControlDesign:
     gap_samples: int = 0
     valve_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
-    paper: PaperTuning | None = None
+    others: AwareFormulations | None = None
 
     def without_rates(self) -> ControlDesign:
         """Return the design without rate limits, for a controller that moves nothing."""

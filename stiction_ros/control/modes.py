@@ -9,8 +9,6 @@ from stiction_ros.control.formulations.embedding import EmbeddingMpc
 from stiction_ros.control.formulations.formulation import Formulation
 from stiction_ros.control.formulations.inversion import InversionMpc
 from stiction_ros.control.formulations.unaware import UnawareMpc
-from stiction_ros.control.printed.embedding import PrintedEmbeddingMpc
-from stiction_ros.control.printed.inversion import PrintedInversionMpc
 from stiction_ros.control.result import ControlMode
 from stiction_ros.control.valves.beliefs import ValveBeliefs
 from stiction_ros.effects.behaviour import FloatArray
@@ -34,18 +32,18 @@ def formulation_of(
         InputError: the formulation cannot be set up for these valves, or the rate limit of an OP
             is below what the smallest jump of its valve takes.
     """
-    known, paper = valves.frictions, design.paper
+    known, others = valves.frictions, design.others
     if mode is ControlMode.HOLD:
         return None
-    if mode is ControlMode.EMBEDDING and paper is not None:
-        return PrintedEmbeddingMpc(design.model, paper, design.limits, known)
+    if mode is ControlMode.EMBEDDING and others is not None:
+        return others.embedding(design.model, design.limits, known)
     if mode is ControlMode.EMBEDDING:
         weights, spreads = design.embedding, valves.spreads
         embedding = EmbeddingMpc(design.model, weights, design.limits, known, design.jumps, spreads)
         _check_rates(design, embedding.least_kicks)
         return embedding
-    if mode is ControlMode.INVERSION and paper is not None:
-        return PrintedInversionMpc(unaware, known)
+    if mode is ControlMode.INVERSION and others is not None:
+        return others.inversion(unaware, known)
     if mode is ControlMode.INVERSION:
         inversion = InversionMpc(unaware, known)
         _check_rates(design, inversion.least_kicks)

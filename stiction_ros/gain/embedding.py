@@ -30,8 +30,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.control import ControlMode, ControlSettings, FrictionSpread, MpcController
+from stiction_ros.control import ControlMode, FrictionSpread, MpcController
 from stiction_ros.control.design import ControlDesign, History
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.draws import Draws

@@ -45,7 +45,7 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 
 
-def identify(
+def identify_exact(
     record: Record,
     options: IdentificationOptions | None = None,
     progress: Progress | None = None,

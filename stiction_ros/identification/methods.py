@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -24,22 +23,23 @@ Progress = Callable[[float], None]
 Method = Callable[[Record, IdentificationOptions | None, Progress | None], Identification]
 
 
-def _in_module(name: str) -> Method:
-    """Return ``identify`` of a module here, imported when called: they load slowly."""
+def _exact(
+    record: Record, options: IdentificationOptions | None, progress: Progress | None
+) -> Identification:
+    from stiction_ros.identification.engine import identify_exact  # slow to import
 
-    def run(
-        record: Record, options: IdentificationOptions | None, progress: Progress | None
-    ) -> Identification:
-        method: Method = importlib.import_module(f"stiction_ros.identification.{name}").identify
-        return method(record, options, progress)
-
-    return run
+    return identify_exact(record, options, progress)
 
 
-METHODS: Mapping[str, Method] = {
-    "exact": _in_module("engine"),
-    "evidence": _in_module("evidence.engine"),
-}
+def _by_evidence(
+    record: Record, options: IdentificationOptions | None, progress: Progress | None
+) -> Identification:
+    from stiction_ros.identification.evidence.engine import identify_by_evidence  # slow to import
+
+    return identify_by_evidence(record, options, progress)
+
+
+METHODS: Mapping[str, Method] = {"exact": _exact, "evidence": _by_evidence}
 
 
 def identify(

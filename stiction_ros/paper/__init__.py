@@ -1,8 +1,10 @@
-"""The paper as printed: its identification methods, its figures and its tables."""
+"""The paper as printed.
 
-from __future__ import annotations
+- :mod:`.methods`: identification by its methods: the nonlinear programme (12), its grid search.
+- :mod:`.programme`: the programme (12); :mod:`.smoothed`: the laws (5), (6) that it is written in.
+- :mod:`.controllers`: its three controllers, (19) to (22), with the weights of Section 4.2.
+- :mod:`.exhibits`: its figures and tables beside what is found here.
 
-from stiction_ros.paper.methods import METHODS, identify
-from stiction_ros.paper.options import PaperOptions
-
-__all__ = ["METHODS", "PaperOptions", "identify"]
+It is imported from these modules, as a controller that is not the paper's loads none of it but
+:mod:`.controllers`.
+"""

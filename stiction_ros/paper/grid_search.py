@@ -78,7 +78,7 @@ def count_points(record: Record, options: PaperOptions) -> int:
     return int(np.prod([side * (side + 1.0) / 2.0 for side in sides.tolist()]))
 
 
-def identify(
+def identify_by_grid(
     record: Record,
     options: PaperOptions | None = None,
     progress: Progress | None = None,
@@ -109,7 +109,7 @@ def identify(
 def search(
     record: Record, options: PaperOptions, orders: ArxOrders, progress: Progress
 ) -> GridPoint:
-    """Return the grid point and delays of lowest mean SE; see :func:`identify`."""
+    """Return the grid point and delays of lowest mean SE; see :func:`identify_by_grid`."""
     limits = friction_limits(record, options)
     if options.grid_step > limits.max():
         raise InputError(

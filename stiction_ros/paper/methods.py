@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 
 from stiction_ros.identification import Identification
@@ -19,20 +18,30 @@ Progress = Callable[[float], None]
 Method = Callable[[Record, PaperOptions, Progress | None], Identification]
 
 
-def _in_module(name: str) -> Method:
-    """Return ``identify`` of a module here, imported when called: CasADi loads slowly."""
+def _by_programme(
+    record: Record, options: PaperOptions, progress: Progress | None
+) -> Identification:
+    from stiction_ros.paper.programme.nlp import identify_by_programme  # CasADi loads slowly
 
-    def run(record: Record, options: PaperOptions, progress: Progress | None) -> Identification:
-        method: Method = importlib.import_module(f"stiction_ros.paper.{name}").identify
-        return method(record, options, progress)
+    return identify_by_programme(record, options, progress)
 
-    return run
+
+def _as_printed(record: Record, options: PaperOptions, progress: Progress | None) -> Identification:
+    from stiction_ros.paper.programme.printed import identify_as_printed  # CasADi loads slowly
+
+    return identify_as_printed(record, options, progress)
+
+
+def _by_grid(record: Record, options: PaperOptions, progress: Progress | None) -> Identification:
+    from stiction_ros.paper.grid_search import identify_by_grid  # slow to import
+
+    return identify_by_grid(record, options, progress)
 
 
 METHODS: Mapping[str, Method] = {
-    "nlp": _in_module("programme.nlp"),
-    "nlp_printed": _in_module("programme.printed"),
-    "grid": _in_module("grid_search"),
+    "nlp": _by_programme,
+    "nlp_printed": _as_printed,
+    "grid": _by_grid,
 }
 
 

@@ -119,15 +119,16 @@ def example_answer(name: str, variant: str, method: str) -> Answer:
     """Return what a method says of one of the paper's examples, with the example's orders."""
     import dataclasses
 
-    from stiction_ros import paper
     from stiction_ros.identification import identify
+    from stiction_ros.paper.methods import identify as identify_as_paper
+    from stiction_ros.paper.options import PaperOptions
     from stiction_studies.examples import example1, example2
 
     make = example1 if name == "example1" else example2
     example = make(EXAMPLE_SEED, variant)
     if method == "grid":
-        printed = paper.PaperOptions.of(example.options, method)
-        return _identification(paper.identify(example.record, printed).to_json())
+        printed = PaperOptions.of(example.options, method)
+        return _identification(identify_as_paper(example.record, printed).to_json())
     options = dataclasses.replace(example.options, method=method)
     return _identification(identify(example.record, options).to_json())
 

@@ -15,7 +15,8 @@ import pytest
 
 from stiction_ros import effects
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.control import ControlMode, MpcController
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.data.gate import SHOWN

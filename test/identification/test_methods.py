@@ -35,7 +35,7 @@ def test_each_method_signs_its_result(method: str) -> None:
 
 def test_the_default_is_the_search_by_evidence() -> None:
     record = loops.example1(0, samples=700)
-    assert identify(record, SMALL).valves == engine.identify(record, SMALL).valves
+    assert identify(record, SMALL).valves == engine.identify_by_evidence(record, SMALL).valves
 
 
 @pytest.mark.parametrize(

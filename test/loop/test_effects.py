@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlSettings
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import Behaviour, behaviours, from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, simulate_open_loop

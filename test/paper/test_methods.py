@@ -9,8 +9,9 @@ import simulated_loops as loops
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
-from stiction_ros.paper import METHODS, PaperOptions, identify, methods
-from stiction_ros.paper.options import METHOD_NAMES
+from stiction_ros.paper import methods
+from stiction_ros.paper.methods import METHODS, identify
+from stiction_ros.paper.options import METHOD_NAMES, PaperOptions
 
 SMALL = PaperOptions(
     output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0

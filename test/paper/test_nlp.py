@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, VerdictKind
 from stiction_ros.identification.problem.equation_error import ArxOrders, fit_outputs, squared_error
-from stiction_ros.paper import PaperOptions, identify
+from stiction_ros.paper.methods import identify
+from stiction_ros.paper.options import PaperOptions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.programme_data import ProgrammeData

@@ -123,10 +123,11 @@ def identify_by(
         chosen: of :func:`search_options`.
     """
     if method in PAPER_METHODS:
-        from stiction_ros import paper
+        from stiction_ros.paper.methods import identify as identify_as_paper
+        from stiction_ros.paper.options import PaperOptions
 
-        settings = paper.PaperOptions.of(options, method, **chosen)
-        return lambda record, progress: paper.identify(record, settings, progress)
+        settings = PaperOptions.of(options, method, **chosen)
+        return lambda record, progress: identify_as_paper(record, settings, progress)
     import dataclasses
 
     from stiction_ros.identification import identify

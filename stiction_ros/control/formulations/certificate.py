@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import daqp
 import numpy as np
 
 from stiction_ros.control.formulations.embedding_problem import FREE, StickyState
 from stiction_ros.control.formulations.pattern_bounds import jump_sizes
+from stiction_ros.control.problem.horizon import HorizonCost, HorizonLimits
 from stiction_ros.control.problem.horizon_qp import HorizonQp
 from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import Plan
 from stiction_ros.effects.behaviour import FloatArray
-
-if TYPE_CHECKING:  # the embedding judges its own plans
-    from stiction_ros.control.formulations.embedding import EmbeddingMpc
 
 BINARY = 16  # a bound of daqp that must be active on one side
 CURVATURE = 1e-3  # of the binaries; their linear terms take it off at 0 and 1
@@ -51,10 +49,30 @@ class Certificate:
     nodes: int
 
 
-def certify(
-    mpc: EmbeddingMpc, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
-) -> Certificate:
-    r"""Solve the embedding with jumps of any number and direction by branch and bound.
+def certify(problem: FreeJumps, state: FloatArray, target: Target, plan: Plan) -> Certificate:
+    """Return how far ``plan`` is from the optimum of ``problem``.
+
+    Args:
+        problem: the loop in which the plan was made, with the stems where they were then.
+        state, target: as given to :meth:`~.embedding.EmbeddingMpc.plan`.
+        plan: to be judged.
+    """
+    nan = float("nan")
+    if not problem.bounded:
+        return Certificate(CertificateStatus.UNBOUNDED_TRAVEL, nan, nan, problem.samples, 0)
+    value, nodes = problem.solve(state, target)
+    if value is None:
+        return Certificate(CertificateStatus.UNSOLVED, nan, nan, problem.samples, nodes)
+    cost, last = problem.cost, problem.valves.last
+    fixed = cost.constant(state - target.state, last - target.stem, target.path)
+    optimum = value + fixed
+    above = max(plan.cost - optimum, 0.0)
+    gap = above / max(optimum, 1e-9 * (1.0 + abs(fixed)))
+    return Certificate(CertificateStatus.CERTIFIED, optimum, gap, problem.samples, nodes)
+
+
+class FreeJumps:
+    r"""The embedding with jumps of any number and direction, solved by branch and bound.
 
     At each of the first ``samples`` samples every sticky valve stays, jumps up or jumps down,
     told by two binaries δ⁺, δ⁻ with δ⁺ + δ⁻ ≤ 1:
@@ -68,57 +86,59 @@ def certify(
     Later no sticky valve moves. Everything else (bounds, weights, prices, slacks) is as in
     :class:`~.embedding.EmbeddingMpc`. The time grows by about a third with each further sample.
 
-    Args:
-        mpc: made ``plan`` from the next three.
-        state, target, last: as given to :meth:`~.embedding.EmbeddingMpc.plan`.
-        plan: to be judged.
-        samples: 1 … N.
+    Columns: stems of sticky valves at the free samples, healthy stems, then binaries.
     """
-    problem = _FullProblem(mpc, min(samples, mpc.cost.horizon), mpc.valves(last))
-    if not np.isfinite(mpc.limits.stem[problem.sticky]).all():
-        nan = float("nan")
-        return Certificate(CertificateStatus.UNBOUNDED_TRAVEL, nan, nan, problem.samples, 0)
-    value, nodes = problem.solve(state, target, last)
-    if value is None:
-        nan = float("nan")
-        return Certificate(CertificateStatus.UNSOLVED, nan, nan, problem.samples, nodes)
-    fixed = mpc.cost.constant(state - target.state, last - target.stem, target.path)
-    optimum = value + fixed
-    above = max(plan.cost - optimum, 0.0)
-    gap = above / max(optimum, 1e-9 * (1.0 + abs(fixed)))
-    return Certificate(CertificateStatus.CERTIFIED, optimum, gap, problem.samples, nodes)
 
+    def __init__(
+        self,
+        cost: HorizonCost,
+        limits: HorizonLimits,
+        valves: StickyState,
+        sticky: Sequence[bool],
+        jump_price: float,
+        samples: int,
+    ) -> None:
+        """Lay out the columns and rows.
 
-class _FullProblem:
-    """Columns: stems of sticky valves at the free samples, healthy stems, then binaries."""
-
-    def __init__(self, mpc: EmbeddingMpc, samples: int, valves: StickyState) -> None:
-        self.mpc, self.samples, self.valves = mpc, samples, valves
-        cost = mpc.cost
-        self.width = len(mpc.forms)
-        self.sticky = [j for j, form in enumerate(mpc.forms) if form is not None]
+        Args:
+            cost, limits: of the embedding.
+            valves: what is known of the valves now.
+            sticky: whether each of the m valves is.
+            jump_price: cost added per jump.
+            samples: 1 … N.
+        """
+        self.cost, self.limits, self.valves = cost, limits, valves
+        self.jump_price, self.samples = jump_price, min(samples, cost.horizon)
+        self._is_sticky = tuple(sticky)
+        self.width = len(self._is_sticky)
+        self.sticky = [j for j, one in enumerate(self._is_sticky) if one]
         columns: list[FloatArray] = []
         self.first: list[int] = []
-        for j, form in enumerate(mpc.forms):
+        for j, one in enumerate(self._is_sticky):
             self.first.append(len(columns))
-            count = cost.horizon if form is None else samples
+            count = self.samples if one else cost.horizon
             for i in range(count):
                 column = np.zeros((cost.horizon, self.width))
                 column[i : i + 1 if i < count - 1 else None, j] = 1.0
                 columns.append(column.reshape(-1))
         self.stems = len(columns)
-        binaries = 2 * samples * len(self.sticky)
+        binaries = 2 * self.samples * len(self.sticky)
         self.size = self.stems + binaries
         shape = np.zeros((cost.horizon * self.width, self.size))
         shape[:, : self.stems] = np.array(columns).T
         rows = np.vstack([self._rates(), self._jumps()])
-        self.qp = HorizonQp(cost, shape, rows, mpc.limits.output)
+        self.qp = HorizonQp(cost, shape, rows, limits.output)
+
+    @property
+    def bounded(self) -> bool:
+        """Whether every sticky valve has limits: a big M needs them."""
+        return bool(np.isfinite(self.limits.stem[self.sticky]).all())
 
     def _rates(self) -> FloatArray:
         rows = []
-        for j, form in enumerate(self.mpc.forms):
-            if form is None and np.isfinite(self.mpc.limits.move[j]):
-                for i in range(1, self.mpc.cost.horizon):
+        for j, sticky in enumerate(self._is_sticky):
+            if not sticky and np.isfinite(self.limits.move[j]):
+                for i in range(1, self.cost.horizon):
                     row = np.zeros(self.size)
                     row[self.first[j] + i], row[self.first[j] + i - 1] = 1.0, -1.0
                     rows.append(row)
@@ -129,7 +149,7 @@ class _FullProblem:
         rows = []
         valves = self.valves
         for number, j in enumerate(self.sticky):
-            travel = float(np.diff(self.mpc.limits.stem[j])[0])
+            travel = float(np.diff(self.limits.stem[j])[0])
             least, largest = (sizes[j] for sizes in jump_sizes(valves))
             for i in range(self.samples):
                 binary = self.stems + 2 * (number * self.samples + i)
@@ -149,19 +169,22 @@ class _FullProblem:
                 rows += [upper, lower, one, high, low]
         return np.array(rows).reshape(-1, self.size)
 
-    def solve(
-        self, state: FloatArray, target: Target, last: FloatArray
-    ) -> tuple[float | None, int]:
-        """Return the optimum without the constant part of the cost, and the nodes."""
+    def solve(self, state: FloatArray, target: Target) -> tuple[float | None, int]:
+        """Return the optimum without the constant part of the cost, and the nodes.
+
+        Args:
+            state: ξ̂, shape (n,).
+            target: where outputs and stems should come to rest.
+        """
         lower, upper = self._bounds(target)
-        deviation = last - target.stem
+        deviation = self.valves.last - target.stem
         problem = self.qp.problem(
             state - target.state, deviation, lower, upper, target.pv, target.path
         )
         hessian, linear = problem.hessian.copy(), problem.linear.copy()
         binaries = np.arange(self.stems, self.size)
         hessian[binaries, binaries] += CURVATURE
-        linear[binaries] += self.mpc.tuning.jump_price - 0.5 * CURVATURE
+        linear[binaries] += self.jump_price - 0.5 * CURVATURE
         sense = np.zeros(len(problem.upper), dtype=np.int32)
         sense[binaries] = BINARY
         _, value, flag, info = daqp.solve(
@@ -176,17 +199,17 @@ class _FullProblem:
         return (float(value) if flag >= 1 else None), int(info["nodes"])
 
     def _bounds(self, target: Target) -> tuple[FloatArray, FloatArray]:
-        limits, horizon = self.mpc.limits, self.mpc.cost.horizon
+        limits, horizon = self.limits, self.cost.horizon
         lower, upper = np.zeros(self.size), np.ones(self.size)
         row_lower: list[float] = []
         row_upper: list[float] = []
         jump_lower: list[float] = []
         jump_upper: list[float] = []
-        for j, form in enumerate(self.mpc.forms):
+        for j, sticky in enumerate(self._is_sticky):
             low, high = limits.stem[j] - target.stem[j]
             first = self.first[j]
             start = float(self.valves.last[j] - target.stem[j])
-            if form is not None:
+            if sticky:
                 lower[first : first + self.samples] = low
                 upper[first : first + self.samples] = high
                 for i in range(self.samples):

@@ -8,7 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.formulations.certificate import CertificateStatus, certify
+from stiction_ros.control.formulations.certificate import (
+    Certificate,
+    CertificateStatus,
+    FreeJumps,
+    certify,
+)
 from stiction_ros.control.formulations.embedding_problem import (
     EmbeddingProblem,
     JumpPattern,
@@ -244,8 +249,23 @@ class EmbeddingMpc(Formulation):
     ) -> float | None:
         if self.waits:
             return None  # not the cheapest plan, and not meant to be
-        found = certify(self, state, target, last, plan, samples)
+        found = self.certificate(state, target, last, plan, samples)
         return found.gap if found.status is CertificateStatus.CERTIFIED else None
+
+    def certificate(
+        self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
+    ) -> Certificate:
+        """Return how far ``plan`` is from the best that any pattern of jumps can do.
+
+        Args:
+            state, target, last: as given to :meth:`plan`.
+            plan: what that returned.
+            samples: of the horizon in which jumps are free, 1 … N.
+        """
+        sticky = [form is not None for form in self.forms]
+        price = self.tuning.jump_price
+        jumps = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)
+        return certify(jumps, state, target, plan)
 
     def op_of(self, last: FloatArray, stem: FloatArray) -> FloatArray:
         """Return the OP (m,), %, that moves the stems from ``last`` (m,) to ``stem`` (m,)."""

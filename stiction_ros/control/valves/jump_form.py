@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from stiction_ros.effects import Behaviour, behaviours
-from stiction_ros.effects.friction.jump_form import FrictionSpread, JumpForm
-from stiction_ros.effects.friction.parameters import Stiction
+from stiction_ros.effects.friction.stiction import FrictionSpread, JumpForm, Stiction
 from stiction_ros.errors import InputError
 
 __all__ = ["FrictionSpread", "JumpForm", "jump_form"]

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory
-from stiction_ros.effects.friction.jump_form import JumpForm
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
+from stiction_ros.effects.friction.stiction import JumpForm
 from stiction_ros.effects.friction.switching import MovingCells, Switching
 
 

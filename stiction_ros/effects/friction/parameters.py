@@ -19,7 +19,7 @@ from stiction_ros.effects.behaviour import (
     SimulatesGrid,
     parameter,
 )
-from stiction_ros.effects.friction.jump_form import JumpForm
+from stiction_ros.effects.friction.stiction import Stiction
 from stiction_ros.effects.friction.switching import Switching
 from stiction_ros.effects.seen import Seen
 from stiction_ros.errors import InputError
@@ -61,51 +61,6 @@ class FrictionLaw(SimulatesGrid, Protocol):
     def from_mapping(cls, values: Mapping[str, Any]) -> Behaviour:
         """Return the law with the given values by key."""
         ...
-
-
-@dataclasses.dataclass(frozen=True)
-class Stiction(Behaviour):
-    """What holds for every friction law that does not say otherwise.
-
-    Attributes:
-        switching: how its switching patterns are listed, so that a search can be exact; None
-            for a law that is searched on grids alone, which certifies nothing.
-        not_identified: why it is not identified, one clause; empty when it is.
-        held: keys of further parameters that stay at their defaults, which is said: constants of
-            the law. All others are identified.
-    """
-
-    effect: ClassVar[str] = "stiction"
-    places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "PV moves in jumps while OP ramps, and rests while OP reverses"
-    minimum_data: ClassVar[str] = "several slips, by a limit cycle or by set-point moves"
-    confusable: ClassVar[tuple[str, ...]] = ("valve backlash when J = 0",)
-    experiment: ClassVar[str] = (
-        "let OP reverse by more than the friction that matters, as a cycle does"
-    )
-    separation: ClassVar[str] = (
-        "ramp OP slowly through a reversal and back: a stem that jumps after its rest has "
-        "stiction, one that follows smoothly has backlash"
-    )
-    family: ClassVar[str] = "friction"
-    least: ClassVar[float] = 0.1  # %
-    # For `stiction identify`.
-    switching: ClassVar[Switching | None] = None
-    not_identified: ClassVar[str] = ""
-    held: ClassVar[tuple[str, ...]] = ()
-    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "switching", "jump_form")
-
-    def jump_form(self) -> JumpForm | None:
-        """Return the moves that it can make when OP rests between them.
-
-        Returns:
-            None for a law that has no such form, and so no OP can be planned for it.
-        """
-        return None
-
-    def with_static_friction(self, static_friction: float) -> Self:
-        """Return the law with another f_S, %, f_D and all else kept."""
-        return dataclasses.replace(self, static_friction=static_friction)  # type: ignore[call-arg]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, parameter
-from stiction_ros.effects.friction.jump_form import JumpForm
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
+from stiction_ros.effects.friction.stiction import JumpForm
 from stiction_ros.effects.friction.switching import SlipPolygons, Switching
 
 

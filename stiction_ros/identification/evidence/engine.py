@@ -63,7 +63,7 @@ from stiction_ros.records.record import Record
 Progress = Callable[[float], None]
 
 
-def identify(
+def identify_by_evidence(
     record: Record,
     options: IdentificationOptions | None = None,
     progress: Progress | None = None,

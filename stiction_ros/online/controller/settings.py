@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from stiction_ros.control import ControlMode, ControlSettings
+from stiction_ros.control import ControlMode
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.online.handover.offers import OfferRule
 from stiction_ros.online.handover.watch import WatchRule
 from stiction_ros.online.schedule import FitSchedule

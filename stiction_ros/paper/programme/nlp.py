@@ -70,7 +70,7 @@ class _End:
         return self.solution.objective if self.accepted else float("inf")
 
 
-def identify(
+def identify_by_programme(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> Identification:
     """Identify by the nonlinear programme (12); see the module for the order of work.

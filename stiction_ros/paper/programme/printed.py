@@ -34,10 +34,10 @@ from stiction_ros.records import Record
 Progress = Callable[[float], None]
 
 
-def identify(
+def identify_as_printed(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
 ) -> Identification:
-    """Identify as :func:`stiction_ros.paper.programme.nlp.identify`, by the printed method."""
+    """Identify by the method as printed; all else is as in :func:`~.nlp.identify_by_programme`."""
     begun = time.perf_counter()
     options = options or PaperOptions(method="nlp_printed")
     orders = check_record(record, options)

@@ -127,7 +127,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _study(options: argparse.Namespace, plant: str) -> StudyOptions:
-    from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart, WeightPreset
+    from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, WeightPreset
     from stiction_studies.examples.control_study import StudyOptions
 
     chosen: dict[str, Any] = {

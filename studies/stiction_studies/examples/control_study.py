@@ -11,13 +11,13 @@ import numpy as np
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, FrictionSpread, MpcController, StepResult
-from stiction_ros.control.printed.embedding import PrintedPlan
-from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart, WeightPreset
 from stiction_ros.effects import HeStiction, KanoStiction, Stiction, XchStiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import ClosedLoopRun, LoopModel, Measurement, SetPoints, simulate_closed_loop
 from stiction_ros.online.session import Scenario
+from stiction_ros.paper.controllers.embedding import PrintedPlan
+from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, WeightPreset
 from stiction_studies.examples.paper import PLANTS
 
 SCHEDULES = ("held-out", "scenario")

@@ -11,7 +11,7 @@ from typing import Any
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from stiction_ros.control.problem.paper_weights import ProgrammeCost
+from stiction_ros.paper.controllers.weights import ProgrammeCost
 from stiction_ros.report.drawing import (
     BLUE,
     DPI,

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from stiction_studies.commands import demo_opcua
 from stiction_ros.cli.main import main
 from stiction_ros.cli.runs.scenarios import SCENARIOS
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua.tag_map import TagMap
 from stiction_ros.settings import from_mapping
+from stiction_studies.commands import demo_opcua
 from stiction_studies.commands.demo_opcua import _nodes, _plant
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiction_ros.control.problem.paper_weights import WeightPreset
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
+from stiction_ros.paper.controllers.weights import WeightPreset
 from stiction_studies.examples.control_study import (
     COLUMNS,
     REACH,

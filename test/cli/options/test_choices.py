@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from stiction_ros import paper
 from stiction_ros.cli.loop import gap
 from stiction_ros.cli.options import choices
-from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart, WeightPreset
 from stiction_ros.discrepancy import GapVerdict
 from stiction_ros.identification import METHODS
 from stiction_ros.identification.answer.loop_kind import LoopKind
@@ -13,6 +11,8 @@ from stiction_ros.identification.friction.grid import laws
 from stiction_ros.identification.linear.data import LinearKind, OrderCriterion
 from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
 from stiction_ros.identification.options import LOOP_KINDS
+from stiction_ros.paper import methods
+from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart, WeightPreset
 from stiction_studies.blind.loops.truth import FAMILIES as BLIND
 from stiction_studies.examples import FAMILIES, NOISES, PLANTS, control_study
 from stiction_studies.examples.control_cases import CASES
@@ -23,8 +23,8 @@ from stiction_studies.field.hidden import GIVEN
 
 
 def test_every_choice_is_known_and_none_is_missing() -> None:
-    assert (*METHODS, *paper.METHODS) == choices.METHODS
-    assert tuple(paper.METHODS) == choices.PAPER_METHODS
+    assert (*METHODS, *methods.METHODS) == choices.METHODS
+    assert tuple(methods.METHODS) == choices.PAPER_METHODS
     assert set(choices.laws()) == set(laws())
     assert tuple(kind.value for kind in LoopKind) == choices.LOOP_KINDS == LOOP_KINDS
     assert tuple(kind.value for kind in LinearKind) == choices.LINEAR_KINDS

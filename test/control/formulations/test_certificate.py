@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import INF, first_order, limits_for, stable_model, target_at, weights_for
 
-from stiction_ros.control.formulations.certificate import CertificateStatus, certify
+from stiction_ros.control.formulations.certificate import CertificateStatus
 from stiction_ros.control.formulations.embedding import EmbeddingMpc, EmbeddingTuning
 from stiction_ros.control.formulations.embedding_problem import EmbeddingProblem, JumpPattern
 from stiction_ros.control.problem.target import Target
@@ -44,7 +44,7 @@ def test_no_plan_is_cheaper_than_the_optimum(seed: int, valves: int) -> None:
     mpc, state, target, last = situation(seed, valves)
     plan, cost = planned(mpc, state, target, last)
     # Every enumerated pattern of a horizon of ten jumps within its first ten samples.
-    found = certify(mpc, state, target, last, plan, 10)
+    found = mpc.certificate(state, target, last, plan, 10)
     assert found.status is CertificateStatus.CERTIFIED
     assert found.optimum <= cost * (1.0 + 1e-6) + 1e-6
     assert found.gap == pytest.approx((cost - found.optimum) / found.optimum, abs=1e-5)
@@ -56,7 +56,7 @@ def test_the_optimum_is_that_of_all_patterns_one_by_one(seed: int) -> None:
     """Three free samples, one valve: 27 sequences of staying, up and down, each a plain QP."""
     mpc, state, target, last = situation(seed, 1)
     plan, _ = planned(mpc, state, target, last)
-    found = certify(mpc, state, target, last, plan, 3)
+    found = mpc.certificate(state, target, last, plan, 3)
     valves, horizon = mpc.valves(last), 10
     jump = valves.least[0], min(valves.largest[0], 200.0)
     low, high = mpc.limits.stem[0]
@@ -128,7 +128,7 @@ def test_a_plan_that_is_worse_has_a_larger_gap() -> None:
         tuning = EmbeddingTuning(price)
         mpc = EmbeddingMpc(model, weights_for(model, 20), limits_for(model), (FRICTION,), tuning)
         plan, _ = planned(mpc, np.zeros(1), target, last)
-        gaps.append(certify(cheap, np.zeros(1), target, last, plan, 8).gap)
+        gaps.append(cheap.certificate(np.zeros(1), target, last, plan, 8).gap)
     assert gaps[0] < 0.05 < gaps[1]
 
 
@@ -138,7 +138,7 @@ def test_a_valve_without_limits_is_not_certified() -> None:
     mpc = EmbeddingMpc(model, weights_for(model, 8), limits, (FRICTION,), TUNING)
     target = target_at(model, np.array([53.0]))
     plan, _ = planned(mpc, np.zeros(1), target, np.array([50.0]))
-    found = certify(mpc, np.zeros(1), target, np.array([50.0]), plan, 5)
+    found = mpc.certificate(np.zeros(1), target, np.array([50.0]), plan, 5)
     assert found.status is CertificateStatus.UNBOUNDED_TRAVEL
     assert np.isnan(found.gap)
 
@@ -153,7 +153,7 @@ def test_on_the_tank_the_enumeration_is_near_the_optimum() -> None:
         target = target_at(model, np.array([goal]))
         state = target.state + random.normal(size=1) * 0.2
         plan, _ = planned(mpc, state, target, last)
-        gaps.append(certify(mpc, state, target, last, plan, 10).gap)
+        gaps.append(mpc.certificate(state, target, last, plan, 10).gap)
     assert np.mean(gaps) < 0.05
 
 
@@ -167,6 +167,6 @@ def test_the_patterns_of_the_problem_are_those_of_the_certificate() -> None:
         if solution is not None:
             costs.append(solution.cost + TUNING.jump_price * problem.jumps)
     plan, _ = planned(mpc, state, target, last)
-    found = certify(mpc, state, target, last, plan, 1)
+    found = mpc.certificate(state, target, last, plan, 1)
     fixed = mpc.cost.constant(state - target.state, last - target.stem)
     assert found.optimum == pytest.approx(min(costs) + fixed, rel=1e-6, abs=1e-6)

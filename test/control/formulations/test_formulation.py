@@ -6,8 +6,8 @@ from stiction_ros.control.controller import MpcController
 from stiction_ros.control.formulations.formulation import Formulation
 from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
-from stiction_ros.control.settings import ControlSettings
 from stiction_ros.control.valves.beliefs import ValveBeliefs
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop import LoopModel
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
+from stiction_ros.control import ControlMode, MpcController
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel

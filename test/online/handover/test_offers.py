@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, History, MpcController
+from stiction_ros.control import ControlMode, History, MpcController
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.loop import LoopModel, SetPoints, simulate_closed_loop
 from stiction_ros.online.controller.live import LiveController

@@ -14,24 +14,25 @@ from typing import TypeVar
 import numpy as np
 
 from stiction_ros.cli.runs.scenarios import find
-from stiction_ros.control import ControlDesign, ControlMode, ControlSettings, MpcController, Plan
+from stiction_ros.control import ControlDesign, ControlMode, MpcController, Plan
 from stiction_ros.control.formulations.unaware import UnawareMpc
-from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.control.printed.embedding import PrintedEmbeddingMpc
-from stiction_ros.control.printed.smoothed_programme import SmoothedProgramme
-from stiction_ros.control.problem.paper_weights import (
-    AugmentedWeights,
-    PaperTuning,
-    WeightPreset,
-    augmented_weights,
-)
 from stiction_ros.control.problem.target import TargetSelector
 from stiction_ros.control.state.observer import Observer
+from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.session import Scenario, run_live
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.paper.controllers.embedding import PrintedEmbeddingMpc
+from stiction_ros.paper.controllers.smoothed_programme import SmoothedProgramme
+from stiction_ros.paper.controllers.weights import (
+    AugmentedWeights,
+    PaperTuning,
+    WeightPreset,
+    augmented_weights,
+)
 from stiction_ros.records import Record
 from stiction_studies.benches.speed import do_mpc as bench_do_mpc
 from stiction_studies.benches.speed.row import Row, row

@@ -11,13 +11,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from stiction_ros import paper
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, IdentificationOptions, identify
 from stiction_ros.identification.problem.equation_error import ArxOrders, squared_error
-from stiction_ros.paper import PaperOptions
 from stiction_ros.paper.grid_search import count_points
+from stiction_ros.paper.methods import identify as identify_as_paper
 from stiction_ros.paper.one_step_result import check_record, friction_limits
+from stiction_ros.paper.options import PaperOptions
 from stiction_studies.benches.speed.row import Row, row
 from stiction_studies.examples import Example, coupled_loop, example1, example2_of_one_round
 
@@ -285,7 +285,7 @@ def timed(
         begun = time.perf_counter()
         share = _part(progress, len(times), repeat)
         if isinstance(options, PaperOptions):
-            found = paper.identify(example.record, options, share)
+            found = identify_as_paper(example.record, options, share)
         else:
             found = identify(example.record, options, share)
         seconds = time.perf_counter() - begun

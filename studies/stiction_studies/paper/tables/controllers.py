@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stiction_ros.control.problem.paper_weights import ProgrammeCost, WarmStart
 from stiction_ros.identification import Identification
+from stiction_ros.paper.controllers.weights import ProgrammeCost, WarmStart
 from stiction_ros.paper.methods import identify
 from stiction_studies.examples import example2_of_one_round
 from stiction_studies.examples.control_study import COLUMNS, Column, StudyOptions, run_trial

@@ -11,7 +11,13 @@ import numpy as np
 from stiction_ros.control.design import ControlDesign
 from stiction_ros.control.formulations.embedding import EmbeddingTuning
 from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.problem.paper_weights import (
+from stiction_ros.control.state.observer import ObserverKind, ObserverTuning
+from stiction_ros.control.strategies import FallbackRule
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.paper.controllers.formulations import PrintedFormulations
+from stiction_ros.paper.controllers.weights import (
     PaperTuning,
     ProgrammeCost,
     WarmStart,
@@ -20,11 +26,6 @@ from stiction_ros.control.problem.paper_weights import (
     plain_weights,
     unaware_weights,
 )
-from stiction_ros.control.state.observer import ObserverKind, ObserverTuning
-from stiction_ros.control.strategies import FallbackRule
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
-from stiction_ros.loop import LoopModel
 from stiction_ros.settings import setting
 
 
@@ -273,7 +274,7 @@ class ControlSettings:
         )
 
     def _as_printed(self, design: ControlDesign) -> ControlDesign:
-        """Return ``design`` with the paper's own embedding where the settings ask for it."""
+        """Return ``design`` with the paper's own formulations where the settings ask for them."""
         if Formulations(self.formulation) is Formulations.EXACT:
             return design
         printed = self.preset == WeightPreset.PRINTED
@@ -283,7 +284,7 @@ class ControlSettings:
         if ProgrammeCost(self.programme_cost) is ProgrammeCost.PLAIN:
             weights = plain_weights(design.unaware)
         tuning = PaperTuning(weights, WarmStart(self.warm_start), self.first_move)
-        return dataclasses.replace(design, paper=tuning)
+        return dataclasses.replace(design, others=PrintedFormulations(tuning))
 
     def _op_limits(self, model: LoopModel) -> FloatArray:
         m = len(model.valves)

@@ -10,19 +10,19 @@ from loops import limits_for, outputs_of
 from paper_cases import LIMITS, STICKY, situation, tuning, two_valves
 
 from stiction_ros.control import ControlMode
-from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.control.printed.embedding import Choice, PrintedEmbeddingMpc, PrintedPlan
-from stiction_ros.control.printed.smoothed_programme import SmoothedProgramme, SoftOutputs
-from stiction_ros.control.problem.paper_weights import (
+from stiction_ros.effects import ChoudhuryStiction, KanoStiction, XchStiction
+from stiction_ros.effects.behaviour import Behaviour
+from stiction_ros.errors import InputError
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.paper.controllers.embedding import Choice, PrintedEmbeddingMpc, PrintedPlan
+from stiction_ros.paper.controllers.smoothed_programme import SmoothedProgramme, SoftOutputs
+from stiction_ros.paper.controllers.weights import (
     ProgrammeCost,
     WarmStart,
     WeightPreset,
     plain_weights,
     unaware_weights,
 )
-from stiction_ros.effects import ChoudhuryStiction, KanoStiction, XchStiction
-from stiction_ros.effects.behaviour import Behaviour
-from stiction_ros.errors import InputError
 
 MODEL = two_valves()
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from paper_cases import LIMITS, STICKY, situation, tuning, two_valves
 
-from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.control.printed.smoothed_programme import (
+from stiction_ros.effects import HeStiction
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.paper.controllers.smoothed_programme import (
     ProgrammeResult,
     ProgrammeStatus,
     SmoothedProgramme,
 )
-from stiction_ros.control.problem.paper_weights import PaperTuning
-from stiction_ros.effects import HeStiction
+from stiction_ros.paper.controllers.weights import PaperTuning
 
 MODEL = two_valves()
 FRICTIONS = (STICKY, None)

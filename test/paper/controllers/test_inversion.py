@@ -7,9 +7,10 @@ from loops import first_order, kalman, limits_for, target_at, weights_for
 
 from stiction_ros.control import ControlDesign, ControlMode, MpcController
 from stiction_ros.control.formulations.unaware import UnawareMpc
-from stiction_ros.control.printed.inversion import PrintedInversionMpc
-from stiction_ros.control.problem.paper_weights import PaperTuning, WeightPreset, augmented_weights
 from stiction_ros.effects import HeStiction
+from stiction_ros.paper.controllers.formulations import PrintedFormulations
+from stiction_ros.paper.controllers.inversion import PrintedInversionMpc
+from stiction_ros.paper.controllers.weights import PaperTuning, WeightPreset, augmented_weights
 
 MODEL = first_order()
 FRICTION = HeStiction(4.0, 1.0)
@@ -51,7 +52,9 @@ def test_the_observer_takes_the_wanted_stem_for_the_stem() -> None:
         weights,
         np.ones(1),
         kalman(1),
-        paper=PaperTuning(augmented_weights(WeightPreset.CORRECTED, MODEL, 6)),
+        others=PrintedFormulations(
+            PaperTuning(augmented_weights(WeightPreset.CORRECTED, MODEL, 6))
+        ),
     )
     mpc = MpcController(design, ControlMode.INVERSION, (FRICTION,))
     mpc.start(np.array([50.0]), np.array([20.0]))

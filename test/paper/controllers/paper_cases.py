@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from loops import stable_model, target_at
 
-from stiction_ros.control.printed.augmented_cost import PlanProblem
-from stiction_ros.control.problem.paper_weights import (
+from stiction_ros.effects import HeStiction
+from stiction_ros.paper.controllers.augmented_cost import PlanProblem
+from stiction_ros.paper.controllers.weights import (
     AugmentedWeights,
     PaperTuning,
     WarmStart,
     WeightPreset,
     augmented_weights,
 )
-from stiction_ros.effects import HeStiction
 from stiction_ros.processes import LinearModel
 
 STICKY = HeStiction(8.0, 1.0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.control.printed.laws import PrintedFriction
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.paper.controllers.laws import PrintedFriction
 
 
 def compensation(

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from loops import stable_model, target_at
 from paper_cases import STICKY
 
-from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.control.problem.paper_weights import AugmentedWeights
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.paper.controllers.weights import AugmentedWeights
 from stiction_ros.processes import LinearModel
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.control.printed.augmented_cost import PlanProblem
-from stiction_ros.control.printed.laws import PrintedFriction, directed, smoothed_stem
-from stiction_ros.control.problem.paper_weights import PaperTuning
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.paper.controllers.augmented_cost import PlanProblem
+from stiction_ros.paper.controllers.laws import PrintedFriction, directed, smoothed_stem
+from stiction_ros.paper.controllers.weights import PaperTuning
 from stiction_ros.processes import LinearModel
 
 

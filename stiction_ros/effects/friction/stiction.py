@@ -1,14 +1,17 @@
-"""What a law of stiction looks like to a controller that moves OP in steps: stay, or jump."""
+"""What a law of stiction is, and what a controller sees of it that moves OP in steps.
+
+To such a controller a stem stays, or it jumps.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import ClassVar, Self
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from stiction_ros.effects.friction.parameters import Stiction
+from stiction_ros.effects.behaviour import Behaviour
+from stiction_ros.effects.friction.switching import Switching
 
 LEAST_MARGIN = 1e-4  # %; an error of exactly f_S does not slip
 
@@ -89,3 +92,48 @@ class JumpForm:
         else:
             wanted = max(spread.static + spread.dynamic, floor * self.static_friction)
         return self.overshoot * max(wanted, LEAST_MARGIN)
+
+
+@dataclasses.dataclass(frozen=True)
+class Stiction(Behaviour):
+    """What holds for every friction law that does not say otherwise.
+
+    Attributes:
+        switching: how its switching patterns are listed, so that a search can be exact; None
+            for a law that is searched on grids alone, which certifies nothing.
+        not_identified: why it is not identified, one clause; empty when it is.
+        held: keys of further parameters that stay at their defaults, which is said: constants of
+            the law. All others are identified.
+    """
+
+    effect: ClassVar[str] = "stiction"
+    places: ClassVar[tuple[str, ...]] = ("valve",)
+    signature: ClassVar[str] = "PV moves in jumps while OP ramps, and rests while OP reverses"
+    minimum_data: ClassVar[str] = "several slips, by a limit cycle or by set-point moves"
+    confusable: ClassVar[tuple[str, ...]] = ("valve backlash when J = 0",)
+    experiment: ClassVar[str] = (
+        "let OP reverse by more than the friction that matters, as a cycle does"
+    )
+    separation: ClassVar[str] = (
+        "ramp OP slowly through a reversal and back: a stem that jumps after its rest has "
+        "stiction, one that follows smoothly has backlash"
+    )
+    family: ClassVar[str] = "friction"
+    least: ClassVar[float] = 0.1  # %
+    # For `stiction identify`.
+    switching: ClassVar[Switching | None] = None
+    not_identified: ClassVar[str] = ""
+    held: ClassVar[tuple[str, ...]] = ()
+    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "switching", "jump_form")
+
+    def jump_form(self) -> JumpForm | None:
+        """Return the moves that it can make when OP rests between them.
+
+        Returns:
+            None for a law that has no such form, and so no OP can be planned for it.
+        """
+        return None
+
+    def with_static_friction(self, static_friction: float) -> Self:
+        """Return the law with another f_S, %, f_D and all else kept."""
+        return dataclasses.replace(self, static_friction=static_friction)  # type: ignore[call-arg]

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from loops import stable_model, target_at
 from paper_cases import LIMITS, STICKY, situation, two_valves, weights
 
-from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.control.printed.searched_start import SearchedStart
 from stiction_ros.effects import HeStiction
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.paper.controllers.searched_start import SearchedStart
 
 MODEL = two_valves()
 

@@ -10,21 +10,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.control.formulations.formulation import Formulation
-from stiction_ros.control.printed.augmented_cost import AugmentedCost, PlanProblem
-from stiction_ros.control.printed.laws import PrintedFriction, printed_frictions
-from stiction_ros.control.printed.searched_start import SearchedStart
-from stiction_ros.control.printed.smoothed_programme import (
-    ProgrammeStatus,
-    SmoothedProgramme,
-    SoftOutputs,
-)
-from stiction_ros.control.printed.warm_start import compensation
 from stiction_ros.control.problem.horizon import HorizonLimits
-from stiction_ros.control.problem.paper_weights import PaperTuning, WarmStart
 from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import ControlMode, Plan
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.paper.controllers.augmented_cost import AugmentedCost, PlanProblem
+from stiction_ros.paper.controllers.laws import PrintedFriction, printed_frictions
+from stiction_ros.paper.controllers.searched_start import SearchedStart
+from stiction_ros.paper.controllers.smoothed_programme import (
+    ProgrammeStatus,
+    SmoothedProgramme,
+    SoftOutputs,
+)
+from stiction_ros.paper.controllers.warm_start import compensation
+from stiction_ros.paper.controllers.weights import PaperTuning, WarmStart
 from stiction_ros.processes import LinearModel
 
 

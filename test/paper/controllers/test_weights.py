@@ -5,18 +5,20 @@ import pytest
 from loops import first_order
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control import ControlMode, ControlSettings, MpcController
-from stiction_ros.control.printed.embedding import PrintedEmbeddingMpc
-from stiction_ros.control.problem.paper_weights import (
+from stiction_ros.control import ControlMode, MpcController
+from stiction_ros.control.state.observer import ObserverKind
+from stiction_ros.control_settings import ControlSettings
+from stiction_ros.effects import HeStiction
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.paper.controllers.embedding import PrintedEmbeddingMpc
+from stiction_ros.paper.controllers.formulations import PrintedFormulations
+from stiction_ros.paper.controllers.weights import (
     WarmStart,
     WeightPreset,
     augmented_weights,
     unaware_weights,
 )
-from stiction_ros.control.state.observer import ObserverKind
-from stiction_ros.effects import HeStiction
-from stiction_ros.errors import InputError
-from stiction_ros.loop import LoopModel
 
 TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
 MODEL = TANK.process.linear(60.0)
@@ -55,7 +57,7 @@ def test_s_is_printed_for_two_valves_only() -> None:
 
 def test_settings_choose_the_preset() -> None:
     own = ControlSettings(output_weights=(7.0,), target_weights=(2.0,))
-    assert own.design(TANK).paper is None
+    assert own.design(TANK).others is None
     printed = ControlSettings(
         output_weights=(7.0,), target_weights=(2.0,), preset="printed"
     ).design(TANK)
@@ -69,7 +71,8 @@ def test_settings_choose_the_formulation() -> None:
     design = ControlSettings(formulation="printed", warm_start="search", first_move=1.5).design(
         TANK
     )
-    assert design.paper is not None
-    assert (design.paper.warm_start, design.paper.first_move) == (WarmStart.SEARCH, 1.5)
+    assert isinstance(design.others, PrintedFormulations)
+    tuning = design.others.tuning
+    assert (tuning.warm_start, tuning.first_move) == (WarmStart.SEARCH, 1.5)
     controller = MpcController(design, ControlMode.EMBEDDING, (HeStiction(8.0, 1.0), None))
     assert isinstance(controller._formulation, PrintedEmbeddingMpc)

@@ -1,1 +1,0 @@
-"""The paper's controllers as it prints them."""

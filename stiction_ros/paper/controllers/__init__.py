@@ -1,0 +1,1 @@
+"""The paper's controllers as it prints them, by CasADi and IPOPT, and their weights."""
