@@ -106,13 +106,16 @@ def replay_answer(name: str) -> Answer:
     from stiction_ros.online.replays.run import replay
 
     found = replay(_bag(name))
-    fits = [
-        None
-        if each.fit.update is None
-        else _identification(each.fit.update.identification.to_json())
-        for each in found.fits
-    ]
-    return {"match": str(found.match), "samples": found.samples, "fits": fits}
+    updates = [fit.fit.update for fit in found.fits]
+    swaps = [] if found.modes is None else found.modes.swaps
+    return {
+        "samples": found.samples,
+        "swaps": [None if swap is None else found.seconds(swap.stamp) for swap in swaps],
+        "fits": [
+            None if update is None else _valves(update.identification.to_json()["valves"])
+            for update in updates
+        ],
+    }
 
 
 def example_answer(name: str, variant: str, method: str) -> Answer:
