@@ -15,7 +15,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from stiction_ros.cli.runs.scenarios import (
+from stiction_ros.cli.shared.scenarios import (
     SCENARIOS,
     bridged_nodes,
     find,

@@ -30,21 +30,23 @@ if TYPE_CHECKING:
     from stiction_ros.control_settings import ControlSettings as ControlSettings
     from stiction_ros.discrepancy.answer.results import Discrepancy as Discrepancy
     from stiction_ros.discrepancy.decision.decide import GapVerdict as GapVerdict
-    from stiction_ros.discrepancy.options import GapOptions as GapOptions
+    from stiction_ros.discrepancy.gap_options import GapOptions as GapOptions
     from stiction_ros.discrepancy.workflow import find_discrepancy as find_gap
     from stiction_ros.effects.behaviour import Behaviour as Behaviour
     from stiction_ros.effects.friction.he import HeStiction as HeStiction
     from stiction_ros.errors import InputError as InputError
+    from stiction_ros.identification.identification_options import (
+        IdentificationOptions as IdentificationOptions,
+    )
     from stiction_ros.identification.linear.fit import LinearOptions as LinearOptions
     from stiction_ros.identification.linear.fit import fit_linear as fit_linear
     from stiction_ros.identification.linear.result import (
         LinearIdentification as LinearIdentification,
     )
     from stiction_ros.identification.methods import identify as identify
-    from stiction_ros.identification.options import IdentificationOptions as IdentificationOptions
     from stiction_ros.identification.result.identification import Identification as Identification
     from stiction_ros.identification.result.identification import VerdictKind as VerdictKind
-    from stiction_ros.intake.options import CsvColumns as CsvColumns
+    from stiction_ros.intake.intake_options import CsvColumns as CsvColumns
     from stiction_ros.intake.record_file import read as read
     from stiction_ros.loop.closed_loop import simulate as simulate
     from stiction_ros.loop.closed_loop import simulate_closed_loop as simulate_closed_loop
@@ -55,7 +57,7 @@ if TYPE_CHECKING:
     from stiction_ros.online.session import LiveRun as LiveRun
     from stiction_ros.online.session import Scenario as Scenario
     from stiction_ros.online.session import run_live as run_live
-    from stiction_ros.records.csv.writer import write_csv as write_csv
+    from stiction_ros.records.csv_writer import write_csv as write_csv
     from stiction_ros.records.record import Record as Record
     from stiction_ros.records.run.record_to_bag import write_bag as write_bag
     from stiction_ros.report.record.report import report_record as report_record
@@ -67,13 +69,13 @@ _HOMES = {
     "Behaviour": "effects.behaviour",
     "ControlMode": "control.result",
     "ControlSettings": "control_settings",
-    "CsvColumns": "intake.options",
+    "CsvColumns": "intake.intake_options",
     "Discrepancy": "discrepancy.answer.results",
-    "GapOptions": "discrepancy.options",
+    "GapOptions": "discrepancy.gap_options",
     "GapVerdict": "discrepancy.decision.decide",
     "HeStiction": "effects.friction.he",
     "Identification": "identification.result.identification",
-    "IdentificationOptions": "identification.options",
+    "IdentificationOptions": "identification.identification_options",
     "InputError": "errors",
     "LinearIdentification": "identification.linear.result",
     "LinearOptions": "identification.linear.fit",
@@ -97,7 +99,7 @@ _HOMES = {
     "simulate": "loop.closed_loop",
     "simulate_closed_loop": "loop.closed_loop",
     "write_bag": "records.run.record_to_bag",
-    "write_csv": "records.csv.writer",
+    "write_csv": "records.csv_writer",
 }
 
 __all__ = [

@@ -9,9 +9,9 @@ import math
 import numpy as np
 
 from stiction_ros.control.design import ControlDesign
-from stiction_ros.control.formulations.embedding import EmbeddingTuning
-from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.state.observer import ObserverKind, ObserverTuning
+from stiction_ros.control.embedding import EmbeddingTuning
+from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.observer import ObserverKind, ObserverTuning
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError

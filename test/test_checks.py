@@ -9,7 +9,7 @@ from stiction_ros import HeStiction
 from stiction_ros.checks import LONGEST, number, shown
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml.reading import Section
+from stiction_ros.loop.yaml_reading import Section
 from stiction_ros.settings import from_mapping
 
 WRONG: dict[str, tuple[Any, dict[str, Any], str]] = {

@@ -22,12 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.cli.options.choices import MANY
-from stiction_ros.cli.runs.seeds import add_jobs, run_each, seed_range
+from stiction_ros.cli.shared.searches import MANY
+from stiction_ros.cli.shared.seeds import add_jobs, run_each, seed_range
 from stiction_ros.identification.evidence.engine import answered
 from stiction_ros.identification.evidence.rates import liveliest, looks
 from stiction_ros.identification.evidence.search import ALL, Parts
-from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.preparation import prepare
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record

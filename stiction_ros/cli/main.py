@@ -21,43 +21,34 @@ from stiction_ros.errors import InputError
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS: dict[str, tuple[str, str]] = {
-    "demo": ("live.demo", "run a live loop: cycle, identify, swap, record, report"),
-    "identify": ("loop.identify", "identify friction and process from a record"),
-    "fit-linear": (
-        "loop.fit_linear",
-        "fit a linear model, for a controller that knows no friction",
-    ),
-    "gain": ("loop.gain", "what service, embedding or retuning would bring"),
-    "gap": ("loop.gap", "find, name and add the effect that a simulation misses"),
-    "simulate": ("loop.simulate", "simulate a loop model under its own controller"),
-    "experiment": (
-        "loop.experiment",
-        "simulate an identification experiment, or the exports of a plant",
-    ),
-    "convert": ("bags.convert", "convert a record between CSV and bag"),
-    "replay": ("bags.replay", "run estimator and controller over a bag as they ran live"),
-    "report": ("bags.report", "make the report of a bag or a record"),
-    "repair": ("bags.repair", "finish a bag whose recorder was killed, or salvage a damaged one"),
-    "survey": ("plant.survey", "every loop of a plant, ranked by what to service first"),
-    "certificates": ("plant.certificates", "certificates of the link to a control system (OPC UA)"),
-    "browse-tags": ("plant.browse_tags", "make a tag map by browsing a control system (OPC UA)"),
-    "fetch-history": (
-        "plant.fetch_history",
-        "read history from a control system (OPC UA) into CSV records",
-    ),
-    "listen": ("plant.listen", "fill the windows of all loops in the graph, in one process"),
-    "completion": (
-        "options.completion",
-        "a script by which a shell ends commands and options at Tab",
-    ),
+COMMANDS = {
+    "demo": "run a live loop: cycle, identify, swap, record, report",
+    "identify": "identify friction and process from a record",
+    "fit-linear": "fit a linear model, for a controller that knows no friction",
+    "gain": "what service, embedding or retuning would bring",
+    "gap": "find, name and add the effect that a simulation misses",
+    "simulate": "simulate a loop model under its own controller",
+    "experiment": "simulate an identification experiment",
+    "convert": "convert a record between CSV and bag",
+    "replay": "run estimator and controller over a bag as they ran live",
+    "report": "make the report of a bag or a record",
+    "repair": "finish a bag whose recorder was killed, or salvage a damaged one",
+    "survey": "every loop of a plant, ranked by what to service first",
+    "certificates": "certificates of the link to a control system (OPC UA)",
+    "browse-tags": "make a tag map by browsing a control system (OPC UA)",
+    "fetch-history": "read history from a control system (OPC UA) into CSV records",
+    "listen": "fill the windows of all loops in the graph, in one process",
+    "completion": "a script by which a shell ends commands and options at Tab",
 }
-"""Module of each command below this package, loaded when it is called, and what ``--help`` says."""
+"""What ``--help`` says of each command; its module bears its name and is loaded when called."""
 
 
 def _known(command: str | None) -> Mapping[str, tuple[str, str]]:
     """Return module and help of every command; of other distributions where they are needed."""
-    own = {name: (f"{__package__}.{module}", text) for name, (module, text) in COMMANDS.items()}
+    own = {
+        name: (f"stiction_ros.cli.{name.replace('-', '_')}", text)
+        for name, text in COMMANDS.items()
+    }
     return own if command in own else {**own, **extensions.commands()}
 
 

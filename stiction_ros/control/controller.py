@@ -8,17 +8,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.control.beliefs import ValveBeliefs
 from stiction_ros.control.design import ControlDesign, History
-from stiction_ros.control.formulations.unaware import UnawareMpc
+from stiction_ros.control.jump_form import FrictionSpread
 from stiction_ros.control.modes import formulation_of
-from stiction_ros.control.problem.target import Target, TargetSelector
+from stiction_ros.control.observer import Observer
+from stiction_ros.control.passage import Passage
 from stiction_ros.control.result import ControlMode, Plan, StepResult, StepStatus
-from stiction_ros.control.state.observer import Observer
-from stiction_ros.control.state.passage import Passage
+from stiction_ros.control.slip_check import SlipCheck
 from stiction_ros.control.strategies import Proposal, Situation, strategies
-from stiction_ros.control.valves.beliefs import ValveBeliefs
-from stiction_ros.control.valves.jump_form import FrictionSpread
-from stiction_ros.control.valves.slip_check import SlipCheck
+from stiction_ros.control.target import Target, TargetSelector
+from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 
 CUT = 1e-6  # %; what a rate limit takes off a move is told from here on

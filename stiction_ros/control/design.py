@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.control.formulations.aware import AwareFormulations
-from stiction_ros.control.formulations.embedding import EmbeddingTuning
-from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.state.observer import ObserverTuning
+from stiction_ros.control.aware import AwareFormulations
+from stiction_ros.control.embedding import EmbeddingTuning
+from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.observer import ObserverTuning
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.processes import LinearModel

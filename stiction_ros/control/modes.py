@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
+from stiction_ros.control.beliefs import ValveBeliefs
 from stiction_ros.control.design import ControlDesign
-from stiction_ros.control.formulations.embedding import EmbeddingMpc
-from stiction_ros.control.formulations.formulation import Formulation
-from stiction_ros.control.formulations.inversion import InversionMpc
-from stiction_ros.control.formulations.unaware import UnawareMpc
+from stiction_ros.control.embedding import EmbeddingMpc
+from stiction_ros.control.formulation import Formulation
+from stiction_ros.control.inversion import InversionMpc
 from stiction_ros.control.result import ControlMode
-from stiction_ros.control.valves.beliefs import ValveBeliefs
+from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 

@@ -20,10 +20,10 @@ from typing import Protocol
 
 import numpy as np
 
-from stiction_ros.control.formulations.formulation import Formulation
-from stiction_ros.control.problem.target import Target
+from stiction_ros.control.formulation import Formulation
+from stiction_ros.control.jump_form import JumpForm
 from stiction_ros.control.result import ControlMode, Plan, StepStatus
-from stiction_ros.control.valves.jump_form import JumpForm
+from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.decision.scores import Progress
-from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.steps.begin import begin
 from stiction_ros.discrepancy.steps.closing import closing
 from stiction_ros.discrepancy.steps.look import look_on

@@ -42,7 +42,7 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
     scaled,
     scaled_process,
 )
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.rates import LEAST_ROWS, RATES
 from stiction_ros.identification.result.identification import (

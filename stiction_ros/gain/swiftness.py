@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.control.design import ControlDesign
-from stiction_ros.control.problem.horizon import HorizonCost
-from stiction_ros.control.state.observer import Observer
+from stiction_ros.control.horizon import HorizonCost
+from stiction_ros.control.observer import Observer
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.recorded_loop import RecordedLoop

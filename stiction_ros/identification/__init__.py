@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.methods import METHODS, identify
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,

@@ -15,11 +15,11 @@ from stiction_ros.identification.exact.further_fit import begun, settled, with_f
 from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
 from stiction_ros.identification.exact.one_step_best import one_step_best, seen
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.intervals import friction_intervals
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
     Data,
     Model,

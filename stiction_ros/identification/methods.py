@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.identification.result.identification import Identification
 from stiction_ros.identification.side_by_side import at_once

@@ -8,9 +8,9 @@ import numpy as np
 
 from stiction_ros.effects import HeStiction
 from stiction_ros.identification.ahead import ask
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.methods import METHODS, identify
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
 
 SAMPLES = 240

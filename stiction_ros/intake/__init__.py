@@ -1,8 +1,8 @@
 """From the exports of a historian to the records of loops."""
 
 from stiction_ros.intake.intake import loops, one_loop
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
 from stiction_ros.intake.loop import Loop
-from stiction_ros.intake.options import CsvColumns, IntakeOptions
 from stiction_ros.intake.record_file import open_parts, open_record, read_csv, read_csv_parts
 
 __all__ = [

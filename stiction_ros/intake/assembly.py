@@ -10,9 +10,9 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.modes import manual_marked
-from stiction_ros.intake.options import IntakeOptions
 from stiction_ros.intake.plausible import in_percent, refuse_swapped
 from stiction_ros.intake.repairs import (
     Rules,

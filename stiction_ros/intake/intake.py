@@ -8,8 +8,8 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.assembly import Found, loop_of, unread
+from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
-from stiction_ros.intake.options import IntakeOptions
 from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.shown import spreads_of_records

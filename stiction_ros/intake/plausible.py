@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import TO_PERCENT, OpUnit, known_op_unit
+from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake import is_bag, one_loop
-from stiction_ros.intake.options import CsvColumns, IntakeOptions
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
 from stiction_ros.records.parts import longest_part, only_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_parts
@@ -67,7 +67,7 @@ def read_csv(
 
     Times are taken in seconds or as dates (those without a zone as UTC), OP in its own unit.
     Other columns are ignored, but for MODE and the qualities that
-    :func:`stiction_ros.records.csv.writer.write_csv` writes. With semicolons or tabs the decimal
+    :func:`stiction_ros.records.csv_writer.write_csv` writes. With semicolons or tabs the decimal
     sign may be a comma.
 
     Args:

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
+from stiction_ros.records.parts import stretches
 from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.stretches import stretches
 
 IndexArray = NDArray[np.intp]
 

@@ -10,11 +10,11 @@ from stiction_ros.loop.closed_loop import (
     simulate_closed_loop,
 )
 from stiction_ros.loop.excitation import prbs_experiment, random_binary, simulate_open_loop
-from stiction_ros.loop.instrument import Instrument
 from stiction_ros.loop.model import Disturbance, LoopModel, PiTuning, Valve
 from stiction_ros.loop.plant import Measurement, Plant
 from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.loop.valve_changes import ValveChange, read_valve_changes
+from stiction_ros.loop.yaml_process import Instrument
 
 __all__ = [
     "ClosedLoopRun",

@@ -14,11 +14,10 @@ import yaml
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
 from stiction_ros.errors import InputError
-from stiction_ros.loop.instrument import Instrument
-from stiction_ros.loop.yaml.effects import at_place, read_effects
-from stiction_ros.loop.yaml.places import append_effect
-from stiction_ros.loop.yaml.process import read_instruments, read_process
-from stiction_ros.loop.yaml.reading import Section, load_yaml, parse_yaml
+from stiction_ros.loop.places import append_effect
+from stiction_ros.loop.yaml_effects import at_place, read_effects
+from stiction_ros.loop.yaml_process import Instrument, read_instruments, read_process
+from stiction_ros.loop.yaml_reading import Section, load_yaml, parse_yaml
 from stiction_ros.processes import Process
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml.reading import Section, load_yaml
+from stiction_ros.loop.yaml_reading import Section, load_yaml
 
 
 @dataclasses.dataclass(frozen=True)

@@ -34,7 +34,7 @@ from stiction_ros.online.estimator.worker import FitWorker
 from stiction_ros.online.health import stopped_after
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
-from stiction_ros.online.window.pairing import NEW_RUN, PairedSample
+from stiction_ros.online.pairing import NEW_RUN, PairedSample
 
 COUNTED = ("bridged", "repeated", "stale", "future")
 SHOWN_AGAIN = 3.0  # s: a plant in lockstep shows its sample each second

@@ -15,7 +15,7 @@ from stiction_ros.nodes.shared.managed import READER_QOS
 from stiction_ros.nodes.shared.messages import to_ns
 from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.nodes.shared.typed import leave
-from stiction_ros.online.window.loop_windows import LoopWindow
+from stiction_ros.online.loop_windows import LoopWindow
 
 LOOK = 0.2  # s between two looks at what has come; 5000 messages of a topic may wait
 SEARCH = 2.0  # s between two looks for loops that are new

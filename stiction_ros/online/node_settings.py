@@ -7,8 +7,8 @@ import dataclasses
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.estimator.live import EstimatorSettings
 from stiction_ros.online.monitor.gap_monitor import MonitorRule
+from stiction_ros.online.pairing import BRIDGED, Pairing
 from stiction_ros.online.plain_settings import PACES, NodeSettings
-from stiction_ros.online.window.pairing import BRIDGED, Pairing
 from stiction_ros.settings import setting
 
 

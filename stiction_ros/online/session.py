@@ -26,7 +26,7 @@ from stiction_ros.loop import (
     simulate_closed_loop,
 )
 from stiction_ros.loop.valve_changes import valve_changes_text
-from stiction_ros.loop.yaml.reading import Section, load_yaml
+from stiction_ros.loop.yaml_reading import Section, load_yaml
 from stiction_ros.online.controller.live import LiveController, ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator, fit

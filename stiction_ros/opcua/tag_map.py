@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.loop.yaml.reading import Section, load_yaml
+from stiction_ros.loop.yaml_reading import Section, load_yaml
 
 _NODE = re.compile(r"(ns=\d+;|nsu=[^;]+;)?[isgb]=.+")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

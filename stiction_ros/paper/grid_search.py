@@ -34,9 +34,9 @@ from stiction_ros.paper.one_step_result import (
     friction_limits,
     result,
 )
-from stiction_ros.paper.options import PaperOptions
-from stiction_ros.paper.smoothed.laws import smooth_law
-from stiction_ros.paper.smoothed.stems import final_smoothing
+from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.smoothed_laws import smooth_law
+from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records.record import Record
 
 MAX_POINTS = 2_000_000

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 from stiction_ros.identification import Identification
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.records import Record
 
 Progress = Callable[[float], None]

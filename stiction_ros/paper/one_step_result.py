@@ -9,8 +9,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
-from stiction_ros.identification.options import limited
 from stiction_ros.identification.problem.equation_error import (
     ArxFit,
     ArxOrders,
@@ -31,8 +31,8 @@ from stiction_ros.identification.result.identification import (
     VerdictKind,
 )
 from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
-from stiction_ros.paper.options import PaperOptions
-from stiction_ros.paper.smoothed.laws import smooth_law
+from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_ros.records.record import Record
 

@@ -16,17 +16,17 @@ from stiction_ros.identification import Identification, identify
 from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.identification.closed_loop.recovered_controller import LoopSignals, recover
 from stiction_ros.intake.loop import Loop
-from stiction_ros.records.csv.names import DEFAULT_OUTPUT, DEFAULT_VALVE
+from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.survey.beats import beats
 from stiction_ros.survey.entry import Cycling, Entry, Status
-from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.pages.loop_page import loop_page
 from stiction_ros.survey.pages.words import cause_words
 from stiction_ros.survey.ranking import confidence
+from stiction_ros.survey.survey_options import SurveyOptions
 
 FEWEST = 100
 """Samples in automatic below which nothing is judged."""

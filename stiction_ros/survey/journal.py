@@ -11,8 +11,8 @@ from typing import IO, Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.loop import Loop
-from stiction_ros.json_values import json_text
 from stiction_ros.survey.entry import Entry
+from stiction_ros.texts import json_text
 
 FILE = "loops.jsonl"
 

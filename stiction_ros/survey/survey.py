@@ -16,9 +16,9 @@ from stiction_ros.survey.engines.engine import Engine, Task
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group, grouped
 from stiction_ros.survey.journal import Journal, key_of
-from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.pages.unit import with_unit
 from stiction_ros.survey.ranking import ranked
+from stiction_ros.survey.survey_options import SurveyOptions
 
 PAGES = "loops"
 LOG = "survey.log"

@@ -22,7 +22,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from stiction_ros.cli.runs.seeds import add_jobs, run_each
+from stiction_ros.cli.shared.seeds import add_jobs, run_each
 from stiction_ros.errors import InputError
 
 Answer = dict[str, Any]
@@ -124,7 +124,7 @@ def example_answer(name: str, variant: str, method: str) -> Answer:
 
     from stiction_ros.identification import identify
     from stiction_ros.paper.methods import identify as identify_as_paper
-    from stiction_ros.paper.options import PaperOptions
+    from stiction_ros.paper.paper_options import PaperOptions
     from stiction_studies.examples import example1, example2
 
     make = example1 if name == "example1" else example2
@@ -155,7 +155,7 @@ def world_answer(family: str, seed: int) -> Answer:
 
 def live_answer(name: str) -> Answer:
     """Return what a scenario comes to, run by the core without ROS."""
-    from stiction_ros.cli.runs.scenarios import find
+    from stiction_ros.cli.shared.scenarios import find
     from stiction_ros.online.session import Scenario
     from stiction_studies.commands.scenario import run_seed
 

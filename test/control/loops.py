@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from stiction_ros.control import ControlDesign
-from stiction_ros.control.problem.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.problem.target import Target
-from stiction_ros.control.state.observer import ObserverKind, ObserverTuning
+from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
+from stiction_ros.control.observer import ObserverKind, ObserverTuning
+from stiction_ros.control.target import Target
 from stiction_ros.processes import LinearModel
 
 INF = np.inf

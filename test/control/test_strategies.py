@@ -8,9 +8,9 @@ import pytest
 from loops import design_of, first_order, kalman, limits_for, weights_for
 
 from stiction_ros.control import ControlDesign, ControlMode, MpcController, StepStatus
-from stiction_ros.control.problem.target import Target
 from stiction_ros.control.result import Plan, StepResult
 from stiction_ros.control.strategies import FallbackRule, Solve, Unaware, strategies
+from stiction_ros.control.target import Target
 from stiction_ros.effects import HeStiction
 
 FRICTION = HeStiction(8.0, 1.0)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from stiction_ros import effects
-from stiction_ros.cli.loop.gap import _print as _print_gap
-from stiction_ros.cli.loop.identify import _print
+from stiction_ros.cli.gap import _print as _print_gap
+from stiction_ros.cli.identify import _print
 from stiction_ros.config_files import find_config
 from stiction_ros.discrepancy import GapOptions, GapVerdict, find_discrepancy
 from stiction_ros.discrepancy.answer.found_effects import FoundEffect, units_of

@@ -12,7 +12,7 @@ import simulated_loops as loops
 from stiction_ros.errors import InputError
 from stiction_ros.identification import METHODS, IdentificationOptions, identify, methods
 from stiction_ros.identification.evidence import engine
-from stiction_ros.identification.options import METHOD_NAMES
+from stiction_ros.identification.identification_options import METHOD_NAMES
 from stiction_ros.records.record import Record
 
 SMALL = IdentificationOptions(output_order=1, input_order=1, delay=(5, 5), friction_limit=6.0)

@@ -32,7 +32,7 @@ from exports import (
     write,
 )
 
-from stiction_ros.intake.options import OpUnit, TimeUnit
+from stiction_ros.intake.intake_options import OpUnit, TimeUnit
 from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.records.quality import Quality
 

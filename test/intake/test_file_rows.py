@@ -13,7 +13,7 @@ from exports import check, iso, op, pv, read, table, text, write
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.intake import Loop
-from stiction_ros.intake.options import OpUnit
+from stiction_ros.intake.intake_options import OpUnit
 
 
 def plant(folder: Path, rows: str, **options: object) -> dict[str, Loop]:

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.intake import IntakeOptions, loops
-from stiction_ros.intake.options import OpUnit, TimeUnit
+from stiction_ros.intake.intake_options import OpUnit, TimeUnit
 
 
 def test_a_loop_that_cannot_be_read_stops_no_other(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from exports import HEADER, iso, one, op, pv, read, said, sp, table, text, write
 
 from stiction_ros.cli.main import main
-from stiction_ros.intake.options import OpUnit
+from stiction_ros.intake.intake_options import OpUnit
 
 
 def column(path: Path, values: list[float], name: str = "OP") -> Path:

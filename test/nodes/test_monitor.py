@@ -18,11 +18,11 @@ from sensor_msgs.msg import JointState
 sys.path.insert(0, str(Path(__file__).parents[1] / "online"))
 from monitored_loops import ONSET, RULE, loop, record, shifted
 
-from stiction_ros.json_values import json_text
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state
 from stiction_ros.online.estimator.live import EstimatorSettings, LiveEstimator
 from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.texts import json_text
 
 SAMPLES, LOOKS = 1120, 12
 NEVER = {"fit_first": 100_000, "fit_every": 100_000}

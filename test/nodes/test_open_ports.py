@@ -21,8 +21,8 @@ pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 from open_sockets import command_of, environment_of, family_of, listening_of
 
 import stiction_ros
-from stiction_ros.cli.runs.node_processes import NodeProcesses
-from stiction_ros.cli.runs.scenarios import loop_nodes
+from stiction_ros.cli.shared.node_processes import NodeProcesses
+from stiction_ros.cli.shared.scenarios import loop_nodes
 
 BUDGET = 60.0  # s
 SPEED = 20.0  # samples per second: the run outlasts the look at it

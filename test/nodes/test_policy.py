@@ -12,7 +12,7 @@ import pytest
 import yaml
 from graph import Graph
 
-from stiction_ros.cli.runs.scenarios import STARTED, find, loop_nodes
+from stiction_ros.cli.shared.scenarios import STARTED, find, loop_nodes
 from stiction_ros.config_files import find_config
 from stiction_ros.opcua.security import CLIENT_URI, Identity, make_certificate, write_secret
 

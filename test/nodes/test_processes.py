@@ -19,7 +19,7 @@ pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from foreign_readers import differences
 
-from stiction_ros.cli.runs.node_processes import NodeProcesses, ros_environment
+from stiction_ros.cli.shared.node_processes import NodeProcesses, ros_environment
 from stiction_ros.nodes.shared.peers import GRACE
 from stiction_ros.online.replays.result import Match
 from stiction_ros.online.replays.run import replay

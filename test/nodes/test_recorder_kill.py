@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 
-from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.cli.shared.node_processes import ros_environment
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state, to_ns
 from stiction_ros.records.bag.messages import read_messages

@@ -14,13 +14,13 @@ from bag_making import JOINT_STATE, SECOND, Bag, joint_state
 
 from stiction_ros import __version__
 from stiction_ros.config_files import find_config
-from stiction_ros.json_values import json_text
 from stiction_ros.online.controller.live import ModeChange
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
 from stiction_ros.online.session import LiveRun, Scenario, run_live
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.storage.bag_metadata import Qos
+from stiction_ros.texts import json_text
 
 SAMPLES = 520
 SCHEDULE: dict[str, Any] = {"fit_first": 400, "fit_every": 50, "fit_latency": 5}

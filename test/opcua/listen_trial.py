@@ -20,7 +20,7 @@ from pathlib import Path
 
 from plant_process import wait_until
 
-from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.cli.shared.node_processes import ros_environment
 from stiction_studies.control_system.process import free_port
 from stiction_studies.faults.loop.node_process import NodeProcess
 

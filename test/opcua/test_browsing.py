@@ -9,7 +9,7 @@ import pytest
 from plant_process import PlantProcess
 
 from stiction_ros.cli.main import main
-from stiction_ros.opcua.intake.browsing import TagNames, loops_of
+from stiction_ros.opcua.browsing import TagNames, loops_of
 from stiction_ros.opcua.tag_map import TagMap
 from stiction_studies.control_system.tags import NAMESPACE
 

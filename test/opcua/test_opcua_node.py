@@ -254,8 +254,8 @@ def test_secrets_are_nowhere(loop: Loop, capfd: pytest.CaptureFixture[str]) -> N
 def test_the_bridge_opens_no_port_and_the_plant_one_of_this_machine(
     loop: Loop, tmp_path: Path
 ) -> None:
-    from stiction_ros.cli.runs.node_processes import ros_environment
-    from stiction_ros.cli.runs.scenarios import write_parameters
+    from stiction_ros.cli.shared.node_processes import ros_environment
+    from stiction_ros.cli.shared.scenarios import write_parameters
 
     values = loop.plant.parameters()
     write_parameters({"opcua": values}, tmp_path / "parameters.yaml")

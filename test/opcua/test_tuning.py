@@ -8,7 +8,7 @@ import yaml
 from tuning_trial import CASES, TUNING, scenario_of_the_page, tried
 
 from stiction_ros.cli.main import main
-from stiction_ros.cli.runs.scenarios import bridged_nodes, write_parameters
+from stiction_ros.cli.shared.scenarios import bridged_nodes, write_parameters
 from stiction_ros.config_files import find_config
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from stiction_ros.cli.runs.scenarios import SCENARIOS, STARTED, bridged_nodes, find, loop_nodes
+from stiction_ros.cli.shared.scenarios import SCENARIOS, STARTED, bridged_nodes, find, loop_nodes
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.__main__ import NODES
 from stiction_ros.nodes.shared.parameter_files import applies, node_keys

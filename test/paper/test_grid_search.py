@@ -8,7 +8,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import VerdictKind
 from stiction_ros.paper.grid_search import count_points, nodes
 from stiction_ros.paper.methods import identify
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 
 
 @pytest.mark.parametrize("law", ["smoothed", "hard"])

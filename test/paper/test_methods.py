@@ -11,7 +11,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.paper import methods
 from stiction_ros.paper.methods import METHODS, identify
-from stiction_ros.paper.options import METHOD_NAMES, PaperOptions
+from stiction_ros.paper.paper_options import METHOD_NAMES, PaperOptions
 
 SMALL = PaperOptions(
     output_order=1, input_order=1, delay=(5, 5), starts=1, grid_step=2.0, friction_limit=6.0

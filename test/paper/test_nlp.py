@@ -13,7 +13,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, VerdictKind
 from stiction_ros.identification.problem.equation_error import ArxOrders, fit_outputs, squared_error
 from stiction_ros.paper.methods import identify
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.programme_data import ProgrammeData
@@ -27,8 +27,8 @@ from stiction_ros.paper.programme.starts import (
     inside,
     stiction_line,
 )
-from stiction_ros.paper.smoothed.laws import SMOOTH_LAWS
-from stiction_ros.paper.smoothed.stems import final_smoothing, smoothed_stems
+from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS
+from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
 from stiction_ros.records.record import Record
 
 OPTIONS = PaperOptions(

@@ -9,8 +9,8 @@ import simulated_loops as loops
 from stiction_ros.effects import KanoStiction
 from stiction_ros.errors import InputError
 from stiction_ros.paper.methods import identify
-from stiction_ros.paper.options import PaperOptions
-from stiction_ros.paper.smoothed.laws import SMOOTH_LAWS, smooth_law
+from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS, smooth_law
 
 TAU = np.array([1e4])
 FRICTION = np.array([[5.0037, 2.0011]])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.grid_search import count_points
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_ros.records import Record
 from stiction_studies.examples import example1, example2_of_one_round

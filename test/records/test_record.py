@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import read_csv_parts
 from stiction_ros.records.bag.messages import read_raw
-from stiction_ros.records.csv.writer import write_csv
+from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.parts import joined, longest_part, only_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record

@@ -15,7 +15,7 @@ from stiction_ros.records.record import Record
 from stiction_ros.survey import assess as module
 from stiction_ros.survey.assess import Assessed, assess, at_limits
 from stiction_ros.survey.entry import Status
-from stiction_ros.survey.options import SurveyOptions
+from stiction_ros.survey.survey_options import SurveyOptions
 
 MODEL = {
     "loop": "FIC1",

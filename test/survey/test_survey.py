@@ -16,8 +16,8 @@ from stiction_ros.survey.engines.engine import Done, Task, lost
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.listing.headline import worked
 from stiction_ros.survey.listing.tables import HEAD, write_csv, write_xlsx
-from stiction_ros.survey.options import SurveyOptions
 from stiction_ros.survey.survey import Plan, survey
+from stiction_ros.survey.survey_options import SurveyOptions
 
 KEYS = {
     *("name", "files", "status", "reason", "samples", "sample_time", "auto_share"),

@@ -16,7 +16,7 @@ from stiction_ros.effects import Behaviour, FloatArray
 LATEST = 20  # samples that a stem may come late
 TELLS = 0.5  # of the squared distance from OP that an effect has to explain to be told
 SIDES = (-1.0, -0.5, 0.0, 0.5, 1.0)
-ROUNDS, SHRINK = 9, 0.5
+STEM_SEARCH_ROUNDS, SHRINK = 9, 0.5
 BOXES, THROWN = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003), 1000  # of a needle, and points in each
 ACCURATE = 0.01  # of the span of OP: a stem that near follows it
 
@@ -111,7 +111,7 @@ def _nearest(candidate: ValveCandidate, run: FreeRun, stem: FloatArray) -> tuple
     steps = np.array([axis.step for axis in candidate.axes])
     around = np.array(list(itertools.product(SIDES, repeat=len(steps))))
     tried, size = candidate.grid(), 1.0
-    for _ in range(ROUNDS):
+    for _ in range(STEM_SEARCH_ROUNDS):
         points = candidate.values(tried)
         left = _left(stem, candidate.stems(run, points))
         k = int(np.argmin(left))

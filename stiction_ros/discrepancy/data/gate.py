@@ -15,7 +15,7 @@ from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisati
 from stiction_ros.effects.behaviour import IntArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-from stiction_ros.records.stretches import stretches
+from stiction_ros.records.parts import stretches
 
 SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""

@@ -18,9 +18,9 @@ from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
-from stiction_ros.records.stretches import stretches
+from stiction_ros.records.parts import stretches
 
-ROUNDS = 2
+EXTENSION_ROUNDS = 2
 GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow
 WORTH = 10.0
 TANGENT = 0.25  # steps of a search, by which figures are varied to see what they would do
@@ -120,7 +120,7 @@ def refit_together(
 ) -> list[AddedEffect]:
     """Return effects, each fitted again behind the others."""
     fitted = list(effects)
-    for _ in range(ROUNDS if len(fitted) > 1 else 1):
+    for _ in range(EXTENSION_ROUNDS if len(fitted) > 1 else 1):
         fitted = [_refit(bare, runs, fitted, k) for k in range(len(fitted))]
     return fitted
 

@@ -38,7 +38,7 @@ THROW_SHRINK = 0.7
 CENTRES = 5
 COMBS = (0.1, 0.03, 0.01)  # boxes around the best point, of the largest
 TEETH, STROKES = 3000, 4  # points in each, and how often it is moved to a better one
-ROUNDS = 5
+GAP_SEARCH_ROUNDS = 5
 FAIR, BEHIND = 3, 20.0  # rounds after which a start that is so far behind, in BIC, is given up
 POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
@@ -193,7 +193,7 @@ class _Search:
             self._try(self.candidate.grid())
             return
         best = self._try(np.array([centre]), self.found, under)
-        for done in range(ROUNDS):
+        for done in range(GAP_SEARCH_ROUNDS):
             if done >= FAIR and best[1].delta_bic < self.best().delta_bic - BEHIND:
                 break
             best = self._around(best, size, under)
@@ -204,7 +204,7 @@ class _Search:
         if not self.candidate.axes or self.best().delta_bic <= 0.0:
             return
         best = self.candidate.coordinates(self.best().point), self.best()
-        size = 0.7 * SHRINK**ROUNDS
+        size = 0.7 * SHRINK**GAP_SEARCH_ROUNDS
         for _ in range(POLISHES):
             better = self._around(best, size)
             if better[1].delta_bic < best[1].delta_bic + NEXT_TO_NOTHING:

@@ -11,7 +11,7 @@ import numpy as np
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.likelihood.seen_noise import seen_noise
-from stiction_ros.durations import spoken
+from stiction_ros.texts import spoken
 
 LARGER = 1.25  # times the declared standard deviation, beyond which they disagree
 LAGS = 20

@@ -8,9 +8,9 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import BoolArray, left_by, projector
-from stiction_ros.durations import spoken
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop.set_points import set_point_moves
+from stiction_ros.texts import spoken
 
 KNOTS = 60
 LEAST_ROWS = 30

@@ -23,7 +23,7 @@ from stiction_ros.discrepancy.likelihood.kernels import (
 from stiction_ros.effects import FloatArray
 
 MAX_ORDER = 6
-ROUNDS = 4
+NOISE_FIT_ROUNDS = 4
 SURPRISE = 5.0  # standard deviations that one held-out row may count
 ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
 VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
@@ -128,7 +128,7 @@ def fit_noise(
     rows = np.ascontiguousarray(columns.T)
     ar = np.zeros(0) if start is None else start
     best: tuple[float, FloatArray, FloatArray] | None = None
-    for _ in range(ROUNDS):
+    for _ in range(NOISE_FIT_ROUNDS):
         sure, beta = turn(rows, target, train, ar)
         if not sure:
             beta = _solve(whiten(columns, ar)[train], whiten(target, ar)[train])

@@ -20,7 +20,7 @@ WORK = 3_000_000  # samples of all stems of a first grid together
 BATCH = 160_000
 LEADERS = 3  # per prefilter
 CENTRES = 3
-ROUNDS = 4
+FREE_SEARCH_ROUNDS = 4
 SHRINK = 0.35
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
 ROUGH, FINE = 3, 8  # rounds of Gauss-Newton
@@ -177,7 +177,7 @@ class FreeSearch:
         whole = np.array([axis.whole for axis in self.candidate.axes])
         offsets = np.array(list(itertools.product(SIDE, repeat=len(steps))))
         size = 0.7
-        for _ in range(ROUNDS):
+        for _ in range(FREE_SEARCH_ROUNDS):
             span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)
             grid = best.coordinates + offsets * span
             grid = grid[self._possible(grid)]

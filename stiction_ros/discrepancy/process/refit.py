@@ -21,7 +21,7 @@ from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxProcess, Process
 
 LATER = 1  # samples beyond the model's own delays that are tried
-ROUNDS = 8
+REFIT_ROUNDS = 8
 SETTLING = 6  # rows that the noise model of highest order reaches back
 
 
@@ -129,7 +129,7 @@ def problems_of(run: FreeRun, stems: FloatArray | None = None) -> list[Problem]:
     ]
 
 
-def refit_output(problem: Problem, own: Equation, longest: int, rounds: int = ROUNDS) -> Fitted:
+def refit_output(problem: Problem, own: Equation, longest: int, rounds: int = REFIT_ROUNDS) -> Fitted:
     """Return an output's best equation of the same orders over all delays up to ``longest``.
 
     Starts are the model's own coefficients and, per delay, those of an equation-error fit that
@@ -159,7 +159,7 @@ def _nested(problem: Problem, own: Equation, longest: int, rounds: int) -> list[
     return [dataclasses.replace(found, b=tuple(padded))]
 
 
-def refit_process(model: LoopModel, runs: Runs, longest: int, rounds: int = ROUNDS) -> LoopModel:
+def refit_process(model: LoopModel, runs: Runs, longest: int, rounds: int = REFIT_ROUNDS) -> LoopModel:
     """Return the model with ARX coefficients that fit the free run best, by Gauss-Newton.
 
     Effects and orders stay. The likelihood is that of the innovations on the fitted rows, as
@@ -175,7 +175,7 @@ def refit_process(model: LoopModel, runs: Runs, longest: int, rounds: int = ROUN
     return refitted(FreeRun(model, runs), longest, rounds)
 
 
-def refitted(run: FreeRun, longest: int, rounds: int = ROUNDS) -> LoopModel:
+def refitted(run: FreeRun, longest: int, rounds: int = REFIT_ROUNDS) -> LoopModel:
     """Return the model of a free run, its process fitted again behind the run's own stems."""
     found = [
         refit_output(problem, own, longest, rounds).equation

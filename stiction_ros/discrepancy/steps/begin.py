@@ -15,7 +15,7 @@ from stiction_ros.discrepancy.data.long_records import liveliest_parts
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted
-from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.process.refit import (
     longest_delay,
     refit_process,

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import Candidate
-from stiction_ros.discrepancy.decision.chance import stored_threshold
 from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, decide, thinned_away
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
@@ -22,7 +21,7 @@ from stiction_ros.discrepancy.decision.extend import (
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
 from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
 from stiction_ros.discrepancy.decision.testable import testable_effects
-from stiction_ros.discrepancy.fit.uncertainty import chance_threshold
+from stiction_ros.discrepancy.fit.uncertainty import chance_threshold, stored_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
 from stiction_ros.discrepancy.steps.friction import rests_left

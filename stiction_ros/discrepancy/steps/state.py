@@ -14,7 +14,7 @@ from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, b
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.decision.testable import Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.options import GapOptions
+from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.process.change import ProcessChange
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray

@@ -7,7 +7,7 @@ import dataclasses
 from stiction_ros.identification.answer.experiment import experiment_for
 from stiction_ros.identification.answer.loop_kind import LoopKind, judged_by_kind
 from stiction_ros.identification.answer.step_answer import StepAnswer
-from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.result.identification import FitStatus, Identification, VerdictKind
 from stiction_ros.records.record import Record
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from stiction_ros.durations import spoken
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.identification.closed_loop.explanation import (
@@ -15,10 +14,11 @@ from stiction_ros.identification.closed_loop.explanation import (
     is_echoed,
     is_wave_itself,
 )
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.verdict import price_of_few
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
+from stiction_ros.texts import spoken
 
 STEPS = (4, 2, 1)
 """Steps into which the largest band that is not rejected is divided, the first whose answers PV's

@@ -26,7 +26,7 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.kernels.polynomials import recursion
-from stiction_ros.records.stretches import stretches
+from stiction_ros.records.parts import stretches
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 Stretches = list[tuple[int, int]]

@@ -13,7 +13,7 @@ from stiction_ros.identification.evidence.candidate import (
     Judge,
     candidates_apart,
 )
-from stiction_ros.identification.evidence.fit.problem import LIMIT, Problem
+from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
 from stiction_ros.identification.evidence.search import APART, Found
 from stiction_ros.identification.friction.grid import coarse_grid, finer_grid
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.fit.output_fit import OutputFit, fit_output
-from stiction_ros.identification.evidence.fit.problem import Problem
-from stiction_ros.identification.evidence.fit.whitened import Criterion, Whitened
+from stiction_ros.identification.evidence.fit_problem import Problem
+from stiction_ros.identification.evidence.output_fit import OutputFit, fit_output
+from stiction_ros.identification.evidence.whitened import Criterion, Whitened
 from stiction_ros.identification.kernels.scan import best_apart
 from stiction_ros.identification.linear.response_prior import FREE
 

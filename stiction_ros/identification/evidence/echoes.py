@@ -12,7 +12,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate
-from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER, Problem
+from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
 from stiction_ros.identification.kernels.lags import whitened
 
 SHORTEST = NOISE_ORDER + 4  # rows of a turn: the noise model describes shorter ones

@@ -14,9 +14,9 @@ from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.echoes import echo
-from stiction_ros.identification.evidence.fit.output_fit import OutputFit
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
+from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
     PRICE,
@@ -34,13 +34,13 @@ from stiction_ros.identification.evidence.verdict import (
     stem_is_wave,
     verdict_of,
 )
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import (
     half_gains,
     is_deadband,
 )
 from stiction_ros.identification.kernels.lags import whitened
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.problem.models import (
     Data,
     Model,

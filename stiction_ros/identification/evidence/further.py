@@ -10,8 +10,8 @@ from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.accepted import FREEDOM, MISFIT
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, ideal
-from stiction_ros.identification.evidence.fit.output_fit import white
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
+from stiction_ros.identification.evidence.output_fit import white
 from stiction_ros.identification.evidence.search import DRIFT, Found, search
 from stiction_ros.identification.exact.further_fit import EQUAL, widened
 from stiction_ros.identification.friction.further import (
@@ -22,7 +22,7 @@ from stiction_ros.identification.friction.further import (
 )
 from stiction_ros.identification.result.identification import ValveEstimate
 
-ROUNDS = 2
+FURTHER_LAW_ROUNDS = 2
 
 
 def settled(problem: Problem) -> tuple[tuple[float, ...], ...]:
@@ -44,7 +44,7 @@ def settled(problem: Problem) -> tuple[tuple[float, ...], ...]:
             known = np.all(found.rows[:, 2:-1] == np.array(first), axis=1)
             if found.loss[0] < found.loss[known].min() - EQUAL:
                 problem = _with_further(problem, valve, found.rows[0])
-    for _ in range(ROUNDS):
+    for _ in range(FURTHER_LAW_ROUNDS):
         before, best = problem, search(problem).best
         for valve in np.flatnonzero(best.friction[:, 0]).tolist():
             problem = _with_further(problem, valve, _nearby(problem, best, valve).rows[0])

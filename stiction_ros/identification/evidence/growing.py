@@ -14,8 +14,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate, Judge, rows_apart
-from stiction_ros.identification.evidence.fit.output_fit import OutputFit
-from stiction_ros.identification.evidence.fit.problem import LIMIT, Problem
+from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
+from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.exact.growing_windows import samples_of_turns
 from stiction_ros.identification.friction.grid import even_grid
 

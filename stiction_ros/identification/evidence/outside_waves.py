@@ -25,7 +25,7 @@ from stiction_ros.identification.closed_loop.outside_line import (
     independent,
     waves_of,
 )
-from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER, Problem
+from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
 from stiction_ros.identification.kernels.lags import with_past
 
 HARMONICS = 25  # H, at most: corners of a square wave

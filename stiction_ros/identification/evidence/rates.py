@@ -25,7 +25,7 @@ import numpy as np
 from stiction_ros.identification.closed_loop.tuning import tunings
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.search import (
@@ -39,13 +39,13 @@ from stiction_ros.identification.evidence.search import (
     search_again,
 )
 from stiction_ros.identification.exact.long_records import PART, liveliest_begin
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.linear.response_prior import FREE
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
 
 RATES = (1, 2, 4, 8)
 LEAST_ROWS = 120  # that are left at a rate
-ROUNDS = 2  # in which rates hand each other what they found
+RATE_ROUNDS = 2  # in which rates hand each other what they found
 SEEDS = 2  # frictions of each rate that are tried at the others
 OLDEST = 2.0  # rows from one report to the next, at most, of a rate that may call a valve healthy
 STRAIGHT = 1e-7  # of the range of PV: less is no bend
@@ -222,7 +222,7 @@ def _searched(
 ) -> list[Found]:
     """Return what is found at each rate, what is best at one tried at the others, and ``seeds``."""
     found = [search(problem, parts) for problem in problems]
-    for _ in range(ROUNDS):
+    for _ in range(RATE_ROUNDS):
         heads_of = [_heads(*one) for one in zip(problems, found, strict=True)]
         for k, problem in enumerate(problems):
             others = [seed for other, row in enumerate(heads_of) if other != k for seed in row]

@@ -20,15 +20,15 @@ from stiction_ros.identification.evidence.candidate import (
     ideal,
     rows_apart,
 )
-from stiction_ros.identification.evidence.fit.output_fit import (
+from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
+from stiction_ros.identification.evidence.growing import grown
+from stiction_ros.identification.evidence.output_fit import (
     OutputFit,
     beginnings,
     fit_output,
     follow,
     white,
 )
-from stiction_ros.identification.evidence.fit.problem import LIMIT, Problem
-from stiction_ros.identification.evidence.growing import grown
 from stiction_ros.identification.friction.grid import coarse_grid, cross_grid, finer_grid
 
 SEEDS = 6  # frictions taken from one look at the whole triangle

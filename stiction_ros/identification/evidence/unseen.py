@@ -18,8 +18,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.accepted import Interval
-from stiction_ros.identification.evidence.fit.output_fit import noise_of
-from stiction_ros.identification.evidence.fit.problem import NOISE_ORDER
+from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER
+from stiction_ros.identification.evidence.output_fit import noise_of
 from stiction_ros.identification.kernels.lags import whitened
 
 BETWEEN = 2.0  # standard deviations of OP's innovations by which an end may lie farther out

@@ -13,8 +13,8 @@ from stiction_ros.identification.closed_loop.explanation import (
     is_wave_itself,
 )
 from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.verdict import kind_of, price_of_few
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import (
     Identification,

@@ -23,7 +23,7 @@ from stiction_ros.identification.result.identification import ValveEstimate
 EQUAL = 10.0
 """Loss by which other values than those they begin at must be better before the search."""
 LEAST_GAIN = 0.5
-ROUNDS = 3
+FURTHER_FIT_ROUNDS = 3
 FREEDOM = 3  # as of f_S and f_D alone; each further parameter is one more
 
 
@@ -56,7 +56,7 @@ def settled(data: Data, model: Model, orders: Orders) -> tuple[Data, Model]:
     if not searched(data.law):
         return data, model
     for valve in np.flatnonzero(model.friction[:, 0]).tolist():
-        for _ in range(ROUNDS):
+        for _ in range(FURTHER_FIT_ROUNDS):
             row = _nearby(data, model, orders, valve).rows[0]
             other = _with_further(data, valve, row)
             delays = np.array([each[valve] for each in model.delays])

@@ -49,7 +49,7 @@ STEPS = 30
 LEVELS = 9
 KEPT, LEAST_KEPT = 150, 20
 CHILDREN = 30
-ROUNDS = 4
+SWARM_ROUNDS = 4
 WIDTH, WIDE = 0.03, 0.1
 SHRINK = 0.6
 DECADES = 1.5
@@ -107,7 +107,7 @@ def _grown(data: Data, model: Model, orders: Orders, valve: int, first: int) -> 
         if count > first:
             best = _on_window(window, model, best, orders, valve)
             swarm.scan = _judged(window, best, orders, valve, swarm.rows, ranges)
-        for _ in range(ROUNDS):
+        for _ in range(SWARM_ROUNDS):
             best = _fitted(window, best, orders, valve, swarm)
             off = _offsets(len(swarm.rows) * CHILDREN, swarm.width, generator)
             rows = np.repeat(swarm.rows, CHILDREN, axis=0) + limit * off
@@ -122,7 +122,7 @@ def _grown(data: Data, model: Model, orders: Orders, valve: int, first: int) -> 
         if mean > BROKEN * least:
             return None
         least = min(least, mean)
-        swarm.width *= SHRINK ** (2 - ROUNDS)
+        swarm.width *= SHRINK ** (2 - SWARM_ROUNDS)
     return best
 
 

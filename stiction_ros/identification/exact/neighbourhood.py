@@ -37,7 +37,7 @@ SAMPLES = 6000  # up to which neighbourhoods are of full size
 REJECTED = 1.0
 GROWTHS = 14
 MARGIN = 6.0
-ROUNDS = 4
+NEIGHBOURHOOD_ROUNDS = 4
 LEAST_GAIN = 0.3
 
 
@@ -152,7 +152,7 @@ def refine(
     reachable = None
     if not has_cells(data.law):
         return model, None
-    for _ in range(ROUNDS):
+    for _ in range(NEIGHBOURHOOD_ROUNDS):
         if model.friction[valve, 0] <= 0.0:
             return model, None
         ranges = nearby_delays(data, model, valve, wander)

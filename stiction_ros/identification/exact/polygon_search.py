@@ -33,7 +33,7 @@ MOST_CELLS = 400
 GROWTHS = 8
 WIDEST = 0.05
 NARROWEST = 1e-9
-ROUNDS = 4
+POLYGON_ROUNDS = 4
 LEAST_GAIN = 0.3
 INSIDE = 1e-6
 
@@ -140,7 +140,7 @@ def refine_polygons(
     if model.friction[valve, 0] <= 0.0:
         return model, None
     found = polygon_neighbourhood(data, model, orders, valve, threshold)
-    for _ in range(ROUNDS):
+    for _ in range(POLYGON_ROUNDS):
         start = float(model.start[valve])
         rival = with_valve(data, model, orders, valve, found.best, start, found.delays)
         start = best_start(data, rival, orders, valve)

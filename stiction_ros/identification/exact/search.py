@@ -57,7 +57,7 @@ RIVALS = 2
 PARENTS = 6
 FITTED = 3
 SWEEPS = 5
-ROUNDS = 3
+EXACT_SEARCH_ROUNDS = 3
 CROSS = 200
 LEAST_GAIN = 0.5
 ALIKE = 0.9
@@ -375,7 +375,7 @@ def search(data: Data, model: Model, orders: Orders, growing: bool = True) -> Se
 
 def improve(data: Data, model: Model, orders: Orders) -> Model:
     """Improve the friction of one sticky valve after the other until nothing changes."""
-    for _ in range(ROUNDS):
+    for _ in range(EXACT_SEARCH_ROUNDS):
         gains = [0.0]
         for valve in np.flatnonzero(model.friction[:, 0]):
             better = improve_valve(data, model, orders, int(valve))

@@ -30,7 +30,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.options import IdentificationOptions
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.models import Data, Model
 from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.identification.result.stability import Interval

@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law
-from stiction_ros.identification.options import IdentificationOptions, limited
+from stiction_ros.identification.identification_options import IdentificationOptions, limited
 from stiction_ros.identification.problem.input_checks import (
     TOO_SHORT,
     require_samples,

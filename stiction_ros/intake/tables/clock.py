@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
+from stiction_ros.intake.intake_options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
 from stiction_ros.intake.sheets.cells import is_stamp
 from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
 from stiction_ros.intake.sheets.sheet import Sheet

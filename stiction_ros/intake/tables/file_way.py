@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import CsvColumns, IntakeOptions, OpUnit
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit
 from stiction_ros.intake.tables.tag_rows import TagRow
 from stiction_ros.intake.tables.tags import TagList
 

@@ -7,7 +7,7 @@ import enum
 from collections.abc import Mapping
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import CsvColumns, IntakeOptions
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
 from stiction_ros.intake.sheets.names import (
     OR_ROW,
     QUALITY_NAMES,
@@ -21,7 +21,7 @@ from stiction_ros.intake.sheets.sheet import Sheet, stem
 from stiction_ros.intake.tables.block import Key
 from stiction_ros.intake.tables.clock import TimeColumn, time_column
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv.names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
+from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
 OPTIONS = {"op": "--op TAG=COLUMN", "pv": "--pv TAG=COLUMN", "sp": "--sp TAG=COLUMN"}
 

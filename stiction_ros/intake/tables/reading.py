@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import IntakeOptions
+from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.sheets.cells import BAD_WORDS, Cells, Numbers, Words, number
 from stiction_ros.intake.sheets.names import read_tag
 from stiction_ros.intake.sheets.sheet import Sheet
@@ -17,7 +17,7 @@ from stiction_ros.intake.tables.block import Block, Clock, Column, FlagArray, Ke
 from stiction_ros.intake.tables.clock import in_seconds
 from stiction_ros.intake.tables.plan import Plan, Shape
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.records.csv.names import QUALITY
+from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 
 OPC_GOOD = 192

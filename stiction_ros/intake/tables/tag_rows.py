@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.options import OpUnit, known_time_unit, op_unit
+from stiction_ros.intake.intake_options import OpUnit, known_time_unit, op_unit
 from stiction_ros.intake.sheets.cells import Words, number
 from stiction_ros.intake.sheets.names import SIGNAL_WORDS, SIGNALS
 from stiction_ros.intake.sheets.sheet import Sheet

@@ -5,9 +5,9 @@ from __future__ import annotations
 from sensor_msgs.msg import JointState
 
 from stiction_ros.identification import Identification
-from stiction_ros.json_values import json_text
 from stiction_ros.nodes.shared.messages import joint_state
 from stiction_ros.online.estimator.live import FitUpdate
+from stiction_ros.texts import json_text
 
 Keys = list[tuple[str, object]]
 

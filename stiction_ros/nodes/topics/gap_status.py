@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from stiction_ros.json_values import json_text
 from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring
+from stiction_ros.texts import json_text
 
 Keys = list[tuple[str, object]]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.loop.yaml.reading import parse_limited
+from stiction_ros.loop.yaml_reading import parse_limited
 
 WHERE = "loop_model"
 LONGEST_DELAY = 1000  # samples; a process needs a state for each

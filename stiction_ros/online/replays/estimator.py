@@ -23,8 +23,8 @@ from stiction_ros.online.monitor.gap_finding import GapFinding
 from stiction_ros.online.monitor.gap_monitor import GapLook
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
+from stiction_ros.online.pairing import PairedSample
 from stiction_ros.online.replays.bag import Signal
-from stiction_ros.online.window.pairing import PairedSample
 from stiction_ros.records import Record
 
 SECOND = 10**9

@@ -6,11 +6,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from stiction_ros.json_values import json_text
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.estimator import ReplayedEstimator
 from stiction_ros.online.replays.matching import first_difference
 from stiction_ros.online.replays.result import Match, MonitorMatch
+from stiction_ros.texts import json_text
 
 
 def match_monitor(bag: ReplayBag, estimator: ReplayedEstimator) -> MonitorMatch | None:

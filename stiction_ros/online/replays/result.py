@@ -7,11 +7,11 @@ import enum
 from collections.abc import Sequence
 from typing import Any
 
-from stiction_ros.json_values import finite
 from stiction_ros.online.replays.bag import ReplayBag
 from stiction_ros.online.replays.controller import SECOND, OpMatch
 from stiction_ros.online.replays.estimator import ReplayedFit
 from stiction_ros.records.run.log import ModeChange
+from stiction_ros.texts import finite
 
 
 class Match(enum.StrEnum):

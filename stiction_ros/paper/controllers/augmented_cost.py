@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.problem.horizon import HorizonCost
-from stiction_ros.control.problem.horizon_qp import slack_weights
-from stiction_ros.control.problem.target import Target
+from stiction_ros.control.horizon import HorizonCost
+from stiction_ros.control.horizon_qp import slack_weights
+from stiction_ros.control.target import Target
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.controllers.laws import PrintedFriction
 from stiction_ros.paper.controllers.weights import AugmentedWeights

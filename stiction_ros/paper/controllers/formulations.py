@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from stiction_ros.control.formulations.aware import AwareFormulations
-from stiction_ros.control.formulations.unaware import UnawareMpc
-from stiction_ros.control.problem.horizon import HorizonLimits
+from stiction_ros.control.aware import AwareFormulations
+from stiction_ros.control.horizon import HorizonLimits
+from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import Behaviour
 from stiction_ros.paper.controllers.embedding import PrintedEmbeddingMpc
 from stiction_ros.paper.controllers.inversion import PrintedInversionMpc

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.control.formulations.formulation import Formulation
-from stiction_ros.control.formulations.unaware import UnawareMpc
-from stiction_ros.control.problem.target import Target
+from stiction_ros.control.formulation import Formulation
 from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.control.target import Target
+from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.paper.controllers.laws import printed_frictions

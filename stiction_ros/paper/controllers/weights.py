@@ -7,7 +7,7 @@ import enum
 
 import numpy as np
 
-from stiction_ros.control.problem.horizon import HorizonWeights
+from stiction_ros.control.horizon import HorizonWeights
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel

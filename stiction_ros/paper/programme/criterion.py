@@ -15,8 +15,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.problem.equation_error import ArxOrders, Delays
-from stiction_ros.paper.smoothed.laws import smooth_law
-from stiction_ros.paper.smoothed.stems import final_smoothing
+from stiction_ros.paper.smoothed_laws import smooth_law
+from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records import Record
 
 RIDGE = 1e-11  # on normal equations of unit columns: a stem that rests has no effect

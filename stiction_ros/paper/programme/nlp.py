@@ -33,7 +33,7 @@ from stiction_ros.paper.one_step_result import (
     friction_limits,
     result,
 )
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme, ReducedSolution

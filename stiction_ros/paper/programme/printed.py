@@ -22,13 +22,13 @@ from stiction_ros.paper.one_step_result import (
     friction_limits,
     result,
 )
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme, Solution
 from stiction_ros.paper.programme.nlp import MAX_CHOICES, NO_END, pairs
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.starts import draw_starts
-from stiction_ros.paper.smoothed.stems import final_smoothing
+from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records import Record
 
 Progress = Callable[[float], None]

@@ -16,7 +16,7 @@ from stiction_ros.identification.problem.equation_error import (
     stable_arx,
 )
 from stiction_ros.paper.programme.stem_sensitivities import StemSensitivities
-from stiction_ros.paper.smoothed.laws import smooth_law
+from stiction_ros.paper.smoothed_laws import smooth_law
 
 
 @dataclasses.dataclass(frozen=True)

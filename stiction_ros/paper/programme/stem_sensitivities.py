@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.paper.smoothed.laws import SmoothLaw, smooth_law
+from stiction_ros.paper.smoothed_laws import SmoothLaw, smooth_law
 
 BLOCK = 250
 SECOND = ((0, 0), (0, 1), (1, 1))

@@ -8,9 +8,9 @@ import re
 from stiction_ros.discrepancy import Discrepancy, FoundEffect
 from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.durations import HOUR, spoken
 from stiction_ros.effects import behaviours
 from stiction_ros.report.page import number
+from stiction_ros.texts import HOUR, spoken
 
 DIGITS = 3  # of a figure without an interval
 CONTROLLER = {

@@ -9,7 +9,6 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
-from stiction_ros.json_values import finite
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
 from stiction_ros.report.drawing import (
@@ -33,6 +32,7 @@ from stiction_ros.report.shapes import (
     fitted_start,
     free_run,
 )
+from stiction_ros.texts import finite
 
 _MEANING = {
     "delta_bic": "BIC by which friction beats the best model without it",

@@ -5,10 +5,10 @@ from __future__ import annotations
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.words import cause_of, materiality, next_step, why
 from stiction_ros.identification.result.cause import CauseKind
-from stiction_ros.json_values import finite
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.report.page import Cell, duration, interval, number, table, text, words
+from stiction_ros.texts import finite
 
 
 def lead(found: Identification) -> str:

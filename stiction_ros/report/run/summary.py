@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.json_values import finite, json_text
 from stiction_ros.report.run.scoring import Phase
 from stiction_ros.report.run.story import Story
+from stiction_ros.texts import finite, json_text
 
 
 def summary(

@@ -9,7 +9,7 @@ from typing import Protocol
 from stiction_ros.intake.loop import Loop
 from stiction_ros.survey.assess import Assessed
 from stiction_ros.survey.entry import Entry, Status
-from stiction_ros.survey.options import SurveyOptions
+from stiction_ros.survey.survey_options import SurveyOptions
 
 ATTEMPTS = 3
 """Times that a loop is tried whose worker dies: one that kills workers must not kill all."""

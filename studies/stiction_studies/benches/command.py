@@ -14,9 +14,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.options.searches import add_search_options
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.output.progress import Bar, bar
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.progress import Bar, bar
+from stiction_ros.cli.shared.searches import add_search_options
 from stiction_ros.errors import InputError
 from stiction_studies.benches import against
 from stiction_studies.benches.accuracy import field as bench_field

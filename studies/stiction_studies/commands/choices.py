@@ -6,7 +6,7 @@ at once.
 
 from __future__ import annotations
 
-from stiction_ros.cli.options.choices import METHODS
+from stiction_ros.cli.shared.searches import METHODS
 
 COUNTED = METHODS
 """Methods that ``stiction paper --success`` counts."""

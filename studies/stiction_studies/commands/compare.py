@@ -13,8 +13,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over, write_json
-from stiction_ros.cli.runs.seeds import run_seeds, seed_range
+from stiction_ros.cli.shared.as_json import hand_over, write_json
+from stiction_ros.cli.shared.seeds import run_seeds, seed_range
 from stiction_ros.errors import InputError, storing
 from stiction_studies.commands import choices
 

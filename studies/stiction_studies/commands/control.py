@@ -11,8 +11,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop.set_points import holds

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli.output.progress import Bar
-from stiction_ros.cli.runs.node_processes import NodeError, NodeProcesses
-from stiction_ros.cli.runs.scenarios import bridged_nodes, find
+from stiction_ros.cli.shared.node_processes import NodeError, NodeProcesses
+from stiction_ros.cli.shared.progress import Bar
+from stiction_ros.cli.shared.scenarios import bridged_nodes, find
 from stiction_ros.opcua import require_asyncua
 
 if TYPE_CHECKING:

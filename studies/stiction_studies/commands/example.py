@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from stiction_ros.cli.options.searches import add_search_options, identify_by, search_options
-from stiction_ros.cli.output.as_json import hand_over, write_json
-from stiction_ros.cli.output.progress import bar
-from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.cli.shared.as_json import hand_over, write_json
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.cli.shared.searches import add_search_options, identify_by, search_options
+from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError, storing
-from stiction_ros.records.csv.writer import write_csv
+from stiction_ros.records.csv_writer import write_csv
 from stiction_studies.commands import choices
 from stiction_studies.commands.example_tables import print_outcome, print_study
 

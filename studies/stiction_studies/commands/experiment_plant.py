@@ -7,7 +7,7 @@ import functools
 import sys
 from pathlib import Path
 
-from stiction_ros.cli.runs.seeds import add_jobs, run_each
+from stiction_ros.cli.shared.seeds import add_jobs, run_each
 from stiction_ros.errors import InputError
 from stiction_studies.field import field_loop
 from stiction_studies.field.exports.plant import PlantLoop, export_plant, loop_seed, plant_loop

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.node_processes import require_ros, ros_environment
-from stiction_ros.cli.runs.seeds import run_each
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.node_processes import require_ros, ros_environment
+from stiction_ros.cli.shared.seeds import run_each
 from stiction_ros.errors import InputError
 from stiction_studies.commands.fault_cases import keep, shown_seconds
 from stiction_studies.faults.fault import Fault

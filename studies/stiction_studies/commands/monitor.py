@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
     from stiction_ros.online.monitor.gap_monitor import MonitorRule

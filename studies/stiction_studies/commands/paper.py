@@ -10,8 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.progress import bar
-from stiction_ros.cli.runs.seeds import run_seeds, seed_range
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.cli.shared.seeds import run_seeds, seed_range
 from stiction_ros.errors import InputError, storing
 from stiction_studies.commands import choices
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.scenarios import find
-from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.scenarios import find
+from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario
@@ -72,9 +72,9 @@ def add(commands: Any) -> None:
 def run_seed(scenario: Scenario, seed: int, *, ideal_valves: bool) -> Outcome:
     """Run one seed; a plain function, so that a worker process can run it."""
     from stiction_ros.online.session import run_live
-    from stiction_ros.report.run.live_log import log_of
     from stiction_ros.report.run.story import tell
     from stiction_ros.report.run.summary import summary
+    from stiction_studies.commands.live_log import log_of
 
     chosen = dataclasses.replace(scenario, seed=seed)
     live = run_live(chosen, ideal_valves=ideal_valves)

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.output.progress import bar
-from stiction_ros.cli.runs.node_processes import require_ros
-from stiction_ros.cli.runs.scenarios import find, node_parameters
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.node_processes import require_ros
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.cli.shared.scenarios import find, node_parameters
 from stiction_ros.errors import InputError, storing
 from stiction_ros.settings import settings_of
 from stiction_studies.faults.terms import Pace

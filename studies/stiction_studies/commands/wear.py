@@ -10,9 +10,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.scenarios import find
-from stiction_ros.cli.runs.seeds import add_jobs, run_seeds, seed_range
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.scenarios import find
+from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError
 
 if TYPE_CHECKING:

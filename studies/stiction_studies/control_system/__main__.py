@@ -16,7 +16,7 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel, PiTuning, SetPoints
-from stiction_ros.loop.yaml.reading import Section, load_yaml
+from stiction_ros.loop.yaml_reading import Section, load_yaml
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.security import check_secret_file
 from stiction_ros.orphans import DIE_WITH_PARENT, die_with_parent

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from stiction_ros.config_files import find_config
-from stiction_ros.control.formulations.embedding import EmbeddingMpc
+from stiction_ros.control.embedding import EmbeddingMpc
 from stiction_ros.effects import Behaviour, HeStiction, StepDisturbance
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError

@@ -19,8 +19,8 @@ from stiction_ros.loop import (
     SetPoints,
     simulate_closed_loop,
 )
-from stiction_ros.loop.pi_stability import largest_gains
 from stiction_ros.records import Record
+from stiction_studies.blind.pi_stability import largest_gains
 from stiction_studies.examples.example import Example
 
 FAMILIES = ("tight", "sine", "coloured")

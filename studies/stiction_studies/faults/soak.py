@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.cli.shared.node_processes import ros_environment
 from stiction_ros.online.controller.live import HISTORY_SAMPLES
 from stiction_ros.online.node_settings import EstimatorNodeSettings
 from stiction_ros.settings import from_mapping

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.json_values import finite
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.records.storage.bag_metadata import BagTopic
@@ -33,6 +32,7 @@ from stiction_ros.report.page import card, duration, embedded, number, page, tab
 from stiction_ros.report.run.scoring import Phases, phases
 from stiction_ros.report.run.summary import measured, messages, write_json
 from stiction_ros.report.run.work_table import work_rows
+from stiction_ros.texts import finite
 from stiction_studies.control_system.journal import transfer_steps
 
 JOURNAL = "journal.jsonl"  # of the simulated plant, beside the bag

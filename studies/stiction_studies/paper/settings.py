@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable
 
 from stiction_ros.errors import InputError
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_studies.examples import Example, example1, example2_of_one_round
 
 

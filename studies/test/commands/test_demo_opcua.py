@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from stiction_ros.cli.main import main
-from stiction_ros.cli.runs.scenarios import SCENARIOS
+from stiction_ros.cli.shared.scenarios import SCENARIOS
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua.tag_map import TagMap
 from stiction_ros.settings import from_mapping

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiction_ros.discrepancy.decision.chance import FEW, SCORE_OF_FEW, stored_threshold
+from stiction_ros.discrepancy.fit.uncertainty import FEW, SCORE_OF_FEW, stored_threshold
 from stiction_studies.blind.calibration import ChanceScore, chance_scores
 
 

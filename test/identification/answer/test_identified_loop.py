@@ -29,7 +29,7 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.records.csv.writer import write_csv
+from stiction_ros.records.csv_writer import write_csv
 
 
 @pytest.fixture(scope="module")

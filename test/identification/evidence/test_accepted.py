@@ -14,7 +14,7 @@ from stiction_ros.identification.evidence.accepted import (
     accepted,
 )
 from stiction_ros.identification.evidence.candidate import Judge
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.search import search
 
 

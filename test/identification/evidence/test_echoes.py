@@ -9,7 +9,7 @@ from evidence_loops import FloatArray, pi_loop
 from stiction_ros.identification.closed_loop.explanation import ECHO, PLAIN_LINE, RIVAL, is_echoed
 from stiction_ros.identification.evidence.candidate import Candidate, ideal
 from stiction_ros.identification.evidence.echoes import SHORTEST, echo
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.records import Record
 
 SAMPLES = 1200

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.evidence.fit.kernels import (
+from stiction_ros.identification.evidence.fit_kernels import (
     Given,
     Lines,
     beside_lines,

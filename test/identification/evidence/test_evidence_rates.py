@@ -10,7 +10,7 @@ from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.accepted import Accepted
 from stiction_ros.identification.evidence.engine import evidence_of
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
     BESIDE,

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.identification.evidence.accepted import accepted
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.search import Found, search
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.kernels.scan import best_apart

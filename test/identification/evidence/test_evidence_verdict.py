@@ -11,7 +11,7 @@ from stiction_ros.identification import IdentificationOptions, VerdictKind
 from stiction_ros.identification.closed_loop.explanation import SURE
 from stiction_ros.identification.evidence.accepted import Accepted
 from stiction_ros.identification.evidence.engine import _stability
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.rates import PRICE, Agreement, Look
 from stiction_ros.identification.evidence.search import Found, ideal
 from stiction_ros.identification.evidence.verdict import (

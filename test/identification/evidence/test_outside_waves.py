@@ -8,7 +8,7 @@ from evidence_loops import FloatArray, pi_loop
 
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.evidence.candidate import ideal
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.rates import looks
 from stiction_ros.identification.evidence.search import better, search

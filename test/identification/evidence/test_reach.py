@@ -14,11 +14,11 @@ from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.closed_loop.tuning import RESETS, Tuning, tunings
 from stiction_ros.identification.evidence.accepted import HARMLESS, accepted
 from stiction_ros.identification.evidence.candidate import ideal
-from stiction_ros.identification.evidence.fit.output_fit import beginnings, fit_output
-from stiction_ros.identification.evidence.fit.problem import Problem
-from stiction_ros.identification.evidence.fit.whitened import Whitened
+from stiction_ros.identification.evidence.fit_problem import Problem
+from stiction_ros.identification.evidence.output_fit import beginnings, fit_output
 from stiction_ros.identification.evidence.rates import looks
 from stiction_ros.identification.evidence.search import search
+from stiction_ros.identification.evidence.whitened import Whitened
 from stiction_ros.identification.linear.response_prior import (
     FACTOR,
     FREE,

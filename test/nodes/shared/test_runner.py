@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 for Python is not installed")
 
-from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.cli.shared.node_processes import ros_environment
 
 PATIENCE = 60.0
 SOON = 1.0  # s from an interrupt to the end

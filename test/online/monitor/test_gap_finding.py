@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from monitored_loops import ONSET, loop, record, shifted, sticky
 
 from stiction_ros.discrepancy import GapVerdict
-from stiction_ros.json_values import json_text
 from stiction_ros.online.monitor.gap_finding import GapFinding, find_in_window, standing, unusable
+from stiction_ros.texts import json_text
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,6 @@ from bag_making import Bag
 from monitored_loops import RULE, loop, record, shifted
 
 from stiction_ros import __version__
-from stiction_ros.json_values import json_text
 from stiction_ros.online.estimator.live import LiveEstimator
 from stiction_ros.online.monitor.monitoring import Monitoring
 from stiction_ros.online.node_settings import EstimatorNodeSettings
@@ -27,6 +26,7 @@ from stiction_ros.records.bag.messages import read_messages
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.run.gap_log import gap_log
 from stiction_ros.records.storage.mcap_scan import RawMessage
+from stiction_ros.texts import json_text
 
 SAMPLES = 1120
 SETTINGS = EstimatorNodeSettings(

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from loops import first_order, kalman, limits_for, target_at, weights_for
 
 from stiction_ros.control import ControlDesign, ControlMode, MpcController
-from stiction_ros.control.formulations.unaware import UnawareMpc
+from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.effects import HeStiction
 from stiction_ros.paper.controllers.formulations import PrintedFormulations
 from stiction_ros.paper.controllers.inversion import PrintedInversionMpc

@@ -6,7 +6,7 @@ from loops import first_order
 
 from stiction_ros.config_files import find_config
 from stiction_ros.control import ControlMode, MpcController
-from stiction_ros.control.state.observer import ObserverKind
+from stiction_ros.control.observer import ObserverKind
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.errors import InputError

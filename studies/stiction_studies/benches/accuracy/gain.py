@@ -11,8 +11,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import write_json
-from stiction_ros.cli.runs.seeds import run_seeds
+from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.seeds import run_seeds
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign, EmbeddingRun

@@ -17,9 +17,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.output.progress import bar
-from stiction_ros.cli.runs.seeds import drop
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.cli.shared.seeds import drop
 from stiction_ros.orphans import spared
 from stiction_studies.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_studies.commands import choices
@@ -153,7 +153,7 @@ def judge_all(
 
 def _show_chance(bench: GapBench) -> None:
     """Print how large scores of noise alone become, by the number of candidates."""
-    from stiction_ros.discrepancy.decision.chance import stored_threshold
+    from stiction_ros.discrepancy.fit.uncertainty import stored_threshold
     from stiction_studies.blind.calibration import chance_scores
 
     scores: dict[int, list[float]] = {}

@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.fit.output_fit import OutputFit, beginnings, fit_output
-from stiction_ros.identification.evidence.fit.problem import Problem
+from stiction_ros.identification.evidence.fit_problem import Problem
+from stiction_ros.identification.evidence.output_fit import OutputFit, beginnings, fit_output
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.rates import at_all_rates, liveliest, price_beside
+from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.kernels.lags import in_rows
-from stiction_ros.identification.options import IdentificationOptions
 from stiction_ros.records.record import Record
 
 

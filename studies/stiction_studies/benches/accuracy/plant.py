@@ -12,7 +12,7 @@ from typing import Any
 
 from rich.console import Console
 
-from stiction_ros.cli.output.as_json import hand_over
+from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError
 from stiction_studies.benches.accuracy.answer import FOUND
 from stiction_studies.benches.accuracy.share import Share, shares_table

@@ -15,8 +15,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.seeds import run_each
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.seeds import run_each
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import CsvColumns, open_parts
 from stiction_ros.records.parts import longest_part

@@ -14,10 +14,10 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from stiction_ros.cli.output.as_json import hand_over
-from stiction_ros.cli.runs.seeds import run_each
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.seeds import run_each
 from stiction_ros.errors import InputError, storing
-from stiction_ros.json_values import json_text
+from stiction_ros.texts import json_text
 from stiction_studies.benches.accuracy.gap import matrix_table, rate_table
 from stiction_studies.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_studies.commands import choices
@@ -131,7 +131,7 @@ def judge(full: bool, log: Path, case: Case) -> WorldScore:
 def write_loops(bench: WorldBench, folder: Path) -> None:
     """Write every loop to ``folder/loops/FAMILY_MODEL_SEED``, its answer to ``folder/answers``."""
     from stiction_ros.loop import LoopModel
-    from stiction_ros.records.csv.writer import write_csv
+    from stiction_ros.records.csv_writer import write_csv
     from stiction_studies.field.hidden import hidden_loop
 
     for family, given, seed in bench.cases:

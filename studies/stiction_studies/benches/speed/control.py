@@ -13,11 +13,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from stiction_ros.cli.runs.scenarios import find
+from stiction_ros.cli.shared.scenarios import find
 from stiction_ros.control import ControlDesign, ControlMode, MpcController, Plan
-from stiction_ros.control.formulations.unaware import UnawareMpc
-from stiction_ros.control.problem.target import TargetSelector
-from stiction_ros.control.state.observer import Observer
+from stiction_ros.control.observer import Observer
+from stiction_ros.control.target import TargetSelector
+from stiction_ros.control.unaware import UnawareMpc
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.control.problem.horizon import HorizonWeights
+from stiction_ros.control.horizon import HorizonWeights
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.paper.controllers.augmented_cost import PlanProblem
 from stiction_ros.processes import LinearModel

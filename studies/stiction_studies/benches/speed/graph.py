@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.cli.output.progress import Bar
-from stiction_ros.cli.runs.node_processes import NodeProcesses, require_ros, ros_environment
-from stiction_ros.cli.runs.scenarios import find, node_parameters
+from stiction_ros.cli.shared.node_processes import NodeProcesses, require_ros, ros_environment
+from stiction_ros.cli.shared.progress import Bar
+from stiction_ros.cli.shared.scenarios import find, node_parameters
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
 from stiction_studies.benches.speed.row import Row, row

@@ -17,7 +17,7 @@ from stiction_ros.identification.problem.equation_error import ArxOrders, square
 from stiction_ros.paper.grid_search import count_points
 from stiction_ros.paper.methods import identify as identify_as_paper
 from stiction_ros.paper.one_step_result import check_record, friction_limits
-from stiction_ros.paper.options import PaperOptions
+from stiction_ros.paper.paper_options import PaperOptions
 from stiction_studies.benches.speed.row import Row, row
 from stiction_studies.examples import Example, coupled_loop, example1, example2_of_one_round
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
-from stiction_ros.cli.output.progress import Bar
-from stiction_ros.cli.runs.node_processes import require_ros, ros_environment
+from stiction_ros.cli.shared.node_processes import require_ros, ros_environment
+from stiction_ros.cli.shared.progress import Bar
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.writer import BagWriter, Packing

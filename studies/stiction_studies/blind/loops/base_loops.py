@@ -12,7 +12,7 @@ from scipy.signal import cont2discrete
 
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel, PiController, PiControllers, PiTuning
-from stiction_ros.loop.pi_stability import largest_gains
+from stiction_studies.blind.pi_stability import largest_gains
 
 MIDDLE = 50.0  # OP and PV of the operating point
 LIMITS = (0.0, 100.0)

@@ -16,10 +16,10 @@ from stiction_ros.effects import (
     Tuning,
 )
 from stiction_ros.errors import InputError, storing
-from stiction_ros.json_values import json_text
 from stiction_ros.loop import LoopModel, PiTuning, SetPoints, simulate_closed_loop
 from stiction_ros.records import Record
-from stiction_ros.records.csv.writer import write_csv
+from stiction_ros.records.csv_writer import write_csv
+from stiction_ros.texts import json_text
 from stiction_studies.blind.loops.base_loops import BaseLoop, base_loop
 from stiction_studies.blind.loops.causes import CAUSES, FIRST_OF_TWO, SECOND_OF_TWO, Cause, Draw
 from stiction_studies.blind.loops.circumstances import (

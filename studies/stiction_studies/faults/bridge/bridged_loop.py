@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from stiction_ros.cli.runs.scenarios import find, node_parameters
+from stiction_ros.cli.shared.scenarios import find, node_parameters
 from stiction_ros.config_files import find_config
 from stiction_ros.loop import LoopModel
 from stiction_studies.control_system.control_system import AUTO, REMOTE

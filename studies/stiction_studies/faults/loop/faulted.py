@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiction_ros.cli.runs.node_processes import ros_environment
+from stiction_ros.cli.shared.node_processes import ros_environment
 from stiction_studies.faults.loop.node_process import NodeProcess
 
 if TYPE_CHECKING:

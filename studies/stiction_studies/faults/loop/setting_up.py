@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from stiction_ros.cli.runs.scenarios import find, node_parameters
+from stiction_ros.cli.shared.scenarios import find, node_parameters
 from stiction_ros.loop import LoopModel
 from stiction_ros.settings import settings_of
 from stiction_studies.faults.terms import Pace

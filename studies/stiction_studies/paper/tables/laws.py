@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from stiction_ros.paper.methods import identify
-from stiction_ros.paper.options import METHOD_NAMES, PaperOptions
+from stiction_ros.paper.paper_options import METHOD_NAMES, PaperOptions
 from stiction_studies.examples import example1
 from stiction_studies.examples.control_study import COLUMNS, StudyOptions, run_trial
 from stiction_studies.pages.control_scores import score_trial

@@ -12,7 +12,7 @@ from stiction_ros.paper.programme.friction_programme import FrictionProgramme
 from stiction_ros.paper.programme.nlp import WIDTH
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme
-from stiction_ros.paper.smoothed.stems import final_smoothing, smoothed_stems
+from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
 from stiction_studies.examples import Example
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example

@@ -10,11 +10,11 @@ import pytest
 
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
-from stiction_ros.loop.pi_stability import closed_loop_radius
 from stiction_studies.blind.loops.base_loops import KINDS, base_loop
 from stiction_studies.blind.loops.causes import CAUSES
 from stiction_studies.blind.loops.generator import blind_loop, write_blind_loop
 from stiction_studies.blind.loops.truth import FAMILIES
+from stiction_studies.blind.pi_stability import closed_loop_radius
 
 SHIFTED = 37  # a seed with a time shift
 every_family = pytest.mark.parametrize("family", FAMILIES)

@@ -1,1 +1,0 @@
-"""Commands about bags: convert, repair, replay, report."""

@@ -1,0 +1,187 @@
+"""``stiction demo``: a live loop from limit cycle to compensation, recorded and reported."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stiction_ros.cli import extensions
+from stiction_ros.cli.shared.node_processes import NodeError, NodeProcesses, require_ros
+from stiction_ros.cli.shared.progress import Bar, bar
+from stiction_ros.cli.shared.scenarios import SCENARIOS, find, loop_nodes
+from stiction_ros.errors import InputError, storing
+
+if TYPE_CHECKING:
+    from stiction_ros.online.session import Scenario
+
+
+OPCUA = "opcua"
+OPCUA_HELP = "; opcua: the tank behind a control system"
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    opcua, compare = extensions.part("demo opcua"), extensions.part("demo --compare")
+    parser = commands.add_parser(
+        "demo",
+        help="run a live loop: cycle, identify, swap, record, report",
+        description="Start plant, controller, estimator and recorder as processes; let the loop "
+        "cycle; identify the friction; swap the controller; record all traffic; write the report.",
+    )
+    parser.add_argument(
+        "scenario",
+        nargs="*",
+        metavar="SCENARIO",
+        help="tank, siso, or a file (default: both)" + (OPCUA_HELP if opcua else ""),
+    )
+    parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    parser.add_argument(
+        "--speed",
+        default="max",
+        type=_speed,
+        metavar="max|N",
+        help="lockstep as fast as possible, or N simulated seconds per second (default: max)",
+    )
+    if compare is None:
+        parser.add_argument("--compare", action=extensions.Missing)
+    else:
+        compare.add_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    compare = extensions.part("demo --compare")
+    if compare is not None:
+        if options.compare:
+            return int(compare.run(options))
+        compare.refuse_options(options)
+    names = options.scenario or SCENARIOS
+    paths = [find(name) for name in names if name != OPCUA]
+    opcua = extensions.needed_part("demo opcua") if OPCUA in names else None
+    from stiction_ros.online.session import Scenario
+
+    scenarios = [Scenario.load(path) for path in paths]
+    require_ros()
+    signal.signal(signal.SIGTERM, _interrupt)
+    good = True
+    if opcua is not None:
+        directory = Path(options.out) / OPCUA
+        opcua.require()
+        _make_empty(directory)
+        with bar(f"{OPCUA}: starting") as show:
+            good = opcua.run(directory, options.seed, options.speed, show)
+    for scenario in scenarios:
+        directory = Path(options.out) / scenario.name
+        _make_empty(directory)
+        with bar(f"{scenario.name}: starting") as show:
+            good = _run_scenario(scenario, directory, options, show) and good
+    return 0 if good else 1
+
+
+def _run_scenario(
+    scenario: Scenario, directory: Path, options: argparse.Namespace, show: Bar
+) -> bool:
+    """Run one scenario and print its table; return whether it succeeded."""
+    from stiction_ros.report.run.report import report_run
+
+    name = scenario.name
+    nodes = loop_nodes(scenario.path, directory, seed=options.seed, speed=options.speed)
+    processes = NodeProcesses(nodes, directory)
+    load, begin = os.getloadavg()[0], time.monotonic()
+    try:
+        try:
+            processes.start()
+            processes.wait(lambda share: show(0.9 * share, f"{name}: running"))
+        finally:
+            processes.stop()
+        processes.check()
+    except NodeError as failure:
+        print(f"stiction: {name}: {failure}; see {directory / 'log'}", file=sys.stderr)
+        return False
+    seconds = time.monotonic() - begin
+    show(0.92, f"{name}: reporting")
+    report = report_run(directory / "bag", directory, scenario=scenario, seconds=seconds, load=load)
+    show(1.0)
+    _print(report.summary, directory)
+    return bool(report.summary["status"] == "ok")
+
+
+def _print(summary: dict[str, Any], directory: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from stiction_ros.report.run.work_table import work_rows
+
+    console = Console()
+    name = summary["scenario"]
+    if summary["swap_time"] is None:
+        console.print(f"{name}: the controller was never swapped")
+    else:
+        valves = ", ".join(
+            f"{v['name']} {v['verdict']} (f_S {v['f_s']:.2f}, f_D {v['f_d']:.2f})"
+            for v in summary["valves"]
+        )
+        console.print(f"{name}: swapped at {summary['swap_time']:.0f} s; {valves}")
+    table = Table(title=f"{name}, {summary['samples']} samples", title_justify="left")
+    for column in ("output", "", "before", "after", "stiction-free"):
+        table.add_column(column)
+    phases = summary["phases"]
+    for output in phases.get("before", {}):
+        for key in ("amplitude", "offset", "iae_per_hour"):
+            values = [
+                phases.get(phase, {}).get(output, {}).get(key)
+                for phase in ("before", "after", "stiction_free")
+            ]
+            cells = ["–" if value is None else f"{value:.4g}" for value in values]
+            table.add_row(output, key, *cells)
+    for valve, label, told in work_rows(summary, ("before", "after", "stiction_free")):
+        table.add_row(valve, label, *("–" if value is None else f"{value:.4g}" for value in told))
+    console.print(table)
+    if summary["pv_to_op_ms"]:
+        times = ", ".join(f"{key} {value:.3g}" for key, value in summary["pv_to_op_ms"].items())
+        load = summary["load_before"]
+        console.print(f"{name}: PV to OP in ms: {times}; load {load:.2f} before the run")
+    for topic, count in summary["messages"].items():
+        # The recorder cannot hold its own last message.
+        lost = (count["published"] or 0) - count["recorded"] - (topic == "/diagnostics")
+        if lost > 0:
+            console.print(f"{name}: warning: {lost} messages of {topic} are not in the bag")
+    if summary["status"] != "ok":
+        console.print(f"{name}: {summary['reason']}")
+    console.print(f"{directory / 'report.html'}")
+
+
+def _make_empty(directory: Path) -> None:
+    """Make the folder, and remove what an earlier run of the demo left in it."""
+    if directory.exists() and any(directory.iterdir()):
+        if not (directory / "parameters.yaml").is_file():
+            raise InputError(
+                "holds other files", where=str(directory), fix="choose another folder by --out"
+            )
+        shutil.rmtree(directory)
+    with storing(directory, what="made"):
+        directory.mkdir(parents=True, exist_ok=True)
+
+
+def _speed(text: str) -> float | None:
+    if text == "max":
+        return None
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not speed > 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither max nor a positive number")
+    return speed
+
+
+def _interrupt(_number: int, _frame: Any) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,171 @@
+"""``stiction fit-linear``: a linear model of a record, without friction."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared import searches
+from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+)
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.errors import storing
+from stiction_ros.records.parts import longest_part
+
+if TYPE_CHECKING:
+    from stiction_ros.identification.linear.result import LinearIdentification
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "fit-linear",
+        help="fit a linear model, for a controller that knows no friction",
+        description="Fit a linear model from OP to PV and write it as a loop model. Exit code 1 "
+        "when there is no stable model.",
+    )
+    parser.add_argument("record", metavar="RECORD", help="CSV file or bag")
+    add_columns(parser)
+    add_intake(parser)
+    parser.add_argument(
+        "--kind", default="state_space", choices=searches.LINEAR_KINDS, help="(state_space)"
+    )
+    parser.add_argument("--order", type=int, metavar="N", help="states (default: by BIC)")
+    parser.add_argument(
+        "--method",
+        default="cva",
+        choices=searches.SUBSPACE_METHODS,
+        help="projection of state_space; predictor for records of a closed loop (cva)",
+    )
+    parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: 1 to 3)")
+    parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
+    parser.add_argument("--nc", type=int, metavar="N", help="order n_c of armax (default: n_a)")
+    parser.add_argument("--criterion", default="bic", choices=searches.CRITERIA, help="(bic)")
+    parser.add_argument(
+        "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
+    )
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument("--out", metavar="F", help="write the loop model, F.loop.yaml")
+    parser.add_argument(
+        "--limits", type=limits_range, metavar="LO:HI", help="limits of the valves in it, %%"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    loop = opened(options)
+    record = longest_part(loop.parts)
+    from stiction_ros.identification.linear.data import LinearKind, LinearStatus, OrderCriterion
+    from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
+    from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
+
+    settings = LinearOptions(
+        kind=LinearKind(options.kind),
+        order=options.order,
+        output_order=options.na,
+        input_order=options.nb,
+        noise_order=options.nc,
+        delay=options.delay,
+        criterion=OrderCriterion(options.criterion),
+        method=SubspaceMethod(options.method),
+    )
+    with bar("fitting") as show:
+        found = fit_linear(record, settings, progress=show)
+    if options.json is not None:
+        write_json(options.json, {"record": str(options.record)} | found.to_json())
+    if options.json != "-":
+        print(f"{loop.name}: {loop.summary}")
+        _print(str(options.record), found)
+    if found.status in (LinearStatus.NO_MODEL, LinearStatus.UNSTABLE):
+        return 1
+    if options.out is not None:
+        name = Path(options.out).name.removesuffix(".yaml").removesuffix(".loop")
+        with storing(options.out):
+            found.loop_model(name or "loop", options.limits).save(options.out)
+    return 0
+
+
+def _print(name: str, found: LinearIdentification) -> None:
+    console = Console()
+    title = f"{name}: {found.kind}, {found.samples} samples, {found.status}"
+    table = Table(title=title, title_justify="left")
+    heads = ["output", "delay", "one step %", "free run %", "noise"]
+    heads += [f"gain {valve}" for valve in found.valves]
+    for head in heads:
+        table.add_column(head, justify="left" if head == "output" else "right")
+    for i, tag in enumerate(found.outputs):
+        table.add_row(
+            tag,
+            " ".join(map(str, found.delay[i].tolist())),
+            f"{found.fit_one_step[i]:.2f}",
+            f"{found.fit_free_run[i]:.2f}",
+            f"{found.noise_std[i]:.4g}",
+            *(f"{gain:.5g}" for gain in found.gain[i]),
+        )
+    console.print(table)
+    console.print("poles: " + ", ".join(_number(pole) for pole in found.poles))
+    console.print(_rivals(found))
+    for note in [found.reason, *found.notes]:
+        if note:
+            console.print(f"note: {note}")
+
+
+def _number(value: complex) -> str:
+    if abs(value.imag) < 1e-9:
+        return f"{value.real:.4f}"
+    return f"{value.real:.4f}{value.imag:+.4f}j"
+
+
+def _rivals(found: LinearIdentification) -> Table:
+    """Return the table of the orders that were tried; the one taken is marked."""
+    from stiction_ros.identification.linear.subspace import StateSpaceFit
+
+    heads = ["output", "order", "delay", "AIC", "BIC", "one step %", "free run %", "taken"]
+    table = Table(*heads, title="orders, AIC and BIC of the one-step error", title_justify="left")
+    if isinstance(found.detail, StateSpaceFit):
+        for rival in found.detail.rivals:
+            figures = (rival.aic, rival.bic, rival.fit_one_step, rival.fit_free_run)
+            taken = rival.order == found.detail.order
+            delays = " ".join(map(str, found.detail.delay))
+            _row(table, ("all", str(rival.order), delays), figures, taken)
+        return table
+    judged = found.detail[0].judged
+    table.title = f"orders, AIC and BIC of the {judged.replace('_', '-')} error"
+    for tag, choice in zip(found.outputs, found.detail, strict=True):
+        for row in choice.best_of_each_order():
+            figures = (*row.values(judged), row.fit_one_step, row.fit_free_run)
+            orders = f"{row.orders.output} {row.orders.input} {row.orders.noise}"
+            _row(table, (tag, orders, " ".join(map(str, row.delays))), figures, row.chosen)
+    return table
+
+
+def _row(table: Table, head: tuple[str, ...], figures: tuple[float, ...], taken: bool) -> None:
+    shown = [f"{value:.1f}" for value in figures[:2]] + [f"{value:.2f}" for value in figures[2:]]
+    table.add_row(*head, *shown, "yes" if taken else "")
+
+
+def limits_range(text: str) -> tuple[float, float]:
+    """Return ``LO:HI`` as two numbers, the first the smaller."""
+    low, _, high = text.partition(":")
+    try:
+        limits = float(low), float(high)
+    except ValueError:
+        limits = 0.0, 0.0
+    if not (np.isfinite(limits).all() and limits[0] < limits[1]):
+        raise argparse.ArgumentTypeError(f"{text!r} are no limits, write 0:100")
+    return limits

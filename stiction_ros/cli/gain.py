@@ -1,0 +1,190 @@
+"""``stiction gain``: what would help a loop, simulated."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    is_model,
+    opened,
+    show_loops,
+    tell,
+)
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError
+from stiction_ros.loop import LoopModel
+from stiction_ros.loop.set_points import SetPoints
+
+if TYPE_CHECKING:
+    from stiction_ros.identification import Identification
+    from stiction_ros.records.record import Record
+
+MODEL_ENDING = ".loop.yaml"
+
+MEASURES = {
+    "amplitude": "amplitude",
+    "iae_per_hour": "IAE per hour",
+    "travel_per_hour": "travel %/h",
+    "moves_per_hour": "moves/h",
+    "reversals_per_hour": "reversals/h",
+}
+"""Measures in the order in which they are printed, and what they are called."""
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "gain",
+        help="what service, embedding or retuning would bring",
+        description="Simulate what would help a loop: a serviced valve, a controller that knows "
+        "the friction, another tuning, or nothing. A record is identified first and the "
+        "controller of the record is the baseline; a model needs a controller of its own.",
+    )
+    parser.add_argument(
+        "record", metavar="RECORD|MODEL", help=f"CSV file, other export, bag, or *{MODEL_ENDING}"
+    )
+    add_columns(parser)
+    add_intake(parser)
+    parser.add_argument("--valve", metavar="TAG", help="of several valves (default: widest band)")
+    parser.add_argument("--set-points", metavar="F", help="schedule, for a model")
+    parser.add_argument("--samples", type=int, metavar="N", help="of a run, for a model (2000)")
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    # Simulating takes compiled code, which other commands do not wait for.
+    from stiction_ros.gain.gain import Gain
+
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    found: Gain
+    verdict: dict[str, Any] = {}
+    if is_model(options.record):
+        found = _of_model(options)
+    else:
+        found, verdict = _of_record(options)
+    document = {"record": str(options.record)} | verdict | found.to_json()
+    hand_over(options.json, document, lambda: show(found, verdict))
+    return 0
+
+
+def _of_model(options: argparse.Namespace) -> Any:
+    from stiction_ros.gain.model_gain import SAMPLES, gain_of_model
+
+    model = LoopModel.load(find_config(options.record))
+    schedule = None
+    if options.set_points is not None:
+        schedule = SetPoints.load(find_config(options.set_points), model.outputs)
+    samples = SAMPLES if options.samples is None else options.samples
+    if samples < 100:
+        raise InputError(f"{samples} is too few", where="--samples", fix="use 100 or more")
+    with bar("simulating"):
+        return gain_of_model(model, schedule, samples)
+
+
+def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
+    from stiction_ros.gain.gain import gain_of
+    from stiction_ros.identification import identify
+    from stiction_ros.records.parts import longest_part
+
+    for key in ("set_points", "samples"):
+        if getattr(options, key) is not None:
+            raise InputError(
+                "a record brings its own", where=f"--{key.replace('_', '-')}", fix="leave it out"
+            )
+    loop = opened(options)
+    tell(loop)
+    record = longest_part(loop.parts)
+    with bar("identifying") as show_share:
+        identified = identify(record, progress=show_share)
+    with bar("simulating"):
+        gain = gain_of(record, identified, options.valve)
+    return gain, _verdict(record, identified, gain)
+
+
+def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str, Any]:
+    """Return what was found of the valve that was looked at, as it stands in the JSON."""
+    from stiction_ros.records.valve_work import ValveWork
+    from stiction_ros.survey.ranking import confidence
+
+    index = record.valves.index(gain.valve)
+    valve = identified.valves[index].to_json()
+    cause = identified.outputs[record.outputs.index(gain.output)].cause
+    turns = round(ValveWork.of(identified.stem[:, index]).reversals)
+    keys = ("verdict", "f_s", "f_s_interval", "f_d", "f_d_interval")
+    sure = confidence(valve, None if cause is None else cause.kind.value, turns)
+    return {key: valve[key] for key in keys} | {"confidence": sure}
+
+
+def show(found: Any, verdict: Mapping[str, Any]) -> None:
+    """Print the verdict, what each option brings with its interval, and the notes.
+
+    Args:
+        found: what would help.
+        verdict: on the valve; empty for a model.
+    """
+    console = Console()
+    console.print(_headline(found, verdict), highlight=False)
+    table = Table()
+    for name in ("", "measure", "now", "then", "5 to 95 % of the drawn loops"):
+        table.add_column(name)
+    for option in found.options:
+        for row in _rows(found.now, option):
+            table.add_row(*row)
+        table.add_section()
+    console.print(table)
+    for option in found.options:
+        console.print(f"{option.what}: {option.note}", highlight=False)
+    for note in found.notes:
+        console.print(f"note: {note}", highlight=False)
+
+
+def _headline(found: Any, verdict: Mapping[str, Any]) -> str:
+    said = f"{found.valve} and {found.output}"
+    if not verdict:
+        return said
+    (low, high), (least, most) = verdict["f_s_interval"], verdict["f_d_interval"]
+    said += (
+        f": {verdict['verdict']}, f_S {verdict['f_s']:.3g} % ({low:.3g} to {high:.3g}), "
+        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g}), "
+        f"confidence {verdict['confidence']:.2f}"
+    )
+    if verdict["verdict"] == "undecided":
+        said += (
+            ". The record does not decide whether the valve has friction: half of the drawn loops "
+            "have none, and figures are means of both"
+        )
+    return f"{said}."
+
+
+def _rows(now: Any, option: Any) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each measure that an option has; one of dashes where it has none."""
+    if option.measures is None and not option.interval:
+        yield str(option.what), "–", "", "–", ""
+        return
+    shown = str(option.what)
+    for key, name in MEASURES.items():
+        if (value := getattr(now, key)) is None:
+            continue
+        then = None if option.measures is None else getattr(option.measures, key)
+        low, high = option.interval.get(key, (None, None))
+        between = "" if low is None else f"{_figure(low)} to {_figure(high)}"
+        yield shown, name, _figure(value), _figure(then), between
+        shown = ""
+
+
+def _figure(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"

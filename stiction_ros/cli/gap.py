@@ -1,0 +1,209 @@
+"""``stiction gap``: what a simulation misses, from records of the loop."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    is_model,
+    opened,
+    show_loops,
+)
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.config_files import find_config
+from stiction_ros.errors import InputError, storing
+from stiction_ros.loop import LoopModel
+from stiction_ros.records import Record
+from stiction_ros.records.parts import longest_part, only_part
+
+if TYPE_CHECKING:
+    from stiction_ros.discrepancy import Discrepancy
+
+EXIT_CODES = {
+    "named": 0,
+    "none": 0,
+    "ambiguous": 3,
+    "unknown": 4,
+    "untestable": 5,
+}
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "gap",
+        help="find, name and add the effect that a simulation misses",
+        description="Compare a loop model with records of its loop, name the physical effect that "
+        "it lacks, add it and measure the gap again. Exit codes: 0 named or none, 3 ambiguous, "
+        "4 unknown, 5 untestable.",
+    )
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        metavar="FILE",
+        help="MODEL RECORD…; with --fit-linear RECORD… alone (CSV files or bags)",
+    )
+    add_columns(parser)
+    add_intake(parser)
+    parser.add_argument(
+        "--fit-linear",
+        action="store_true",
+        help="there is no model yet: fit a linear one to the longest record",
+    )
+    parser.add_argument(
+        "--delay",
+        type=delay_range,
+        default=(0, 10),
+        metavar="LO:HI",
+        help="delays tried by --fit-linear, samples (0:10)",
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="no bootstrap: stored threshold, intervals by likelihood",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the bootstraps (0)")
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument(
+        "--out", metavar="DIR", help="write report.html and model_after.loop.yaml there"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.dry_run:
+        records = options.inputs if options.fit_linear else options.inputs[1:]
+        return show_loops([Path(path) for path in records], intake_options(options))
+    model, records = _inputs(options)
+    from stiction_ros.discrepancy import GapOptions, find_discrepancy
+
+    settings = GapOptions(
+        quick=options.quick, seed=options.seed, free_process=bool(options.fit_linear)
+    )
+    with bar("comparing") as show:
+        found = find_discrepancy(model, records, settings, progress=show)
+    if options.out is not None:  # first: who reads what is printed may stop doing so
+        _write(found, Path(options.out))
+    hand_over(options.json, found.to_json(), lambda: _print(found))
+    return EXIT_CODES[found.verdict]
+
+
+def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
+    if options.fit_linear:
+        for path in filter(is_model, options.inputs):
+            raise InputError(
+                "is a loop model", where=path, fix="leave it out, --fit-linear makes one"
+            )
+        records = [_record(path, options) for path in options.inputs]
+        from stiction_ros.discrepancy.data.first_model import first_model
+
+        return first_model(records, options.delay), records
+    if len(options.inputs) < 2:
+        raise InputError(
+            "no record",
+            where="gap",
+            fix="write stiction gap MODEL RECORD, or --fit-linear RECORD without a model",
+        )
+    if not is_model(options.inputs[0]):
+        raise InputError(
+            "is no loop model",
+            where=options.inputs[0],
+            fix="name the model first, a .yaml file, then its records",
+        )
+    model = LoopModel.load(find_config(options.inputs[0]))
+    return model, [_record(path, options) for path in options.inputs[1:]]
+
+
+def _record(path: str, options: argparse.Namespace) -> Record:
+    loop = opened(argparse.Namespace(**{**vars(options), "record": path}))
+    return longest_part([only_part(loop.parts, path)])
+
+
+def _write(found: Discrepancy, directory: Path) -> None:
+    from stiction_ros.report.gap.report import report_gap
+
+    with storing(directory, what="made"):
+        directory.mkdir(parents=True, exist_ok=True)
+    found.model_after.save(directory / "model_after.loop.yaml")
+    print(f"report: {report_gap(found, directory)}", file=sys.stderr)
+
+
+def _print(found: Discrepancy) -> None:
+    console = Console()
+    names = ", ".join(record.name for record in found.runs.records)
+    console.print(f"{names}: {found.verdict}", markup=False)
+    if found.effects:
+        table = Table("effect", "figure", "value", "95 %", "ΔBIC", "closes", "or")
+        for effect in found.effects:
+            others = ", ".join(f"{place} {name}" for place, name in effect.alternatives)
+            for k, (key, value) in enumerate(effect.parameters.items()):
+                ends = effect.intervals.get(key)
+                table.add_row(
+                    f"{effect.place} {effect.title}" if k == 0 else "",
+                    key,
+                    f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
+                    "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
+                    f"{effect.delta_bic:.0f}" if k == 0 else "",
+                    _share(effect.closed) if k == 0 else "",
+                    others if k == 0 else "",
+                )
+        console.print(table)
+    elif found.alternatives:
+        console.print("one of: " + ", ".join(f"{p} {e}" for p, e in found.alternatives))
+    for effect in found.effects:
+        if effect.sentence:
+            console.print(f"{effect.place} {effect.title}: {effect.sentence}", markup=False)
+    for change in found.process_changes:
+        said = f"process to {change.output}: {change.what} {change.value:.4g} {change.unit}"
+        console.print(said.removesuffix(" 1"), markup=False)
+    console.print(_gaps(found))
+    for sentence in found.where:
+        console.print(f"where: {sentence}", markup=False)
+    if found.experiment:
+        console.print(f"to learn more: {found.experiment}", markup=False)
+    if found.untestable:
+        listed = ", ".join(f"{t.place} {t.effect}" for t in found.untestable)
+        console.print(f"not testable here: {listed}", markup=False)
+    if found.not_considered:
+        reasons: dict[str, set[str]] = {}
+        for entry in found.not_considered:
+            reasons.setdefault(entry.reason, set()).add(entry.name)
+        for reason, left in reasons.items():
+            console.print(f"not considered: {', '.join(sorted(left))}: {reason}", markup=False)
+    for note in found.notes:
+        console.print(f"note: {note}", markup=False)
+
+
+def _share(closed: float) -> str:
+    return "" if math.isnan(closed) else f"{100.0 * closed:.0f} %"
+
+
+def _gaps(found: Discrepancy) -> Table:
+    title = f"gap on held-out samples; closed {100.0 * found.closed:.0f} % of its excess"
+    table = Table(title=title, title_justify="left")
+    for head in ("output", "free run", "after", "noise", "one step", "after", "noise"):
+        table.add_column(head, justify="left" if head == "output" else "right")
+    for before, after in zip(found.before, found.after, strict=True):
+        table.add_row(
+            before.name,
+            f"{before.free_run_rmse:.4g}",
+            f"{after.free_run_rmse:.4g}",
+            f"{after.floor_free_run:.4g}",
+            f"{before.one_step_rmse:.4g}",
+            f"{after.one_step_rmse:.4g}",
+            f"{after.floor_one_step:.4g}",
+        )
+    return table

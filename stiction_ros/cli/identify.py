@@ -1,0 +1,228 @@
+"""``stiction identify``: friction, process and a verdict per valve from one record."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.cli.shared import searches
+from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.cli.shared.searches import (
+    add_search_options,
+    identify_by,
+    input_orders,
+    output_orders,
+    refuse_channel_orders,
+    search_options,
+)
+from stiction_ros.errors import storing
+from stiction_ros.records.parts import longest_part
+
+if TYPE_CHECKING:
+    from stiction_ros.identification import Identification, ValveEstimate
+    from stiction_ros.identification.result.cause import Cause
+    from stiction_ros.records.record import Record
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "identify",
+        help="identify friction and process from a record",
+        description="Identify the friction of every valve and the process behind it from "
+        "controller output and measurement, and say which valve sticks. Of a record with gaps "
+        "or of several runs the longest good part is taken.",
+    )
+    parser.add_argument("record", metavar="RECORD", help="CSV file, other export, or bag")
+    add_columns(parser)
+    add_intake(parser)
+    parser.add_argument(
+        "--na",
+        type=output_orders,
+        metavar="N[,N]",
+        help="order n_a (default: by BIC); methods of the paper also one for each output",
+    )
+    parser.add_argument(
+        "--nb",
+        type=input_orders,
+        metavar="N[,N][/N,N]",
+        help="order n_b (default: n_a); methods of the paper also one for each valve, a row of "
+        "them for each output",
+    )
+    parser.add_argument(
+        "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
+    )
+    parser.add_argument(
+        "--law",
+        default="he",
+        metavar="LAW",
+        help=f"friction law: {' | '.join(searches.laws())} (default: he)",
+    )
+    parser.add_argument(
+        "--kind",
+        choices=searches.LOOP_KINDS,
+        help="what the loop controls: the process found is held against it, as a note",
+    )
+    parser.add_argument(
+        "--method",
+        default="evidence",
+        choices=searches.METHODS,
+        help="search (default: evidence)",
+    )
+    add_search_options(parser)
+    parser.add_argument(
+        "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
+    )
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument("--out", metavar="DIR", help="write report.html and figures there")
+    parser.set_defaults(run=run)
+
+
+def delay_range(text: str) -> tuple[int, int]:
+    """Return ``LO:HI`` (or one number) as a range."""
+    low, _, high = text.partition(":")
+    try:
+        return int(low), int(high or low)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no range, write LO:HI") from None
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    loop = opened(options)
+    record, parts = longest_part(loop.parts), loop.parts
+    chosen = search_options(options)
+    from stiction_ros.identification import IdentificationOptions
+
+    plain = refuse_channel_orders(options, chosen)
+    settings = IdentificationOptions(
+        output_order=plain["na"],
+        input_order=plain["nb"],
+        delay=options.delay,
+        law=options.law,
+        kind=options.kind,
+    )
+    search = identify_by(options.method, settings, chosen)
+    with bar("identifying") as show:
+        found = search(record, show)
+    if options.model is not None:
+        _write_model(record, found, options.model)
+    document = {"record": str(options.record)} | found.to_json()
+    if options.json is not None:
+        write_json(options.json, document)
+    if options.json != "-":
+        print(f"{loop.name}: {loop.summary}")
+        _print(document, found)
+    else:
+        tell(loop)
+    if options.out is not None:
+        from stiction_ros.report.record.report import report_record
+
+        directory = Path(options.out)
+        with storing(options.out, what="made"):
+            directory.mkdir(parents=True, exist_ok=True)
+        page = report_record(record, found, directory, parts)
+        print(f"report: {page}", file=sys.stderr)
+    return 0
+
+
+def _write_model(record: Record, found: Identification, target: str) -> None:
+    from stiction_ros.identification.answer.identified_loop import identified_loop
+
+    name = Path(target).name.removesuffix(".yaml").removesuffix(".loop")
+    model = identified_loop(record, found, name or "loop")
+    with storing(target):
+        model.save(target)
+
+
+def _print(document: Mapping[str, Any], found: Identification) -> None:
+    console = Console()
+    table = Table(title=f"{document['record']}: {found.samples} samples", title_justify="left")
+    further = _further(found)
+    for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval"):
+        table.add_column(name)
+    for head in further.values():
+        table.add_column(head)
+        table.add_column("interval")
+    table.add_column("moves")
+    table.add_column("band")
+    for valve in found.valves:
+        table.add_row(
+            valve.name,
+            str(valve.verdict),
+            f"{valve.static_friction:.3g}",
+            "{:.3g} to {:.3g}".format(*valve.static_interval),
+            f"{valve.dynamic_friction:.3g}",
+            "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
+            *(cell for key in further for cell in _cells(valve, key)),
+            str(valve.moves),
+            f"{100 * valve.band_share:.0f} % of OP" if valve.band_share > 0.0 else "",
+        )
+    console.print(table)
+    if found.row_samples > 1:
+        used = found.row_samples * found.sample_time
+        console.print(f"rate: friction was judged on rows of {used:g} s")
+    for output in found.outputs:
+        delays = ", ".join(f"{valve} {delay}" for valve, delay in output.delay.items())
+        console.print(
+            f"{output.name}: delay {delays} samples, fit {output.fit_one_step:.1f} % one step, "
+            f"{output.fit_free_run:.1f} % free run, noise {output.noise_std:.3g}"
+        )
+        if output.cause is not None:
+            console.print(f"{output.name}: {_cause(output.cause)}")
+    from stiction_ros.identification.answer.words import materiality, next_step, why
+
+    for j, valve in enumerate(found.valves):
+        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
+        console.print(f"{valve.name}: {' '.join(filter(None, said))}")
+    for note in found.notes:
+        console.print(f"note: {note}")
+
+
+def _further(found: Identification) -> dict[str, str]:
+    """Return the heads of the columns of the law's further parameters, by their keys."""
+    from stiction_ros.identification.friction.grid import find_law
+
+    heads = {}
+    for valve in found.valves:
+        for entry in find_law(valve.law).parameters()[2:] if valve.further else ():
+            heads[entry.key] = entry.key if entry.unit == "1" else f"{entry.key} {entry.unit}"
+    return heads
+
+
+def _cells(valve: ValveEstimate, key: str) -> tuple[str, str]:
+    """Return value and interval of a further parameter; a constant of the law is held."""
+    if key not in valve.further:
+        return "", ""
+    ends = valve.further_intervals.get(key)
+    between = "held" if ends is None else "{:.3g} to {:.3g}".format(*ends)
+    return f"{valve.further[key]:.3g}", between
+
+
+def _cause(cause: Cause) -> str:
+    """Return why an output oscillates, in words."""
+    from stiction_ros.identification.result.cause import CauseKind
+
+    if cause.kind is CauseKind.NONE or cause.period is None:
+        return f"cause {cause.kind}. {cause.sentence}"
+    return (
+        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.1f}, "
+        f"amplitude {cause.amplitude:.3g}. {cause.sentence}"
+    )

@@ -1,0 +1,77 @@
+"""``stiction listen``: the windows of all loops in the graph, in one process."""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.node_processes import require_ros
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.errors import InputError
+from stiction_ros.records.csv_writer import write_csv
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "listen",
+        help="fill the windows of all loops in the graph, in one process",
+        description="Read pv and op_applied of every loop in the ROS graph and write one CSV "
+        "record a loop, which identify takes. Nothing is published.",
+    )
+    parser.add_argument("--seconds", type=float, required=True, help="how long")
+    parser.add_argument("--sample-time", type=float, default=1.0, metavar="S", help="default: 1")
+    parser.add_argument("--window", type=int, default=5000, metavar="N", help="samples kept")
+    parser.add_argument("--out", metavar="DIR", help="folder of the CSV records; default: none")
+    parser.add_argument("--json", metavar="F", help="samples by loop; - for standard output")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    require_ros()
+    for key in ("seconds", "sample_time", "window"):
+        if not getattr(options, key) > 0:
+            raise InputError("is not positive", where=f"--{key.replace('_', '-')}")
+    from stiction_ros.nodes.listener import Listener
+
+    begin, listener = time.process_time(), Listener(options.sample_time, options.window)
+    try:
+        with bar("listening") as show:
+            listener.run(options.seconds, show)
+    finally:
+        listener.close()
+    windows = listener.windows
+    if options.out:
+        folder = Path(options.out)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, window in windows.items():
+            record = window.record()
+            if record is not None:
+                write_csv(record, folder / f"{name}.csv")
+    told = {
+        "loops": {
+            name: {"samples": w.samples, "missed": w.missed, "window": len(w), **w.counts}
+            for name, w in windows.items()
+        },
+        "cpu_seconds": time.process_time() - begin,
+        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    if options.json:
+        write_json(options.json, told)
+    total = sum(window.samples for window in windows.values())
+    missed = sum(window.missed for window in windows.values())
+    if options.json != "-":
+        print(f"{len(windows)} loops, {total} samples, {missed} missed")
+    if not windows:
+        print(
+            "stiction: nobody publishes pv and op_applied; does the bridge run, in this "
+            "ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE?",
+            file=sys.stderr,
+        )
+    return 0 if windows else 1

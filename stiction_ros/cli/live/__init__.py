@@ -1,1 +1,0 @@
-"""Commands that start the nodes: the demo, faults, the long run."""

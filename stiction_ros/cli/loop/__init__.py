@@ -1,1 +1,0 @@
-"""Commands about one loop: identify, gap, gain, simulate."""

@@ -1,1 +1,0 @@
-"""What options several commands have, and how they are read."""

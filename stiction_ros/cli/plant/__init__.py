@@ -1,1 +1,0 @@
-"""Commands about a whole plant: all its loops, and its control system."""

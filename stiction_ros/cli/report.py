@@ -1,0 +1,68 @@
+"""``stiction report``: the report of a bag."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
+from stiction_ros.errors import storing
+from stiction_ros.intake.intake import is_bag
+from stiction_ros.records.parts import longest_part
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "report",
+        help="make the report of a bag or a record",
+        description="Make a self-contained HTML report of a bag, or of a CSV record.",
+    )
+    parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
+    add_columns(parser)
+    add_intake(parser)
+    parser.add_argument(
+        "--out",
+        default="report.html",
+        metavar="F.html",
+        help="the page, or a folder that gets figures and summary.json too (default: report.html)",
+    )
+    parser.set_defaults(run=run)
+
+
+def holds_live_run(path: str) -> bool:
+    """Return whether a bag tells of a controller or an estimator, not of signals alone."""
+    from stiction_ros.records.bag.messages import read_raw
+
+    names = {raw.topic.name.rpartition("/")[2] for raw in read_raw(path)}
+    return bool(names & {"mode", "stiction", "loop_model"})
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    out = Path(options.out)
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    with storing(out, fix="choose another --out"):
+        if is_bag(options.record) and holds_live_run(options.record):
+            from stiction_ros.report.run.report import report_run
+
+            print(report_run(options.record, out, namespace=options.namespace).page)
+        else:
+            loop = opened(options)
+            tell(loop)
+            record, parts = longest_part(loop.parts), loop.parts
+            from stiction_ros.identification import IdentificationOptions, identify
+            from stiction_ros.report.record.report import report_record
+
+            found = identify(record, IdentificationOptions())
+            print(report_record(record, found, out, parts))
+    return 0

@@ -1,1 +1,0 @@
-"""What commands run: scenarios, processes of nodes, many seeds."""

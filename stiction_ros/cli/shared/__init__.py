@@ -1,0 +1,1 @@
+"""What several commands share: options, scenarios, processes, seeds, JSON, progress."""

@@ -1,0 +1,34 @@
+"""Results as JSON, to a file or to standard output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.errors import storing
+from stiction_ros.texts import json_text
+
+
+def write_json(target: str, value: Any) -> None:
+    """Write ``value`` to the file ``target``, or to standard output for ``-``."""
+    text = json_text(value)
+    if target == "-":
+        print(text)
+        return
+    with storing(target):
+        Path(target).write_text(text + "\n", encoding="utf-8")
+
+
+def hand_over(target: str | None, value: Any, show: Callable[[], object]) -> None:
+    """Write a result as JSON where ``--json`` asks for it, and show it to people.
+
+    Args:
+        target: what ``--json`` names, ``-`` for standard output; None where it is not given.
+        value: the result.
+        show: prints it; not called where standard output holds the JSON.
+    """
+    if target is not None:
+        write_json(target, value)
+    if target != "-":
+        show()

@@ -1,0 +1,199 @@
+"""The options by which commands read records, whatever they are kept in."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.errors import InputError
+from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
+from stiction_ros.intake.intake import is_bag, strange_files
+from stiction_ros.intake.intake_options import OpUnit, TimeUnit
+from stiction_ros.intake.repairs import plural
+from stiction_ros.intake.sheets.stamps import DateOrder
+
+NAMED = 8
+"""Names that a remark lists."""
+
+
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Add the options that name the columns of a file of one loop, or the loop in a bag."""
+    group = parser.add_argument_group(
+        "columns of a file of one loop (default: t, OP, PV[, SP][, STEM][, MODE])",
+        "A file that stiction wrote needs none of these: its TAG.OP, TAG.PV … are recognised.",
+    )
+    for option, text in (
+        ("op", "controller output of a valve"),
+        ("pv", "process variable"),
+        ("sp", "set-point of a process variable"),
+        ("stem", "true stem position of a valve"),
+    ):
+        group.add_argument(
+            f"--{option}", action="append", type=_pair, default=[], metavar="TAG=COL", help=text
+        )
+    group.add_argument("--time", metavar="COL", help="seconds or dates")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="of the loop's topics, for a bag that holds several loops"
+    )
+
+
+def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
+    """Add the options of exports: tags, units, dates, what is repaired.
+
+    Args:
+        parser: of a command.
+        many: whether the command takes all loops that there are.
+    """
+    group = parser.add_argument_group("exports")
+    group.add_argument(
+        "--tags",
+        metavar="F",
+        help="table loop,pv,sp,op,mode with the tags of each loop, with file for one file alone",
+    )
+    if not many:
+        group.add_argument("--loop", metavar="NAME", help="of several loops in a file")
+    group.add_argument(
+        "--op-unit",
+        type=OpUnit,
+        choices=tuple(OpUnit),
+        metavar="UNIT",
+        help=f"what OP is counted in: {', '.join(OpUnit)} (default: as the export says, or %%)",
+    )
+    group.add_argument(
+        "--time-unit",
+        type=TimeUnit,
+        choices=tuple(TimeUnit),
+        metavar="UNIT",
+        help=f"what times that are numbers are counted in: {', '.join(TimeUnit)}",
+    )
+    group.add_argument(
+        "--dates", type=DateOrder, choices=tuple(DateOrder), help="day or month first in dates"
+    )
+    group.add_argument(
+        "--sample-time", type=float, metavar="S", help="s, for signals kept when they changed"
+    )
+    group.add_argument(
+        "--auto", action="append", metavar="WORD", help="what MODE shows in automatic"
+    )
+    group.add_argument(
+        "--strict", action="store_true", help="refuse what would have to be repaired"
+    )
+    group.add_argument(
+        "--dry-run", action="store_true", help="show what would be read from where, and stop"
+    )
+
+
+def columns(options: argparse.Namespace) -> CsvColumns:
+    """Return the chosen columns."""
+    chosen: dict[str, Any] = {}
+    for key in ("op", "pv", "sp", "stem"):
+        if getattr(options, key, None):
+            chosen[key] = dict(getattr(options, key))
+    if getattr(options, "time", None) is not None:
+        chosen["time"] = options.time
+    return CsvColumns(**chosen)
+
+
+def intake_options(options: argparse.Namespace) -> IntakeOptions:
+    """Return how the command line wants exports to be read.
+
+    Raises:
+        InputError: a sample time that is none.
+    """
+    step = options.sample_time
+    if step is not None and not 0.0 < step < 1e9:
+        raise InputError(f"{step:g} s is no sample time", where="--sample-time")
+    return IntakeOptions(
+        columns=columns(options),
+        namespace=getattr(options, "namespace", None),
+        tags=None if options.tags is None else Path(options.tags),
+        strict=options.strict,
+        op_unit=options.op_unit,
+        time_unit=options.time_unit,
+        dates=options.dates,
+        sample_time=step,
+        automatic=None if options.auto is None else tuple(options.auto),
+    )
+
+
+def is_model(source: str) -> bool:
+    """Tell by its name whether a file is a loop model and no record."""
+    return source.endswith((".yaml", ".yml"))
+
+
+def opened(options: argparse.Namespace) -> Loop:
+    """Return the loop of the record that the command line names.
+
+    Raises:
+        InputError: it cannot be read; columns given for a bag, a namespace for a file.
+    """
+    path = Path(options.record)
+    if is_bag(path):
+        if columns(options) != CsvColumns():
+            raise InputError(
+                "is a bag, which has no columns",
+                where=str(path),
+                fix="leave --op, --pv, --sp, --stem and --time out",
+            )
+    elif options.namespace is not None:
+        raise InputError("is for bags", where="--namespace", fix="leave it out")
+    return one_loop(path, intake_options(options), options.loop)
+
+
+def show_loops(paths: Sequence[Path], options: IntakeOptions) -> int:
+    """Print what would be read from where: ``--dry-run``.
+
+    Returns:
+        Exit code: 0, or 1 when no loop can be read.
+    """
+    readable = known = 0
+    for loop in loops(paths, options):
+        known += 1
+        readable += loop.problem is None
+        files = ", ".join(file.name for file in loop.files)
+        said = loop.summary if loop.problem is None else f"not read: {loop.problem}"
+        print(f"{loop.name} ({files}): {said}")
+        for line in _signals(loop):
+            print(f"  {line}")
+        for note in loop.notes:
+            print(f"  note: {note}")
+    print(f"{plural(known, 'loop')}, {readable} can be read" if known else "no file of a loop")
+    if len(paths) > 1 or paths[0].is_dir():
+        tell_strangers(options.tags, "export", strange_files(paths, options))
+    return 0 if readable else 1
+
+
+def tell_strangers(file: str | Path | None, what: str, names: Sequence[str]) -> None:
+    """Print to standard error which names of a file are not there, as they may be misspelt.
+
+    Args:
+        file: that has the names.
+        what: is called so, in a word.
+        names: that nothing has.
+    """
+    if names:
+        more = " and others" if len(names) > NAMED else ""
+        print(f"{file}: no {what} is called {', '.join(names[:NAMED])}{more}", file=sys.stderr)
+
+
+def _signals(loop: Loop) -> Iterator[str]:
+    """Yield where each signal comes from and what stands there."""
+    for signal in dict.fromkeys((*loop.columns, *loop.spreads)):
+        origin = f" from {loop.columns[signal]}" if signal in loop.columns else ""
+        spread = loop.spreads.get(signal, ", ".join(loop.modes) if signal == "MODE" else "")
+        yield f"{signal}{origin}{f': {spread}' if spread else ''}"
+
+
+def tell(loop: Loop) -> None:
+    """Print sample time, span and unit of a loop to standard error."""
+    print(f"{loop.name}: {loop.summary}", file=sys.stderr)
+
+
+def _pair(text: str) -> tuple[str, str]:
+    tag, sign, column = text.partition("=")
+    if not sign or not tag or not column:
+        raise argparse.ArgumentTypeError(f"{text!r} is not TAG=COL")
+    return tag, column

@@ -1,0 +1,151 @@
+"""Options of the searches, and which search a command calls: the floors' own, or the paper's."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from stiction_ros.effects import Stiction, behaviours
+from stiction_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from stiction_ros.identification import Identification, IdentificationOptions
+    from stiction_ros.records.record import Record
+
+# The modules that give these words their meaning load slowly, and a mistyped option should be
+# told at once; test/cli/test_choices.py holds both together.
+LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
+PAPER_METHODS = ("nlp", "nlp_printed", "grid")
+METHODS = ("exact", "evidence", *PAPER_METHODS)
+LINEAR_KINDS = ("arx", "armax", "state_space")
+CRITERIA = ("aic", "bic")
+SUBSPACE_METHODS = ("n4sid", "moesp", "cva", "predictor")
+
+# Option: where its value goes, and the methods that have it.
+OWNERS = {
+    "--friction-limit": ("friction_limit", ("exact", "evidence", *PAPER_METHODS)),
+    "--starts": ("starts", ("nlp", "nlp_printed")),
+    "--grid-step": ("grid_step", ("grid",)),
+}
+
+
+def laws() -> tuple[str, ...]:
+    """Return the friction laws that can be identified: all but the paper's smoothed ones."""
+    kinds = [kind for kind in behaviours() if issubclass(kind, Stiction)]
+    return tuple(kind.law for kind in kinds if kind.law and not kind.not_identified)
+
+
+def add_search_options(parser: Any) -> None:
+    """Add the options of single searches to a parser."""
+    parser.add_argument(
+        "--friction-limit",
+        type=friction_limit,
+        metavar="F[,F]",
+        help="largest friction tried in %%, one for all valves or one for each (default: what OP "
+        "spans; methods of the paper: what its sustained oscillation spans)",
+    )
+    parser.add_argument(
+        "--starts",
+        type=int,
+        metavar="M",
+        help="first guesses of methods nlp and nlp_printed for every delay (default: 7)",
+    )
+    parser.add_argument(
+        "--grid-step", type=float, metavar="S", help="step of method grid in %% (default: 0.5)"
+    )
+
+
+def friction_limit(text: str) -> float | tuple[float, ...]:
+    """Return one number, or one for each valve, from ``F`` or ``F,F``."""
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number, write F or F,F") from None
+    return values[0] if len(values) == 1 else values
+
+
+def output_orders(text: str) -> int | tuple[int, ...]:
+    """Return one order, or one for each output, from ``N`` or ``N,N``."""
+    try:
+        values = tuple(int(word) for word in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no order, write N or N,N") from None
+    return values[0] if len(values) == 1 else values
+
+
+def input_orders(text: str) -> int | tuple[int | tuple[int, ...], ...]:
+    """Return one order, or a row of one or one for each valve for each output, from ``N,N/N,N``."""
+    rows = tuple(output_orders(row) for row in text.split("/"))
+    return rows[0] if len(rows) == 1 and isinstance(rows[0], int) else rows
+
+
+def refuse_channel_orders(
+    options: argparse.Namespace, chosen: dict[str, Any]
+) -> dict[str, int | None]:
+    """Return the orders that all channels share; those per channel go to ``chosen``.
+
+    Raises:
+        InputError: orders per channel for a search that has one for all.
+    """
+    plain: dict[str, int | None] = {}
+    for option, key in (("na", "output_order"), ("nb", "input_order")):
+        value = getattr(options, option)
+        plain[option] = value if value is None or isinstance(value, int) else None
+        if plain[option] == value:
+            continue
+        if options.method not in PAPER_METHODS:
+            raise InputError(
+                f"method {options.method} takes one order for all channels",
+                where=f"--{option}",
+                fix=f"add --method {' or '.join(PAPER_METHODS)}",
+            )
+        chosen[key] = value
+    return plain
+
+
+def search_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of single searches that were given.
+
+    Raises:
+        InputError: an option that the method at hand does not have.
+    """
+    chosen: dict[str, Any] = {}
+    for option, (key, methods) in OWNERS.items():
+        value = getattr(options, key)
+        if value is None:
+            continue
+        if options.method not in methods:
+            raise InputError(
+                f"method {options.method} has no such option",
+                where=option,
+                fix=f"add --method {' or '.join(methods)}",
+            )
+        chosen[key] = value
+    return chosen
+
+
+def identify_by(
+    method: str,
+    options: IdentificationOptions,
+    chosen: dict[str, Any],
+) -> Callable[[Record, Callable[[float], None]], Identification]:
+    """Return what identifies a record by one method.
+
+    Args:
+        method: of :data:`METHODS`.
+        options: orders, delays and law.
+        chosen: of :func:`search_options`.
+    """
+    if method in PAPER_METHODS:
+        from stiction_ros.paper.methods import identify as identify_as_paper
+        from stiction_ros.paper.paper_options import PaperOptions
+
+        settings = PaperOptions.of(options, method, **chosen)
+        return lambda record, progress: identify_as_paper(record, settings, progress)
+    import dataclasses
+
+    from stiction_ros.identification import identify
+
+    own = dataclasses.replace(options, method=method, **chosen)
+    return lambda record, progress: identify(record, own, progress)

@@ -1,0 +1,86 @@
+"""``stiction simulate``: a loop model in closed loop under its own controller."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.config_files import find_config
+from stiction_ros.loop import LoopModel, SetPoints, simulate
+from stiction_ros.records.record import Record
+
+SAMPLES, SEED = 2000, 1
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "simulate",
+        help="simulate a loop model under its own controller",
+        description="Run a loop model in closed loop under the controller that it records "
+        "(controller: {kind: pi, …}) and write OP, PV, SP and the true stem position.",
+    )
+    parser.add_argument("loop", metavar="LOOP", help="loop model, F.loop.yaml")
+    parser.add_argument(
+        "--set-points", metavar="F", help="schedule of set-points (default: the operating point)"
+    )
+    parser.add_argument("--samples", type=int, default=SAMPLES, metavar="N", help=f"({SAMPLES})")
+    parser.add_argument(
+        "--seed", type=int, default=SEED, metavar="S", help=f"of the noise ({SEED})"
+    )
+    parser.add_argument(
+        "--out",
+        metavar="F.csv|BAG",
+        help="CSV file, or the directory of a new bag (default: LOOP.csv in this folder)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    path = find_config(options.loop)
+    model = LoopModel.load(path)
+    schedule = None
+    if options.set_points is not None:
+        schedule = SetPoints.load(find_config(options.set_points), model.outputs)
+    out = Path(path.name.split(".")[0] + ".csv" if options.out is None else options.out)
+    with bar(f"simulating {model.name}") as show:
+        record = simulate(
+            model,
+            schedule,
+            options.samples,
+            options.seed,
+            lambda done: show(done / options.samples),
+        )
+    write(record, out)
+    told = f"{out}: {len(record)} samples of {record.sample_time:g} s; {moves(record)}; read it by"
+    print(told, shlex.join(["stiction", "identify", str(out)]), sep="\n", file=sys.stderr)
+    return 0
+
+
+def write(record: Record, out: Path) -> None:
+    """Write ``record`` as a CSV file where ``out`` ends in .csv, else as a bag."""
+    if out.suffix.lower() == ".csv":
+        from stiction_ros.records.csv_writer import write_csv
+
+        write_csv(record, out)
+        return
+    from stiction_ros.records.run.record_to_bag import write_bag
+
+    write_bag(record, out)
+
+
+def moves(record: Record) -> str:
+    """Return how often each stem moved, in words."""
+    stem = record.op if record.stem is None else record.stem
+    counts = np.count_nonzero(np.diff(stem, axis=0), axis=0)
+    return ", ".join(
+        f"{valve} moved at {count} of them"
+        for valve, count in zip(record.valves, counts.tolist(), strict=True)
+    )

@@ -1,0 +1,240 @@
+"""``stiction survey``: every loop of a plant, ranked by what to service first."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import dataclasses
+import datetime
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from stiction_ros.cli.identify import delay_range
+from stiction_ros.cli.shared.as_json import write_json
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    show_loops,
+    tell_strangers,
+)
+from stiction_ros.cli.survey_list import print_list
+from stiction_ros.cli.survey_progress import progress
+from stiction_ros.errors import InputError, storing
+from stiction_ros.intake.sheets.cells import Numbers
+from stiction_ros.intake.sheets.layout import delimiter_of
+from stiction_ros.intake.sheets.text import open_text
+
+LOCAL = "local"
+"""The engine of this machine."""
+
+PAGE, CSV, XLSX = "survey.html", "survey.csv", "survey.xlsx"
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "survey",
+        help="every loop of a plant, ranked by what to service first",
+        description="Judge every loop in files and folders of exports and list the valves to "
+        "service first, with a page for each loop. A loop that cannot be judged stands in the "
+        "list with its reason and stops no other.",
+    )
+    parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
+    add_columns(parser)
+    add_intake(parser, many=True)
+    parser.add_argument("--delay", type=delay_range, metavar="LO:HI", help="samples (0:10)")
+    parser.add_argument("--no-gain", action="store_true", help="simulate nothing")
+    parser.add_argument(
+        "--cost",
+        metavar="F",
+        help="CSV with or without a head loop,cost: money per hour and unit of |PV−SP|",
+    )
+    parser.add_argument(
+        "--units",
+        metavar="F",
+        help="CSV with or without a head loop,unit: unit of PV, for the pages",
+    )
+    parser.add_argument(
+        "--previous", action="append", default=[], metavar="F", help="JSON of an earlier survey"
+    )
+    parser.add_argument("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (all cores)"
+    )
+    parser.add_argument(
+        "--engine", default=LOCAL, metavar="E", help="local, or dask://HOST:PORT (local)"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with the survey in --out")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    # Judging takes compiled code, which other commands do not wait for.
+    from stiction_ros.identification.identification_options import IdentificationOptions
+    from stiction_ros.intake.intake import loops, strange_files
+    from stiction_ros.survey.survey import Plan, survey
+    from stiction_ros.survey.survey_options import SurveyOptions
+
+    paths = [Path(path) for path in options.paths]
+    for path in paths:
+        if not path.exists():
+            raise InputError("there is no such file or folder", where=str(path))
+    intake = intake_options(options)
+    if options.dry_run:
+        return show_loops(paths, intake)
+    costs = _costs(options.cost)
+    units = {name: unit for _, name, unit in _pairs(options.units)}
+    identification = IdentificationOptions()
+    if options.delay is not None:
+        identification = dataclasses.replace(identification, delay=options.delay)
+    plan = Plan(
+        SurveyOptions(
+            identification,
+            gain=not options.no_gain,
+            pages=options.out is not None,
+            units=tuple(units.items()),
+            read_by=repr(intake),
+        ),
+        None if options.out is None else Path(options.out),
+        options.resume,
+        costs,
+    )
+    earlier = _earlier(options.previous)
+    engine = _engine(options)
+    again = loops(paths, intake) if options.engine == LOCAL else None
+    try:
+        with progress(again) as show:
+            found = survey(loops(paths, intake), plan, engine, show)
+    except KeyboardInterrupt:
+        if plan.out is not None:
+            print("survey: interrupted; --resume goes on", file=sys.stderr)
+        raise
+    found = dataclasses.replace(
+        found, date=datetime.datetime.now(datetime.UTC).isoformat(" ", "minutes")
+    )
+    there = {entry.name for entry in found.entries}
+    for file, names in ((options.cost, costs), (options.units, units)):
+        tell_strangers(file, "loop", [name for name in names if name not in there])
+    tell_strangers(options.tags, "export", strange_files(paths, intake))
+    if plan.out is not None:
+        _write(found, plan.out, earlier)
+    if options.json is not None:
+        write_json(options.json, found.to_json())
+    if options.json != "-":
+        print_list(found, earlier)
+    list_at = "no list and no page was written; --out DIR writes them"
+    if plan.out is not None:
+        list_at = f"list: {plan.out / PAGE}"
+    print(list_at, file=sys.stderr)
+    return _code(found)
+
+
+def _code(found: Any) -> int:
+    """Return the exit code: 1 where every loop failed."""
+    failed = sum(entry.status.value == "failed" for entry in found.entries)
+    return 1 if failed and failed == len(found.entries) else 0
+
+
+def _engine(options: argparse.Namespace) -> Any:
+    if options.engine == LOCAL:
+        from stiction_ros.survey.engines.local import LocalEngine
+
+        if options.jobs < 1:
+            raise InputError(f"{options.jobs} is no number of processes", where="--jobs")
+        return LocalEngine(options.jobs)
+    from stiction_ros.survey.engines.dask import SCHEME, DaskEngine
+
+    if not options.engine.startswith(SCHEME):
+        raise InputError(
+            f"unknown engine {options.engine!r}",
+            where="--engine",
+            fix=f"use local, or {SCHEME}HOST:PORT",
+        )
+    return DaskEngine(options.engine)
+
+
+def _write(found: Any, out: Path, earlier: Sequence[Any]) -> None:
+    from stiction_ros.survey.listing.columns import Columns
+    from stiction_ros.survey.listing.page import list_page
+    from stiction_ros.survey.listing.tables import write_csv, write_xlsx
+    from stiction_ros.survey.pages.trend import with_trend
+
+    with storing(out):
+        (out / PAGE).write_text(list_page(found, earlier), encoding="utf-8")
+        write_csv(out / CSV, found.entries)
+        write_xlsx(out / XLSX, found.entries)
+        columns = Columns.of(found.entries, earlier)
+        for entry in found.entries:
+            trend = columns.trends.get(entry.name)
+            if entry.report is not None and trend is not None:
+                page = out / entry.report
+                told = with_trend(
+                    page.read_text(encoding="utf-8"), trend, columns.widest[entry.op_unit]
+                )
+                page.write_text(told, encoding="utf-8")
+
+
+def _pairs(file: str | None) -> list[tuple[int, str, str]]:
+    """Return row and first two cells of each row of a table, semicolons or commas between them.
+
+    A first line whose first cell is ``loop``, ``tag`` or ``name`` is a head.
+    """
+    if file is None:
+        return []
+    with open_text(Path(file)) as source:
+        lines = source.read().splitlines()
+    read = enumerate(csv.reader(lines, delimiter=delimiter_of(lines)), start=1)
+    rows = [(number, row) for number, row in read if row and row[0].strip()]
+    short = next((number for number, row in rows if len(row) < 2), None)
+    if short is not None:
+        raise InputError("has no second column", where=f"{file}: row {short}", fix="loop,value")
+    pairs = [(number, row[0].strip(), row[1].strip()) for number, row in rows]
+    return pairs[1:] if pairs and pairs[0][1].lower() in ("loop", "tag", "name") else pairs
+
+
+def _costs(file: str | None) -> dict[str, float]:
+    """Return the cost of each loop; numbers are written as in exports, with point or comma.
+
+    Raises:
+        InputError: the file cannot be read, or a cost is no number of 0 or more.
+    """
+    found = {}
+    for row, name, text in _pairs(file):
+        cells = Numbers(decimal_comma=True)
+        cells.add([text])
+        value = float(cells.values()[0])
+        if not 0.0 <= value < float("inf"):
+            said = f"{text!r} is no cost of loop {name}"
+            raise InputError(said, where=f"{file}: row {row}", fix="use a number of 0 or more")
+        found[name] = value
+    return found
+
+
+def _earlier(files: Sequence[str]) -> list[Any]:
+    """Return earlier surveys, in the order of the files."""
+    from stiction_ros.survey.pages.trend import Earlier
+
+    found = []
+    for file in files:
+        try:
+            document = json.loads(Path(file).read_text(encoding="utf-8"))
+            bands = {row["name"]: _band(row) for row in document["loops"]}
+            found.append(Earlier(str(document.get("date", "")), bands))
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"cannot be read ({error})", where=file) from None
+        except (json.JSONDecodeError, KeyError, TypeError, AttributeError):
+            raise InputError(
+                "is no result of a survey", where=file, fix="give what --json wrote"
+            ) from None
+    return found
+
+
+def _band(row: dict[str, Any]) -> float | None:
+    return None if row["f_s"] is None or row["f_d"] is None else float(row["f_s"] + row["f_d"])

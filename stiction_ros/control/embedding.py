@@ -1,0 +1,280 @@
+"""Stiction-embedding MPC by exact enumeration of the moves that a sticky valve can make."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.certificate import (
+    Certificate,
+    CertificateStatus,
+    FreeJumps,
+    certify,
+)
+from stiction_ros.control.embedding_problem import (
+    EmbeddingProblem,
+    JumpPattern,
+    StickyState,
+)
+from stiction_ros.control.formulation import Formulation
+from stiction_ros.control.horizon import (
+    HorizonCost,
+    HorizonLimits,
+    HorizonWeights,
+)
+from stiction_ros.control.horizon_qp import HorizonSolution
+from stiction_ros.control.jump_form import FrictionSpread, JumpForm, jump_form
+from stiction_ros.control.pattern_bounds import PatternBounds
+from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.control.target import Target
+from stiction_ros.control.unaware import predicted_outputs
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.processes import LinearModel
+
+# Samples between two opposite jumps, by the number of sticky valves: patterns multiply.
+SECOND_JUMPS = {1: (1, 2, 3, 5, 8), 2: (1, 2, 5), 3: (2,)}
+ROUNDING = 1e-9  # of the cost, by which a bound must exceed it
+# Samples that a single valve may wait before its first jump, and what may follow then.
+WAITS = (1,)
+WAITING_SECONDS = (0, 1)
+
+
+def patterns(sticky: int) -> tuple[JumpPattern, ...]:
+    """Return the patterns of each of ``sticky`` valves: stay, ± one jump, ± two jumps.
+
+    A single valve may also wait a sample first: without that a jump that is better later
+    would be made now, since staying for good is the only other choice.
+    """
+    found = [JumpPattern(0)]
+    for direction in (1, -1):
+        found.append(JumpPattern(direction))
+        found.extend(JumpPattern(direction, second) for second in SECOND_JUMPS[sticky])
+        if sticky == 1:
+            found.extend(JumpPattern(direction, s, w) for w in WAITS for s in WAITING_SECONDS)
+    return tuple(found)
+
+
+@dataclasses.dataclass(frozen=True)
+class EmbeddingTuning:
+    """How sticky valves are moved.
+
+    Attributes:
+        jump_price: cost added per jump, in the units of the criterion.
+        jump_margin: how far a jump exceeds the smallest one, as a share of f_S, where nothing
+            is known of the uncertainty of the frictions.
+        kick_limits: largest move of each OP in a sample, shape (m,), %, where a valve jumps; the
+            smallest jump is made all the same. Where the rate limit of OP is smaller it counts.
+        move_prices: cost of the smallest jump of each valve, shape (m,), in place of its weight
+            in S; larger jumps cost as their squares; 0 leaves the weight.
+        least_margin: least margin as a share of f_S where their intervals are known; the
+            margin is then the half-width of f_S's interval plus that of f_D's.
+    """
+
+    jump_price: float = 0.0
+    jump_margin: float = 0.3
+    least_margin: float = 0.1
+    kick_limits: FloatArray | None = None
+    move_prices: FloatArray | None = None
+
+
+class EmbeddingMpc(Formulation):
+    r"""The controller that knows the friction, written in the stem position.
+
+    Under He's law (4), and others of the same
+    :class:`~stiction_ros.control.jump_form.JumpForm`, a stem either stays or jumps by at
+    least J:
+
+    .. math::
+        \Delta\chi = 0 \quad\text{with } u = \hat\chi, \qquad
+        |\Delta\chi| \ge J + \text{margin} \quad\text{with } u = \chi + f_D \text{sign}(\Delta\chi).
+
+    For every pattern of jumps the rest is a small convex quadratic programme in the sizes of
+    the jumps and in the moves of the healthy valves; the cheapest plan is applied. Programmes are
+    solved in the order of their :class:`~.pattern_bounds.PatternBounds`, until the bound of the
+    next one is above the best cost found.
+
+    Attributes:
+        forms: jump form of each valve, None for a healthy one.
+        move_weights: S, shape (m, m), by the prices of the jumps where they are given.
+        solved: programmes that the last plan took.
+        immobile: valves whose smallest jump has no room within the limits.
+    """
+
+    mode = ControlMode.EMBEDDING
+
+    def __init__(
+        self,
+        model: LinearModel,
+        weights: HorizonWeights,
+        limits: HorizonLimits,
+        frictions: Sequence[Behaviour | None],
+        tuning: EmbeddingTuning,
+        spreads: Sequence[FrictionSpread | None] | None = None,
+    ) -> None:
+        """Factorise one problem per combination of patterns.
+
+        What a jump costs goes by the frictions that are known now.
+
+        Raises:
+            InputError: no sticky valve, more than three, or a law without a jump form.
+        """
+        self.limits, self.tuning = limits, tuning
+        self._sticky = [j for j, friction in enumerate(frictions) if friction is not None]
+        if not 1 <= len(self._sticky) <= max(SECOND_JUMPS):
+            raise InputError(
+                f"{len(self._sticky)} sticky valves", fix="embedding takes one to three"
+            )
+        self.know([None if f is None else jump_form(f) for f in frictions], spreads)
+        priced = self._priced(weights)
+        self.cost, self.move_weights = HorizonCost(model, priced), priced.move
+        one = patterns(len(self._sticky))
+        choices = [one if f is not None else (None,) for f in frictions]
+        combinations = tuple(
+            combination
+            for combination in itertools.product(*choices)
+            if _fits(combination, weights.horizon)
+        )
+        self._problems = tuple(EmbeddingProblem(self.cost, limits, one) for one in combinations)
+        self._jumps = np.array([problem.jumps for problem in self._problems], dtype=float)
+        self._bounds = PatternBounds(self.cost, combinations)
+        self.solved = 0
+
+    def _priced(self, weights: HorizonWeights) -> HorizonWeights:
+        """Return ``weights`` with S such that the smallest jump of a sticky valve has its price."""
+        if self.tuning.move_prices is None:
+            return weights
+        move = weights.move.copy()
+        for j in self._sticky:
+            if self.tuning.move_prices[j] > 0.0:
+                move[j, j] = self.tuning.move_prices[j] / self._least[j] ** 2
+        return dataclasses.replace(weights, move=move)
+
+    def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:
+        self.know(valves.forms, valves.spreads, valves.intervals(stem))
+
+    def reach(self, stem: FloatArray, limits: FloatArray) -> FloatArray:
+        """Return ``limits`` with the valves that cannot move held where they are."""
+        found = limits.copy()
+        for j in self.immobile:
+            found[j] = stem[j]
+        return found
+
+    def know(
+        self,
+        forms: Sequence[JumpForm | None],
+        spreads: Sequence[FrictionSpread | None] | None = None,
+        interval: FloatArray | None = None,
+    ) -> None:
+        """Set what is known of the valves for the plans from now on.
+
+        Args:
+            forms: jump form of each of the m valves; None for the healthy ones, as before.
+            spreads: half-widths of the intervals of the frictions, None where unknown.
+            interval: lowest and highest stem position, shape (m, 2), %; None when sure.
+        """
+        tuning = self.tuning
+        self.forms = tuple(forms)
+        self._interval = interval
+        self._least, self._room = np.zeros(len(forms)), np.zeros(len(forms))
+        self._largest = np.full(len(forms), np.inf)
+        for j, form in enumerate(forms):
+            if form is not None:
+                spread = None if spreads is None else spreads[j]
+                margin = form.margin(spread, tuning.jump_margin, tuning.least_margin)
+                self._least[j] = form.least + margin
+                self._room[j] = max(form.dynamic_friction, 0.0)
+                kick = float(self.limits.move[j])
+                if tuning.kick_limits is not None:
+                    kick = min(kick, float(tuning.kick_limits[j]))
+                if np.isfinite(kick):
+                    # OP leads the stem by f_D, and a jump back takes that twice.
+                    way = kick - 2.0 * self._room[j]
+                    self._largest[j] = max(form.overshoot * way, self._least[j])
+        travel = self.limits.stem[:, 1] - self.limits.stem[:, 0] - self._room
+        self.immobile = tuple(j for j in self._sticky if self._least[j] > travel[j])
+
+    @property
+    def least_kicks(self) -> FloatArray:
+        """Move of OP that the smallest jump of each valve takes from rest, (m,), %; else 0."""
+        found = np.zeros(len(self.forms))
+        for j, form in enumerate(self.forms):
+            if form is not None:
+                found[j] = form.op(0.0, float(self._least[j]))
+        return found
+
+    def valves(self, last: FloatArray) -> StickyState:
+        """Return what a problem must know of the valves, stems estimated at ``last`` (m,)."""
+        interval = np.column_stack([last, last]) if self._interval is None else self._interval
+        return StickyState(last, interval, self._least, self._largest, self._room)
+
+    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
+        """Return the cheapest plan from ξ̂ (n,) and the stem estimates ``last`` (m,), or None."""
+        best: tuple[float, int, HorizonSolution] | None = None
+        valves, converged = self.valves(last), True
+        gradient = self.cost.linear(state - target.state, last - target.stem, target.path)
+        bounds = self._bounds.of(gradient, last - target.stem, valves)
+        bounds = bounds + self.tuning.jump_price * self._jumps
+        if self.waits:
+            bounds = np.where(self._jumps > 0, np.inf, bounds)
+        self.solved = 0
+        for i in np.argsort(bounds, kind="stable").tolist():
+            if best is not None and bounds[i] > best[0] + ROUNDING * (1.0 + abs(best[0])):
+                break
+            problem = self._problems[i]
+            solution = problem.solve(state, target, valves, gradient)
+            self.solved += 1
+            converged = converged and not problem.limit_reached
+            if solution is None:
+                continue
+            cost = solution.cost + self.tuning.jump_price * problem.jumps
+            if best is None or (cost, i) < best[:2]:
+                best = (cost, i, solution)
+        if best is None:
+            return None
+        cost, i, solution = best
+        problem = self._problems[i]
+        stem = solution.plan + target.stem
+        cost += self.cost.constant(state - target.state, last - target.stem, target.path)
+        pv = predicted_outputs(self.cost, state, target, solution)
+        op = self.op_of(last, stem[0])
+        return Plan(op, stem, pv, solution.slack, problem.jumps, converged, cost)
+
+    def optimality_gap(
+        self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
+    ) -> float | None:
+        if self.waits:
+            return None  # not the cheapest plan, and not meant to be
+        found = self.certificate(state, target, last, plan, samples)
+        return found.gap if found.status is CertificateStatus.CERTIFIED else None
+
+    def certificate(
+        self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
+    ) -> Certificate:
+        """Return how far ``plan`` is from the best that any pattern of jumps can do.
+
+        Args:
+            state, target, last: as given to :meth:`plan`.
+            plan: what that returned.
+            samples: of the horizon in which jumps are free, 1 … N.
+        """
+        sticky = [form is not None for form in self.forms]
+        price = self.tuning.jump_price
+        jumps = FreeJumps(self.cost, self.limits, self.valves(last), sticky, price, samples)
+        return certify(jumps, state, target, plan)
+
+    def op_of(self, last: FloatArray, stem: FloatArray) -> FloatArray:
+        """Return the OP (m,), %, that moves the stems from ``last`` (m,) to ``stem`` (m,)."""
+        op = stem.copy()
+        for j, form in enumerate(self.forms):
+            if form is not None and abs(stem[j] - last[j]) > 0.5 * self._least[j]:
+                op[j] = form.op(float(last[j]), float(stem[j]))
+        return np.asarray(np.clip(op, self.limits.stem[:, 0], self.limits.stem[:, 1]))
+
+
+def _fits(combination: tuple[JumpPattern | None, ...], horizon: int) -> bool:
+    return all(p is None or p.wait + p.second < horizon for p in combination)

@@ -1,0 +1,67 @@
+"""What a controller asks of a formulation, whichever it is."""
+
+from __future__ import annotations
+
+import abc
+
+from stiction_ros.control.beliefs import ValveBeliefs
+from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.control.target import Target
+from stiction_ros.effects.behaviour import FloatArray
+
+
+class Formulation(abc.ABC):
+    """One way to turn an estimate and a target into a plan.
+
+    In every sample :meth:`learn` comes first, then :meth:`reach` bounds the target, then
+    :meth:`plan` is asked. One that has nothing to learn or to prepare has a plan only.
+
+    Attributes:
+        mode: what it does about the friction.
+        immobile: valves that it cannot move, by their numbers.
+        waits: whether stems at rest are to stay in this sample where that is feasible; who plans
+            no jumps takes no notice of it.
+    """
+
+    mode: ControlMode
+    immobile: tuple[int, ...] = ()
+    waits: bool = False
+
+    def learn(self, valves: ValveBeliefs, stem: FloatArray) -> None:  # noqa: B027
+        """Take over what is believed of the valves, for the plans from now on.
+
+        Args:
+            valves: the belief in each of the m valves.
+            stem: stem estimates, shape (m,), %.
+        """
+
+    def reach(self, stem: FloatArray, limits: FloatArray) -> FloatArray:
+        """Return where the stems may be brought to rest, shape (m, 2), %.
+
+        Args:
+            stem: stem estimates, shape (m,), %.
+            limits: of the stems, shape (m, 2), %.
+        """
+        return limits
+
+    @abc.abstractmethod
+    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
+        """Return a plan, or None when there is none.
+
+        Args:
+            state: ξ̂, shape (n,).
+            target: where outputs and stems should come to rest.
+            last: stem estimates, shape (m,), %.
+        """
+
+    def optimality_gap(
+        self, state: FloatArray, target: Target, last: FloatArray, plan: Plan, samples: int
+    ) -> float | None:
+        """Return the cost of ``plan`` above the optimum as a share of it, None where unknown.
+
+        Args:
+            state, target, last: as given to :meth:`plan`.
+            plan: what that returned.
+            samples: of the horizon in which the optimum is free, at least 1.
+        """
+        return None

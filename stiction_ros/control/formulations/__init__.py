@@ -1,1 +1,0 @@
-"""How OP is planned: unaware of friction, by inversion, by exact embedding."""

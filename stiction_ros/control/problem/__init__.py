@@ -1,1 +1,0 @@
-"""The finite-horizon problem: cost, limits, target, the paper's weights."""

@@ -1,1 +1,0 @@
-"""State and disturbance from PV and the OP that was applied."""

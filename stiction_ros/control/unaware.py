@@ -1,0 +1,138 @@
+"""Stiction-unaware MPC, equation (19): the stem is taken to follow OP."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction_ros.control.formulation import Formulation
+from stiction_ros.control.horizon import (
+    HorizonCost,
+    HorizonLimits,
+    HorizonWeights,
+)
+from stiction_ros.control.horizon_qp import HorizonQp, HorizonSolution
+from stiction_ros.control.result import ControlMode, Plan
+from stiction_ros.control.target import Target
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.processes import LinearModel
+
+
+class UnawareMpc(Formulation):
+    """Offset-free linear MPC with bounds on OP, on its moves, and soft bounds on PV."""
+
+    mode = ControlMode.UNAWARE
+
+    def __init__(self, model: LinearModel, weights: HorizonWeights, limits: HorizonLimits) -> None:
+        """Condense the problem; limits as in :class:`HorizonLimits`."""
+        self.limits = limits
+        self.cost = HorizonCost(model, weights)
+        m = model.b.shape[1]
+        size = weights.horizon * m
+        limited = np.flatnonzero(np.isfinite(limits.move))
+        picks = (np.arange(weights.horizon)[:, None] * m + limited).reshape(-1)
+        self._limited, self._width = limited, m
+        rows = (np.eye(size) - np.eye(size, k=-m))[picks]
+        self._qp = HorizonQp(self.cost, np.eye(size), rows, limits.output, limits.iterations)
+        self._offset = np.zeros(size)
+        self._lower, self._upper = np.empty(size + len(picks)), np.empty(size + len(picks))
+        self._moves = np.tile(limits.move[limited], weights.horizon)
+
+    def plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
+        """Return the best plan from state ξ̂ (n,) and the last stems (m,), or None.
+
+        Out of iterations, the plan without bounds is cut to them, and returned if it is
+        cheaper than leaving the stems where they are.
+        """
+        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
+        deviation = last - target.stem
+        self._fill_bounds(low - target.stem, high - target.stem, deviation)
+        solution = self._qp.solve(
+            state - target.state,
+            deviation,
+            self._offset,
+            self._lower,
+            self._upper,
+            target.pv,
+            target.path,
+        )
+        if solution is not None:
+            constant = self.cost.constant(state - target.state, deviation, target.path)
+            cost = solution.cost + constant
+            return self._plan(state, target, solution, cost)
+        if self._qp.limit_reached:
+            return self._cut_plan(state, target, last)
+        return None
+
+    def _plan(
+        self,
+        state: FloatArray,
+        target: Target,
+        found: HorizonSolution,
+        cost: float,
+        converged: bool = True,
+    ) -> Plan:
+        stem = found.plan + target.stem
+        low, high = self.limits.stem[:, 0], self.limits.stem[:, 1]
+        op = np.minimum(np.maximum(stem[0], low), high)
+        pv = predicted_outputs(self.cost, state, target, found)
+        return Plan(op, stem, pv, found.slack, converged=converged, cost=cost)
+
+    def _cost(
+        self,
+        state: FloatArray,
+        target: Target,
+        last: FloatArray,
+        moved: FloatArray,
+        slack: FloatArray,
+    ) -> float:
+        z, before, v = state - target.state, last - target.stem, moved.reshape(-1)
+        linear = self.cost.linear(z, before, target.path)
+        total = float(v @ (0.5 * self.cost.hessian @ v + linear))
+        return total + self.cost.constant(z, before, target.path) + self._qp.slack_cost(slack)
+
+    def _cut_plan(self, state: FloatArray, target: Target, last: FloatArray) -> Plan | None:
+        before = last - target.stem
+        linear = self.cost.linear(state - target.state, before, target.path)
+        free = np.linalg.solve(self.cost.hessian, -linear).reshape(self.cost.horizon, -1)
+        low, high = (self.limits.stem - target.stem[:, None]).T
+        cut = np.empty_like(free)
+        stem = np.clip(before, low, high)
+        for i, wanted in enumerate(free):
+            stem = np.clip(
+                np.clip(wanted, stem - self.limits.move, stem + self.limits.move), low, high
+            )
+            cut[i] = stem
+        stay = np.tile(np.clip(before, low, high), (self.cost.horizon, 1))
+        both = []
+        for v in (cut, stay):
+            slack = self._qp.slack(state - target.state, v, target.pv)
+            cost = self._cost(state, target, last, v, slack)
+            found = HorizonSolution(v, cost, slack, v.reshape(-1))
+            both.append(self._plan(state, target, found, cost, converged=False))
+        if not np.isfinite(both[0].cost) or both[0].cost > both[1].cost:
+            return None
+        return both[0]
+
+    def _fill_bounds(self, low: FloatArray, high: FloatArray, deviation: FloatArray) -> None:
+        """Write bounds on all stems off the target, then on their limited moves."""
+        size, count = len(self._offset), len(self._limited)
+        self._lower[:size].reshape(-1, self._width)[:] = low
+        self._upper[:size].reshape(-1, self._width)[:] = high
+        if count:
+            self._lower[size:], self._upper[size:] = -self._moves, self._moves
+            self._lower[size : size + count] += deviation[self._limited]
+            self._upper[size : size + count] += deviation[self._limited]
+
+
+def predicted_outputs(
+    cost: HorizonCost, state: FloatArray, target: Target, found: HorizonSolution
+) -> FloatArray:
+    """Return outputs at samples 0 … N, shape (N + 1, p), of the plan ``found``."""
+    deviation = state - target.state
+    pv = np.empty((cost.horizon + 1, len(target.pv)))
+    pv[0] = cost.model.c @ deviation + target.pv
+    if found.pv is None:
+        pv[1:] = cost.outputs(deviation, found.plan) + target.pv
+    else:
+        pv[1:] = found.pv
+    return pv

@@ -1,1 +1,0 @@
-"""Where the stems of sticky valves are believed to be."""

@@ -1,0 +1,118 @@
+"""What a caller may choose, and the constants behind the verdict."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+
+LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
+METHOD_NAMES = ("exact", "evidence")
+
+
+def limited(span: FloatArray, limit: float | tuple[float, ...] | None) -> FloatArray:
+    """Return the largest friction of every valve, shape (m,), %: its OP span, or less.
+
+    Args:
+        span: of OP, shape (m,), %.
+        limit: one for all valves, or one for each; None for the span.
+
+    Raises:
+        InputError: a number of limits that is not that of the valves.
+    """
+    if limit is None:
+        return span
+    given = np.atleast_1d(np.asarray(limit, dtype=float))
+    if len(given) not in (1, len(span)):
+        raise InputError(
+            f"{len(given)} limits for {len(span)} valves",
+            where="friction_limit",
+            fix="give one for all, or one for each",
+        )
+    return np.asarray(np.minimum(span, given), dtype=float)
+
+
+@dataclasses.dataclass(frozen=True)
+class IdentificationOptions:
+    """Options of :func:`stiction_ros.identification.identify`.
+
+    Attributes:
+        method: ``evidence`` or ``exact``, see :mod:`.methods`; the paper's own methods have
+            their own options, :class:`stiction_ros.paper.paper_options.PaperOptions`.
+        output_order: n_a; None lets BIC choose among 1, 2 and 3 under the noise model.
+        input_order: n_b; None means equal to n_a.
+        delay: inclusive range of t_d, samples, for every channel.
+        law: friction law.
+        kind: what the loop controls, one of :data:`LOOP_KINDS`, or None; the process that is
+            found is held against it, which is told as a note and changes no verdict.
+        friction_limit: largest f_S searched, %, one for all valves or one for each; None is the
+            OP span of each valve.
+        noise_order: order p of the autoregressive noise on the free-run error.
+        confidence: level of the intervals.
+        bic_margin: BIC by which friction must beat the friction-free rival to be believed.
+        min_moves: fewest stem moves from which anything may be concluded.
+        negligible_friction: f_S up to this is healthy, %.
+        negligible_share: f_S up to this share of the OP span is healthy.
+        one_step_best: also find the friction and delays of least one-step SE (exact, He's law).
+        check_columns: refuse a record in which OP and PV are clearly swapped.
+
+    Raises:
+        InputError: a value out of range.
+
+    Examples:
+        >>> from stiction_ros import IdentificationOptions
+        >>> options = IdentificationOptions(output_order=1, delay=(0, 4))
+        >>> options.law, options.confidence
+        ('he', 0.95)
+    """
+
+    method: str = "evidence"
+    output_order: int | None = None
+    input_order: int | None = None
+    delay: tuple[int, int] = (0, 10)
+    law: str = "he"
+    kind: str | None = None
+    friction_limit: float | tuple[float, ...] | None = None
+    noise_order: int = 6
+    confidence: float = 0.95
+    bic_margin: float = 20.0
+    min_moves: int = 6
+    negligible_friction: float = 0.3
+    negligible_share: float = 0.03
+    one_step_best: bool = True
+    check_columns: bool = True
+
+    def __post_init__(self) -> None:
+        if self.method not in METHOD_NAMES:
+            raise InputError(
+                f"unknown value {self.method!r}",
+                where="method",
+                fix=f"use {' | '.join(METHOD_NAMES)}",
+            )
+        if self.kind is not None and self.kind not in LOOP_KINDS:
+            raise InputError(
+                f"unknown kind {self.kind!r}", where="kind", fix=f"use {' | '.join(LOOP_KINDS)}"
+            )
+        low, high = self.delay
+        if not 0 <= low <= high:
+            raise InputError(
+                f"{low}:{high} is no delay range", where="delay", fix="use LO:HI, 0 <= LO <= HI"
+            )
+        for key in ("output_order", "input_order"):
+            order = getattr(self, key)
+            if order is not None and not 1 <= order <= 10:
+                raise InputError(f"order {order} lies outside 1 to 10", where=key)
+        limit = self.friction_limit
+        if limit is not None and not all(
+            math.isfinite(one) and one > 0.0
+            for one in (limit if isinstance(limit, tuple) else (limit,))
+        ):
+            raise InputError(f"{limit} is not positive", where="friction_limit")
+        if not 0.5 < self.confidence < 1:
+            raise InputError(f"{self.confidence} is no level", where="confidence", fix="use 0.95")
+        if not 0 <= self.noise_order <= 20:
+            raise InputError(f"order {self.noise_order} lies outside 0 to 20", where="noise_order")

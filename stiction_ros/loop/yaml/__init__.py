@@ -1,1 +1,0 @@
-"""Loop models as YAML: checked reading, each error with its key."""

@@ -1,0 +1,221 @@
+"""The ``process`` section of a loop model, and what its instruments can show."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.effects import Behaviour, FloatArray, LinearFilter
+from stiction_ros.errors import InputError
+from stiction_ros.loop.yaml_effects import read_effects
+from stiction_ros.loop.yaml_reading import Section
+from stiction_ros.processes import (
+    AlteredProcess,
+    ArxOutput,
+    ArxProcess,
+    LinearModel,
+    Noise,
+    NoiseEntry,
+    Process,
+    StateSpaceProcess,
+    StirredTank,
+    TankParameters,
+)
+
+_KINDS = ("arx", "state_space", "stirred_tank")
+
+
+@dataclasses.dataclass(frozen=True)
+class Instrument:
+    """Limits of one measured output; infinite where nothing is known.
+
+    Attributes:
+        low, high: range, engineering units.
+        rate_limit: fastest credible change of the measurement, units per second.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    rate_limit: float = math.inf
+
+
+def read_process(
+    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
+) -> Process:
+    """Build the process; ``point`` is the loop's operating point, read for linear kinds."""
+    kind = section.choice("kind", _KINDS)
+    if kind == "arx":
+        process = _read_arx(section, point, valves)
+    elif kind == "state_space":
+        process = _read_state_space(section, point, valves)
+    else:
+        process = _read_tank(section, point, valves, sample_time)
+    section.finish()
+    effects = tuple(_read_filters(entry) for entry in section.sections("outputs", []))
+    return AlteredProcess(process, effects, sample_time) if any(effects) else process
+
+
+def _read_arx(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
+    if "measured_disturbances" in section and section.raw("measured_disturbances"):
+        raise InputError(
+            "an arx process has no measured disturbances",
+            where=section.at("measured_disturbances"),
+            fix="use kind: state_space with a matrix e",
+        )
+    equations = []
+    for entry in section.sections("outputs"):
+        name = entry.text("name")
+        b_section, delays = entry.section("b"), entry.section("delay", {})
+        b = {v: tuple(b_section.numbers(v).tolist()) for v in valves if v in b_section}
+        b_section.finish()
+        if not b:
+            raise InputError("names no valve", where=b_section.where)
+        delay = {v: delays.integer(v, 0) for v in b}
+        delays.finish()
+        _read_elsewhere(entry)
+        try:
+            equation = ArxOutput(
+                name,
+                tuple(entry.numbers("a").tolist()),
+                b,
+                delay,
+                entry.number("bias", 0.0),
+                _read_noise(entry),
+            )
+        except InputError as error:
+            raise error.within(entry.where) from None
+        entry.finish()
+        equations.append(equation)
+    if not equations:
+        raise InputError("has no output", where=section.at("outputs"))
+    names = tuple(equation.name for equation in equations)
+    op0, pv0 = _read_point(point, valves, names)
+    return ArxProcess(tuple(equations), valves, op0, pv0)
+
+
+def _read_state_space(section: Section, point: Section, valves: tuple[str, ...]) -> Process:
+    names, noise = _read_outputs(section, None)
+    measured = _read_measured(section)
+    a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
+    e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
+    op0, pv0 = _read_point(point, valves, names)
+    try:
+        model = LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
+        return StateSpaceProcess(model, valves, names, noise, measured)
+    except InputError as error:
+        raise error.within(section.where) from None
+
+
+def _read_tank(
+    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
+) -> Process:
+    names, noise = _read_outputs(section, ("C", "T"))
+    measured = _read_measured(section)
+    values = {}
+    for field in dataclasses.fields(TankParameters):
+        if field.name in section:
+            values[field.name] = section.number(field.name, above=0.0)
+    if point.values:
+        raise InputError(
+            "a stirred tank works in absolute units about (50, 50) %",
+            where=point.where,
+            fix="leave operating_point out and give initial instead",
+        )
+    try:
+        return StirredTank(valves, names, noise, TankParameters(**values), sample_time, measured)
+    except InputError as error:
+        raise error.within(section.where) from None
+
+
+def _read_outputs(
+    section: Section, default: tuple[str, ...] | None
+) -> tuple[tuple[str, ...], tuple[Noise, ...]]:
+    if default is not None and "outputs" not in section:
+        return default, tuple(Noise() for _ in default)
+    names, noise = [], []
+    for entry in section.sections("outputs"):
+        names.append(entry.text("name"))
+        noise.append(_read_noise(entry))
+        _read_elsewhere(entry)
+        entry.finish()
+    return tuple(names), tuple(noise)
+
+
+def _read_elsewhere(entry: Section) -> None:
+    """Pass over what :func:`read_process` and :func:`read_instruments` read of an output."""
+    for key in ("effects", "range", "rate_limit"):
+        entry.raw(key, None)
+
+
+def read_instruments(section: Section, outputs: tuple[str, ...]) -> tuple[Instrument, ...]:
+    """Return the limits of the instrument of each output; ``section`` is the process."""
+    found = {
+        entry.text("name"): _read_instrument(entry) for entry in section.sections("outputs", [])
+    }
+    return tuple(found.get(name, Instrument()) for name in outputs)
+
+
+def _read_instrument(entry: Section) -> Instrument:
+    low, high, rate = -math.inf, math.inf, math.inf
+    if "range" in entry:
+        low, high = entry.numbers("range", count=2).tolist()
+        if low >= high:
+            raise InputError(
+                f"lower end {low:g} is not below {high:g}",
+                where=entry.at("range"),
+                fix="write [low, high]",
+            )
+    if "rate_limit" in entry:
+        rate = entry.number("rate_limit", above=0.0)
+    return Instrument(low, high, rate)
+
+
+def _read_filters(entry: Section) -> tuple[Behaviour, ...]:
+    """Return the effects on the process side of one output, which must be linear."""
+    effects = read_effects(entry, "process")
+    for i, effect in enumerate(effects):
+        if not isinstance(effect, LinearFilter):
+            raise InputError(
+                f"{effect.title()} cannot act on a process",
+                where=f"{entry.at('effects')}[{i}]",
+                fix="use gain, delay, pole or leak, or put it to a valve or a sensor",
+            )
+    return effects
+
+
+def _read_measured(section: Section) -> tuple[str, ...]:
+    names = section.raw("measured_disturbances", ()) or ()
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n for n in names):
+        raise InputError(
+            f"{names!r} is no list of names",
+            where=section.at("measured_disturbances"),
+            fix="write [F_B]",
+        )
+    if len(set(names)) != len(names):
+        raise InputError(
+            "two inputs have one name", where=section.at("measured_disturbances"), fix="rename one"
+        )
+    return tuple(names)
+
+
+def _read_noise(entry: Section) -> Noise:
+    if "noise" not in entry:
+        return Noise()
+    section = entry.section("noise")
+    std = section.number("std", low=0.0)
+    enters = section.choice("enters", tuple(NoiseEntry), NoiseEntry.MEASUREMENT)
+    section.finish()
+    return Noise(std, NoiseEntry(enters))
+
+
+def _read_point(
+    point: Section, valves: tuple[str, ...], outputs: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray]:
+    found = []
+    for key, names in (("op", valves), ("pv", outputs)):
+        entry = point.section(key, {})
+        found.append(np.array([entry.number(name, 0.0) for name in names]))
+        entry.finish()
+    return found[0], found[1]

@@ -1,1 +1,0 @@
-"""Windows of samples, PV and OP paired."""

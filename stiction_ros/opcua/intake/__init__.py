@@ -1,1 +1,0 @@
-"""What is read of a control system once: its history, and the tags that it has."""

@@ -1,1 +1,0 @@
-"""Friction laws with smooth switches, and the stems that they give."""

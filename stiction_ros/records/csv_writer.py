@@ -1,0 +1,98 @@
+"""Writes a record as a CSV file that :func:`read_csv` reads back, digit by digit."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError, storing
+from stiction_ros.records.csv_names import (
+    DEFAULT_OUTPUT,
+    DEFAULT_VALVE,
+    MODE,
+    QUALITY,
+    SIGNALS,
+    column_name,
+)
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Record
+
+
+def write_csv(
+    record: Record, path: str | Path, *, iso: bool = False, modes: Sequence[str] | None = None
+) -> None:
+    """Write ``record`` with a column of seconds and one column per signal.
+
+    A loop of one valve V1 and one output PV1 gets the default names ``t,OP,PV[,SP][,STEM]``;
+    any other gets ``TAG.OP``, ``TAG.PV`` …. Where not every sample is good a column ``QUALITY``
+    says what each is, and NaN is an empty cell. Either is read back without naming a column;
+    runs of blanks in a tag come back as one.
+
+    Args:
+        record: to write.
+        path: the file.
+        iso: time as ISO 8601 stamps in UTC, to the microsecond, instead of seconds.
+        modes: of the loop's controller, one a sample, for a column ``MODE``; when it is read,
+            what is not automatic is marked as manual.
+
+    Raises:
+        InputError: the file cannot be written, no ISO stamp can say its times, or it holds
+            several runs.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, read, simulate, write_csv
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=20)
+        >>> write_csv(record, "flow.csv")
+        >>> bool((read("flow.csv").pv == record.pv).all())
+        True
+    """
+    if (np.diff(record.time) <= 0).any():
+        raise InputError(
+            "holds several runs, whose times fall back",
+            where=record.name,
+            fix="write each of its segments by itself",
+        )
+    plain = (record.valves, record.outputs) == ((DEFAULT_VALVE,), (DEFAULT_OUTPUT,))
+    times = _iso(record) if iso else [repr(t) for t in (record.start + record.time).tolist()]
+    header, columns = ["t"], [times]
+    for key, name in SIGNALS.items():
+        values: FloatArray | None = getattr(record, key)
+        if values is None:
+            continue
+        tags = record.valves if key in ("op", "stem") else record.outputs
+        for tag, column in zip(tags, values.T, strict=True):
+            header.append(name if plain else column_name(key, tag))
+            columns.append([_cell(value) for value in column.tolist()])
+    if modes is not None:
+        header.append(MODE)
+        columns.append(list(modes))
+    if record.mask is not None:
+        header.append(QUALITY)
+        columns.append([Quality(number).word for number in record.mask.tolist()])
+    with storing(path), Path(path).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
+        # A semicolon in a name must not be taken for what separates the columns.
+        (quoted if ";" in "".join(header) else writer).writerow(header)
+        writer.writerows(zip(*columns, strict=True))
+
+
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else repr(value)
+
+
+def _iso(record: Record) -> list[str]:
+    try:
+        begin = datetime.datetime.fromtimestamp(record.start, datetime.UTC)
+        stamps = [begin + datetime.timedelta(seconds=t) for t in record.time.tolist()]
+    except (ValueError, OverflowError, OSError):
+        raise InputError(
+            f"{record.start:.9g} s is no date", where=record.name, fix="write seconds"
+        ) from None
+    return [stamp.isoformat().replace("+00:00", "Z") for stamp in stamps]

@@ -1,0 +1,42 @@
+"""Values and times as texts: JSON that every reader takes, times as people say them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+HOUR, DAY = 3600.0, 86400.0
+
+
+def finite(value: Any) -> Any:
+    """Return JSON data with None in place of numbers that JSON does not have."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def json_text(value: Any, *, indent: int | None = 2) -> str:
+    """Return ``value`` as JSON text, never with NaN or Infinity."""
+    return json.dumps(finite(value), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def spoken(seconds: float) -> str:
+    """Return a time of three digits in the unit that suits it: ``45.5 s``, ``4.78 h``, ``12.3 d``.
+
+    Args:
+        seconds: not negative; whole ones are kept below an hour.
+
+    Examples:
+        >>> spoken(45.52), spoken(1234.0), spoken(17210.0)
+        ('45.5 s', '1234 s', '4.78 h')
+    """
+    if seconds < HOUR:
+        return f"{seconds:.3g} s" if seconds < 1000.0 else f"{seconds:.0f} s"
+    size, unit = (HOUR, "h") if seconds < 2.0 * DAY else (DAY, "d")
+    return f"{seconds / size:.3g} {unit}"

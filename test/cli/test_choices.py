@@ -1,0 +1,28 @@
+"""The words of the options are those that the modules know."""
+
+from __future__ import annotations
+
+from stiction_ros.cli import gap
+from stiction_ros.cli.shared import searches
+from stiction_ros.discrepancy import GapVerdict
+from stiction_ros.identification import METHODS
+from stiction_ros.identification.answer.loop_kind import LoopKind
+from stiction_ros.identification.friction.grid import laws
+from stiction_ros.identification.identification_options import LOOP_KINDS
+from stiction_ros.identification.linear.data import LinearKind, OrderCriterion
+from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
+from stiction_ros.paper import methods
+
+
+def test_every_choice_is_known_and_none_is_missing() -> None:
+    assert (*METHODS, *methods.METHODS) == searches.METHODS
+    assert tuple(methods.METHODS) == searches.PAPER_METHODS
+    assert set(searches.laws()) == set(laws())
+    assert tuple(kind.value for kind in LoopKind) == searches.LOOP_KINDS == LOOP_KINDS
+    assert tuple(kind.value for kind in LinearKind) == searches.LINEAR_KINDS
+    assert tuple(criterion.value for criterion in OrderCriterion) == searches.CRITERIA
+    assert tuple(method.value for method in SubspaceMethod) == searches.SUBSPACE_METHODS
+
+
+def test_every_verdict_of_gap_has_an_exit_code() -> None:
+    assert set(gap.EXIT_CODES) == {verdict.value for verdict in GapVerdict}
