@@ -41,7 +41,7 @@ class ValveBelief:
         self._memory, self.stem = self.form.law.rest(stem), stem
         self._others, self._positions = [], (stem, stem)
 
-    def step(self, op: float) -> float:
+    def apply_op(self, op: float) -> float:
         """Apply ``op``, %, for one sample and return χ̂, %."""
         law = self.form.law
         self._memory, self.stem = law.step(self._memory, op, 0.0)
@@ -56,7 +56,7 @@ class ValveBelief:
         return self.stem
 
     def expected(self, op: float) -> float:
-        """Return the χ̂, %, that :meth:`step` would bring about; nothing changes."""
+        """Return the χ̂, %, that :meth:`apply_op` would bring about; nothing changes."""
         return self.form.law.step(self._memory, op, 0.0)[1]
 
     @property

@@ -72,15 +72,15 @@ class ValveBeliefs(Sequence[ValveBelief | None]):
         for j, belief in self.sticky:
             belief.start(float(op[j]), *self._limits[j])
 
-    def step(self, op: FloatArray) -> FloatArray:
+    def apply_op(self, op: FloatArray) -> FloatArray:
         """Apply ``op`` (m,), %, for one sample and return the stems, shape (m,), %."""
         stem = np.array(op, dtype=float)
         for j, belief in self.sticky:
-            stem[j] = belief.step(float(op[j]))
+            stem[j] = belief.apply_op(float(op[j]))
         return stem
 
     def expected(self, op: FloatArray) -> FloatArray:
-        """Return the stems, shape (m,), %, that :meth:`step` would bring about."""
+        """Return the stems, shape (m,), %, that :meth:`apply_op` would bring about."""
         stem = np.array(op, dtype=float)
         for j, belief in self.sticky:
             stem[j] = belief.expected(float(op[j]))

@@ -138,7 +138,7 @@ class MpcController:
         stem = history.op[0]
         self.valves.start(stem)
         for row in history.op[: first + 1]:
-            stem = self.valves.step(row)
+            stem = self.valves.apply_op(row)
         known = history.pv[first:][np.isfinite(history.pv[first:]).all(axis=1)]
         self.observer.rest(stem, known[0] if len(known) else self.design.model.pv0)
         misfit = self._follow(history, first, stem, first + skip)
@@ -152,14 +152,14 @@ class MpcController:
             history: the samples since then, in order.
         """
         if len(history.op):
-            self._follow(history, 0, self.valves.step(history.op[0]))
+            self._follow(history, 0, self.valves.apply_op(history.op[0]))
 
     def _follow(self, history: History, first: int, stem: FloatArray, count_from: int = 0) -> float:
         """Take in the samples from ``first`` on, whose stems are ``stem``; as take_over."""
         total, counted = 0.0, 0
         for k in range(first, len(history.op)):
             if k > first:
-                stem = self.valves.step(history.op[k])
+                stem = self.valves.apply_op(history.op[k])
             if np.isfinite(history.pv[k]).all():
                 self.observer.correct(history.pv[k])
                 if k >= count_from:
@@ -339,7 +339,7 @@ class MpcController:
                 check.drop()
             for j, belief in self.valves.sticky if known else ():
                 check.begin(j, self.observer, belief, float(applied[j]))
-        stem = self.valves.step(applied)
+        stem = self.valves.apply_op(applied)
         told = None if plan is None else plan.process_input
         if told is not None and np.array_equal(applied, decided):
             stem = told

@@ -59,7 +59,7 @@ class _Rival:
         if self._belief is None:
             self.static_friction = max(self.static_friction, abs(op - self.stem))
         else:
-            self.stem = self._belief.step(op)
+            self.stem = self._belief.apply_op(op)
         other = stems.copy()
         other[valve] = self.stem
         self.observer.predict(other, dv)

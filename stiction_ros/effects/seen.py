@@ -93,7 +93,7 @@ class Axis:
         return at > high - near or (not self.whole and at < low + near)
 
     @property
-    def step(self) -> float:
+    def spacing(self) -> float:
         """Distance of two points of the first grid, in coordinates of the search."""
         if self.points < 2:
             return 0.5 * (self.inner(self.high) - self.inner(self.low))

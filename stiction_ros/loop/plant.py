@@ -43,7 +43,7 @@ class _Chain:
         self._drawn = [effect if isinstance(effect, DrivenByNoise) else None for effect in effects]
         self._random = random
 
-    def step(self, value: float, time: float) -> float:
+    def output_of(self, value: float, time: float) -> float:
         for i, (effect, drawn) in enumerate(zip(self.effects, self._drawn, strict=True)):
             memory = self.memories[i]
             if drawn is not None:
@@ -131,11 +131,11 @@ class Plant:
         stem = np.empty(len(self._valves))
         for j, (chain, (low, high)) in enumerate(zip(self._valves, self._limits, strict=True)):
             asked = min(max(float(op[j]), low), high)
-            stem[j] = min(max(chain.step(asked, time), low), high)
+            stem[j] = min(max(chain.output_of(asked, time), low), high)
         noise = self._equation_std * self._random.standard_normal(len(self._equation_std))
         moved = stem.copy() if self._loads or self._waves else stem
         for j, chain in self._loads:
-            moved[j] += chain.step(0.0, time)
+            moved[j] += chain.output_of(0.0, time)
         for j, wave in self._waves:
             moved[j] += float(wave.entering(np.array([time]), self.model.sample_time)[0])
         self._state = self.model.process.advance(self._state, moved, self._upset, noise)
@@ -156,7 +156,7 @@ class Plant:
         clean = process.output(self._state).astype(float, copy=True)
         self._upset = np.zeros(len(process.upsets))
         for place, chain in self._disturbances:
-            value = chain.step(0.0, time)
+            value = chain.output_of(0.0, time)
             if place in process.outputs:
                 clean[process.outputs.index(place)] += value
             else:
@@ -164,5 +164,5 @@ class Plant:
         pv = clean + self._measurement_std * self._random.standard_normal(len(clean))
         for i, chain in enumerate(self._sensors):
             if chain.effects:
-                pv[i] = chain.step(float(pv[i]), time)
+                pv[i] = chain.output_of(float(pv[i]), time)
         return Measurement(time, pv, clean, self._upset[self._measured])

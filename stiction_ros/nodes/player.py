@@ -164,7 +164,7 @@ class PlayerNode(ManagedNode):
             response.success, response.message = False, "it is playing, pause it first"
             return response
         if self.running:
-            self._send(self.playback.step())
+            self._send(self.playback.next_messages())
         return self._answer(response)
 
     def _answer(self, response: Trigger.Response) -> Trigger.Response:

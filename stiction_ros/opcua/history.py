@@ -245,7 +245,7 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
     Raises:
         InputError: a tag without values, or more than 10 million samples.
     """
-    jitter, half = tags.step // JITTER, tags.step // 2
+    jitter, half = tags.sample_ns // JITTER, tags.sample_ns // 2
     pv = [files[output.pv].read() for output in tags.outputs]
     op = [files[valve.op_read].read() for valve in tags.valves]
     names = [one.name for one in tags.outputs] + [one.name for one in tags.valves]
@@ -253,12 +253,12 @@ def record_of(tags: LoopTags, files: dict[str, HistoryFile], span: Span) -> Reco
         if not len(told.stamps):
             raise InputError(f"no history of {name}", where=f"loop {tags.loop}")
     first = max(int(one.stamps[0]) for one in pv)
-    first += max(-(-(span.begin - first) // tags.step), 0) * tags.step
+    first += max(-(-(span.begin - first) // tags.sample_ns), 0) * tags.sample_ns
     end = min(span.end, max(int(one.stamps[-1]) for one in (*pv, *op)))
-    count = (end - first) // tags.step + 1
+    count = (end - first) // tags.sample_ns + 1
     if not 2 <= count <= LONGEST:
         raise InputError(f"{max(count, 0)} samples are no record", where=f"loop {tags.loop}")
-    grid = first + tags.step * np.arange(count, dtype=np.int64)
+    grid = first + tags.sample_ns * np.arange(count, dtype=np.int64)
     columns = {
         "op": np.column_stack([one.at(grid + half) for one in op]),
         "pv": np.column_stack([one.at(grid + jitter) for one in pv]),
@@ -287,7 +287,7 @@ def modes_of(tags: LoopTags, files: dict[str, HistoryFile], record: Record) -> l
     That of a loop with several valves is the first that is not automatic. None when the map
     names none.
     """
-    grid = np.rint((record.start + record.time) * 1e9).astype(np.int64) + tags.step // JITTER
+    grid = np.rint((record.start + record.time) * 1e9).astype(np.int64) + tags.sample_ns // JITTER
     found: list[list[str]] = []
     for valve in tags.valves:
         if valve.mode:

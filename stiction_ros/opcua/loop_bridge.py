@@ -99,7 +99,7 @@ class LoopBridge:
         self.grant = begin(now, rules.writes and tags.grant is not None)
         if rules.asks:
             self.grant = self.grant.ask()
-        self.op_port = OpPort(CommandRules(rules.commander, tags.step, exact=False))
+        self.op_port = OpPort(CommandRules(rules.commander, tags.sample_ns, exact=False))
         self.counts: Counter[str] = Counter()
         self.refused: tuple[str, ...] = ()
         valves = tags.valves

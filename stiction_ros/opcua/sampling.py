@@ -110,7 +110,7 @@ class LoopSampler:
             tag: deque(maxlen=KEPT) for tag in tags.read_tags()
         }
         self._pv = {output.pv for output in tags.outputs}
-        self._jitter = tags.step // JITTER
+        self._jitter = tags.sample_ns // JITTER
         self._next: int | None = None
         self._closed: int | None = None  # stamp of the last sample
         self._heard_at: float | None = None
@@ -149,13 +149,13 @@ class LoopSampler:
         found: list[PlantSample] = []
         while self._next is not None and present is not None:
             ready = alive and self._fresh(self._next - self._jitter)
-            if not ready and present < self._next + self.tags.step // SETTLE:
+            if not ready and present < self._next + self.tags.sample_ns // SETTLE:
                 break
-            if ready and present > self._next + LOST * self.tags.step:
+            if ready and present > self._next + LOST * self.tags.sample_ns:
                 self._skip(present)
                 continue
             found.append(self._close(self._next, alive))
-            self._closed, self._next = self._next, self._next + self.tags.step
+            self._closed, self._next = self._next, self._next + self.tags.sample_ns
         return found
 
     def latest(self, tag: str) -> TagReading:
@@ -175,7 +175,7 @@ class LoopSampler:
     def _is_stray(self, tag: str, reading: TagReading, last: TagReading, now: float) -> bool:
         present = self._clock.now(now)
         past = reading.stamp < last.stamp
-        ahead = present is not None and reading.stamp > present + FAR * self.tags.step
+        ahead = present is not None and reading.stamp > present + FAR * self.tags.sample_ns
         if not past and not ahead:
             del self._strays[tag]
             return False
@@ -219,7 +219,7 @@ class LoopSampler:
     def _follow(self, stamp: int) -> None:
         """Let the grid follow the scans of the plant; one stamp a sample tells of them."""
         assert self._next is not None
-        step = self.tags.step
+        step = self.tags.sample_ns
         if stamp < self._followed + SCAN * step:
             return
         self._followed = stamp
@@ -238,9 +238,9 @@ class LoopSampler:
     def _skip(self, present: int) -> None:
         """Leave out samples that were lost, as a held value would tell of none of them."""
         assert self._next is not None
-        lost = (present - self._next) // self.tags.step
+        lost = (present - self._next) // self.tags.sample_ns
         self.counts["skipped"] += lost
-        self._next += lost * self.tags.step
+        self._next += lost * self.tags.sample_ns
 
     # ---- samples ---------------------------------------------------------------------------
 
@@ -250,7 +250,7 @@ class LoopSampler:
 
     def _close(self, stamp: int, alive: bool) -> PlantSample:
         tags, cut = self.tags, stamp + self._jitter
-        before = stamp - tags.step + tags.step // 2
+        before = stamp - tags.sample_ns + tags.sample_ns // 2
         op = [self._value(self._at(valve.op_read, before), alive) for valve in tags.valves]
         pv = [self._at(output.pv, cut) for output in tags.outputs]
         sp = [self._at(output.sp, cut) if output.sp else NOTHING for output in tags.outputs]

@@ -130,7 +130,7 @@ class LoopTags:
             yield from ((valve.op, Use.OP) for valve in self.valves)
 
     @property
-    def step(self) -> int:
+    def sample_ns(self) -> int:
         """From one sample to the next, ns."""
         return round(self.sample_time * 1e9)
 

@@ -31,7 +31,7 @@ def test_the_start_lies_within_the_limits() -> None:
 
 def test_op_that_moves_shrinks_the_interval() -> None:
     belief = started()
-    belief.step(55.0)
+    belief.apply_op(55.0)
     low, high = belief.interval
     assert high == 58.0
     assert 42.0 < low < 50.0
@@ -40,7 +40,7 @@ def test_op_that_moves_shrinks_the_interval() -> None:
 
 def test_a_slip_that_no_position_escapes_makes_it_sure() -> None:
     belief = started()
-    belief.step(58.0 + 8.0 + 0.1)
+    belief.apply_op(58.0 + 8.0 + 0.1)
     assert belief.sure
     assert belief.interval == pytest.approx((65.1, 65.1))
 
@@ -57,7 +57,7 @@ def test_the_true_stem_is_in_the_interval_and_known_when_it_is_sure(
     memory = law.step(law.rest(true), 50.0, 0.0)[0]
     for op in ops:
         memory, true = law.step(memory, op, 0.0)
-        belief.step(op)
+        belief.apply_op(op)
         low, high = belief.interval
         assert low - 1e-9 <= true <= high + 1e-9
         if belief.sure:
@@ -66,9 +66,9 @@ def test_the_true_stem_is_in_the_interval_and_known_when_it_is_sure(
 
 def test_raising_static_friction_drops_the_intervals_that_it_contradicts() -> None:
     belief = started()
-    belief.step(70.0)
+    belief.apply_op(70.0)
     belief.raise_static(11.0, 44.0)
     assert (belief.form.static_friction, belief.form.dynamic_friction) == (11.0, 1.0)
     assert belief.spread is None
     assert (belief.stem, belief.sure) == (44.0, True)
-    assert belief.step(54.0) == 44.0
+    assert belief.apply_op(54.0) == 44.0

@@ -108,7 +108,7 @@ def _look(run: FreeRun, valve: int) -> StemLook:
 
 def _nearest(candidate: ValveCandidate, run: FreeRun, stem: FloatArray) -> tuple[FloatArray, float]:
     """Return the figures whose stem is nearest, shape (axes,), and its squared distance."""
-    steps = np.array([axis.step for axis in candidate.axes])
+    steps = np.array([axis.spacing for axis in candidate.axes])
     around = np.array(list(itertools.product(SIDES, repeat=len(steps))))
     tried, size = candidate.grid(), 1.0
     for _ in range(STEM_SEARCH_ROUNDS):

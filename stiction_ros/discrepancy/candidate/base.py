@@ -160,7 +160,7 @@ class Candidate(ABC):
             loss: shape (G,), the least is best.
             most: how many at most.
         """
-        steps = np.array([max(axis.step, _TINY) for axis in self.axes])
+        steps = np.array([max(axis.spacing, _TINY) for axis in self.axes])
         chosen: list[int] = []
         for place in np.argsort(loss, kind="stable")[:_RANKED].tolist():
             away = [np.abs((coordinates[place] - coordinates[k]) / steps) for k in chosen]

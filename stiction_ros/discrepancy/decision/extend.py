@@ -200,7 +200,7 @@ def tangents(bare: LoopModel, runs: Runs, added: Sequence[AddedEffect]) -> list[
             continue
         run = run_with(bare, runs, [*added[:k], *added[k + 1 :]])
         own = candidate.coordinates(point)
-        steps = TANGENT * np.diag([axis.step for axis in candidate.axes])
+        steps = TANGENT * np.diag([axis.spacing for axis in candidate.axes])
         points = candidate.values(np.vstack([own + steps, own - steps]))
         response = candidate.respond(run, points)
         for i in response.outputs:

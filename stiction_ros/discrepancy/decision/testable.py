@@ -84,7 +84,7 @@ def _nearest_possible(candidate: Candidate, point: FloatArray) -> FloatArray:
     """Return the possible point of the first grid that is nearest, in its steps, (1, axes)."""
     grid = candidate.grid()
     grid = grid[candidate.possible(candidate.values(grid))]
-    steps = np.array([max(axis.step, 1e-300) for axis in candidate.axes])
+    steps = np.array([max(axis.spacing, 1e-300) for axis in candidate.axes])
     away = (grid - candidate.coordinates(point[0])) / steps
     return candidate.values(grid[[int(np.argmin((away**2).sum(axis=1)))]])
 

@@ -44,13 +44,13 @@ class Region:
         rejected points differ by is no parabola but a walk that drifts, and its bound another.
         """
         axes = fit.candidate.axes
-        free = [d for d, a in enumerate(axes) if a.step > 0.0 and not a.linear]
+        free = [d for d, a in enumerate(axes) if a.spacing > 0.0 and not a.linear]
         if not free:
             return cls(fit.point[None, :], np.zeros(1))
         bound = STEPPED if fit.candidate.stepped else SMOOTH
         centre = fit.candidate.coordinates(fit.point)
         least = np.array([1.0 if axes[d].whole else 0.0 for d in free])
-        width = np.maximum([FIRST_BOX * axes[d].step for d in free], least)
+        width = np.maximum([FIRST_BOX * axes[d].spacing for d in free], least)
         halton, random = halton_sequence(len(free), seed=0), np.random.default_rng(0)
         points, scores = np.zeros((0, len(axes))), np.zeros(0)
         kept = points

@@ -123,7 +123,7 @@ def _dated(search: _Search) -> CandidateFit:
     every = tuple(Blocks(b.scored, np.zeros_like(b.held)) for b in base.blocks)
     whole = _Search(dataclasses.replace(base, blocks=every), search.gap, search.candidate)
     axis = search.candidate.axes[0]
-    centre, reach = axis.inner(float(found.point[0])), REACH * axis.step
+    centre, reach = axis.inner(float(found.point[0])), REACH * axis.spacing
     coordinates = np.tile(search.candidate.coordinates(found.point), (MOMENTS, 1))
     coordinates[:, 0] = np.linspace(centre - reach, centre + reach, MOMENTS)
     values = search.candidate.values(coordinates)
@@ -216,7 +216,7 @@ class _Search:
     ) -> tuple[FloatArray, CandidateFit]:
         """Return the best of a grid around a point and that point, with its coordinates."""
         axes = self.candidate.axes
-        steps = np.array([axis.step for axis in axes])
+        steps = np.array([axis.spacing for axis in axes])
         whole = np.array([axis.whole for axis in axes])
         offsets = np.array(list(itertools.product(*[(0.0,) if a.linear else SIDE for a in axes])))
         span = np.where(whole, np.maximum(np.rint(size * steps), 1.0), size * steps)

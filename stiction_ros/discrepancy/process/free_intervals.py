@@ -50,7 +50,7 @@ def _region(
     """Return points that the likelihood does not reject, shape (K, axes), values."""
     axes = candidate.axes
     centre = candidate.coordinates(fit.point)
-    steps = np.array([axis.step if axis.points > 1 else 0.0 for axis in axes])
+    steps = np.array([axis.spacing if axis.points > 1 else 0.0 for axis in axes])
     free = np.flatnonzero(steps)
     sides = np.meshgrid(*[np.linspace(-1.0, 1.0, BOX)] * len(free), indexing="ij")
     mesh = np.zeros((sides[0].size, len(axes)))

@@ -173,7 +173,7 @@ class FreeSearch:
 
     def _refined(self, best: Behind) -> Behind:
         """Search smaller and smaller grids around a point under the noise of its own fit."""
-        steps = np.array([axis.step for axis in self.candidate.axes])
+        steps = np.array([axis.spacing for axis in self.candidate.axes])
         whole = np.array([axis.whole for axis in self.candidate.axes])
         offsets = np.array(list(itertools.product(SIDE, repeat=len(steps))))
         size = 0.7

@@ -51,7 +51,7 @@ class LoopTopics:
         """
         self._last, stamp = sample, sample.stamp
         if np.isfinite(sample.op_before).all():
-            before = stamp - self.tags.step
+            before = stamp - self.tags.sample_ns
             applied = joint_state(before, self._valves, sample.op_before)
             applied.header.frame_id = by
             self._applied.publish(applied)

@@ -216,7 +216,7 @@ class Playback:
         self._anchor()
         self.paused = False
 
-    def step(self) -> list[RawMessage]:
+    def next_messages(self) -> list[RawMessage]:
         """Return every message of the next log time.
 
         Only a paused playback steps; a running one returns nothing.

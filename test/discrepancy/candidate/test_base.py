@@ -36,7 +36,7 @@ def test_points_apart_are_no_neighbours_and_the_best_is_first(seed: int, most: i
     grid = CANDIDATE.grid()
     loss = np.random.default_rng(seed).random(len(grid))
     chosen = CANDIDATE.apart(grid, loss, most)
-    steps = np.array([axis.step for axis in AXES])
+    steps = np.array([axis.spacing for axis in AXES])
     places = np.rint((grid[chosen] - grid[0]) / steps)
     away = np.abs(places[:, None] - places[None, :]).max(axis=2)
     np.fill_diagonal(away, np.inf)

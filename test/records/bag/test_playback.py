@@ -113,7 +113,7 @@ def test_a_new_rate_holds_from_now_on(bag: Bag) -> None:
 
 def test_a_step_is_every_message_of_the_next_time(bag: Bag) -> None:
     playback = player(ramp(bag, 3), HandClock())
-    steps = [seconds(playback.step()) for _ in range(4)]
+    steps = [seconds(playback.next_messages()) for _ in range(4)]
     assert steps == [[0, 0], [1, 1], [2, 2], []]
     assert playback.finished
 
@@ -121,14 +121,14 @@ def test_a_step_is_every_message_of_the_next_time(bag: Bag) -> None:
 def test_a_running_playback_does_not_step(bag: Bag) -> None:
     playback = player(ramp(bag), HandClock())
     playback.resume()
-    assert playback.step() == []
+    assert playback.next_messages() == []
 
 
 def test_after_a_step_time_goes_on_from_there(bag: Bag) -> None:
     clock = HandClock()
     playback = player(ramp(bag), clock)
-    playback.step()
-    playback.step()
+    playback.next_messages()
+    playback.next_messages()
     playback.resume()
     clock.wait(1.0)
     assert seconds(playback.due(100)) == [2, 2]
@@ -223,7 +223,7 @@ def test_every_message_comes_once_in_order_and_never_early(
             elif isinstance(move, tuple):
                 playback.rate = move[1]
             elif move == "step":
-                found += [message.data for message in playback.step()]
+                found += [message.data for message in playback.next_messages()]
             else:
                 getattr(playback, str(move))()
             for message in playback.due(most):
