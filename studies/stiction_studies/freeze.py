@@ -27,7 +27,7 @@ from stiction_ros.errors import InputError
 
 Answer = dict[str, Any]
 
-FOLDER = Path("test/frozen")
+FOLDER = Path(__file__).parents[2] / "test" / "frozen"
 DIGITS = 6
 FIELD_SEEDS = range(50_000, 50_060)
 BLIND_SEEDS = {"single": range(50_000, 50_014), "two": range(50_000, 50_006)}
@@ -169,10 +169,10 @@ def live_answer(name: str) -> Answer:
 
 
 def _bag(name: str) -> Path:
-    folder = Path("bags") / name
+    folder = Path(__file__).parents[2] / "bags" / name
     if not folder.is_dir():
         raise InputError(
-            "is not there", where=str(folder), fix="run it at the top of the repository"
+            "is not there", where=str(folder), fix="use the studies from a tree of the repository"
         )
     return folder
 
