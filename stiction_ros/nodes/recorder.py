@@ -13,13 +13,14 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stiction_ros.errors import InputError
 from stiction_ros.nodes.shared.endpoints import message_class, offered_qos, reader_qos
 from stiction_ros.nodes.shared.managed import READER_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import SECOND
+from stiction_ros.nodes.shared.peers import Inlet
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import RawTake, subscribe_raw
 from stiction_ros.online.health import Noticed
@@ -60,7 +61,7 @@ class RecorderNode(ManagedNode):
         self._bags.append(directory)
         if len(self._bags) > 1:
             self.log.info(f"recording into {directory}")
-        self._topics: dict[str, QoSProfile] = {}
+        self._topics: dict[str, Inlet] = {}
         self._skipped: dict[str, str] = {}
         self._unheard: dict[str, str] = {}
         self._noticed = Noticed(time.monotonic)
@@ -73,6 +74,7 @@ class RecorderNode(ManagedNode):
             self.create_timer(DISCOVERY_PERIOD, self._discover, clock=self._steady),
             self.create_timer(BAG_PERIOD, self._look_at_the_bag, clock=self._steady),
         ]
+        self._discover()  # now, or its own first status would find no reader
 
     def health(self) -> tuple[str, str, list[tuple[str, object]]]:
         counts = {} if self.writer is None else self.writer.counts
@@ -91,9 +93,13 @@ class RecorderNode(ManagedNode):
         self.close()
 
     def close(self) -> None:
-        """Finish the bag; what the storage refuses is a failure, the journals stay."""
+        """Write what has arrived and finish the bag.
+
+        What the storage refuses is a failure, the journals stay.
+        """
         if self.writer is None:
             return
+        self._take_the_rest()
         writer, self.writer = self.writer, None
         for timer in self._looking:
             self.destroy_timer(timer)
@@ -135,8 +141,7 @@ class RecorderNode(ManagedNode):
         text, type_hash = definition(kind)
         self.writer.add_topic(name, kind, text, type_hash, [offered_qos(i) for i in offered])
         qos = reader_qos(offered, READER_QOS.depth)
-        self._topics[name] = qos
-        subscribe_raw(
+        subscription = subscribe_raw(
             self,
             message_class(kind),
             name,
@@ -144,6 +149,17 @@ class RecorderNode(ManagedNode):
             qos,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+        self._topics[name] = Inlet(subscription, (), qos, informed=True)
+
+    def _take_the_rest(self) -> None:
+        """Write what waits on the subscriptions, the node's own last status among it.
+
+        Topics take turns, as under an executor, so that log time goes on with simulated time.
+        """
+        for _ in range(READER_QOS.depth):
+            taken = sum(inlet.take() for inlet in self._topics.values())
+            if not taken:
+                return
 
     def _look_at_the_bag(self) -> None:
         """Look once a second for what cannot be heard, and whether the bag is still there."""
@@ -171,11 +187,11 @@ class RecorderNode(ManagedNode):
 
     def _look_for_unheard(self) -> None:
         """Tell of publishers that came later and offer less than the subscription asks for."""
-        for name, asked in self._topics.items():
+        for name, inlet in self._topics.items():
             if name in self._unheard:
                 continue
             for info in self.get_publishers_info_by_topic(name):
-                compatibility, why = qos_check_compatible(info.qos_profile, asked)
+                compatibility, why = qos_check_compatible(info.qos_profile, inlet.qos)
                 if compatibility == QoSCompatibility.ERROR:  # equal, not the same object
                     self._unheard[name] = f"{info.node_name}: {why.strip()}"
                     self.log.warning(f"{name} of {self._unheard[name]} is not recorded")

@@ -11,6 +11,8 @@ import pytest
 
 from stiction_ros.identification import warm_up
 
+PATIENCE = 60.0  # s
+
 NEEDED = """
 from stiction_ros.identification.ahead import compile_end
 from stiction_ros.identification.closed_loop.loop_run import run_loops
@@ -27,7 +29,7 @@ print(*(len(each.signatures) for each in asked))
 LEFT = """
 from stiction_ros.identification import ahead
 
-ahead.CODE = "import time, sys; print(%d); time.sleep(60)"
+ahead.CODE = "import time, sys; print(%d); time.sleep(3600)"
 popen = ahead.subprocess.Popen
 
 def started(*arguments, **options):
@@ -52,7 +54,7 @@ def test_another_process_compiles_what_an_identification_needs() -> None:
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="needs /proc")
 def test_the_process_ends_with_the_one_that_it_helps() -> None:
-    pid, ends = int(told_by(LEFT)), time.monotonic() + 10.0
+    pid, ends = int(told_by(LEFT)), time.monotonic() + PATIENCE
     while os.path.exists(f"/proc/{pid}"):
         assert time.monotonic() < ends
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,8 +16,6 @@ from stiction_ros.nodes.shared import managed
 from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state
 from stiction_ros.online.health import Noticed
-
-SOON = 10.0  # s, on a machine that is busy; else it takes three at most
 
 
 @pytest.fixture(autouse=True)
@@ -147,9 +144,7 @@ def test_a_stray_that_came_first_does_not_name_the_tags_for_ever(graph: Graph) -
 def test_a_loop_that_stops_is_an_error_until_it_goes_on(graph: Graph) -> None:
     loop = Loop(graph)
     loop.show([1, 2])
-    begin = time.monotonic()
     loop.says(b"\x02", "no pv")
-    assert time.monotonic() - begin < SOON
     shown = [2]
 
     def over() -> bool:

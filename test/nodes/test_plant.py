@@ -19,8 +19,6 @@ from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import SECOND, joint_state, to_ns
 from stiction_ros.online.health import Noticed
 
-SOON = 10.0  # s, on a machine that is busy; else it takes three at most
-
 
 @pytest.fixture(autouse=True)
 def _quick_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,9 +190,7 @@ def test_a_run_ends_when_a_partner_has_gone_or_is_another(graph: Graph, back: bo
 
 def test_a_stopped_loop_is_an_error_and_over_when_op_comes(graph: Graph) -> None:
     hand = Commander(graph, pace="realtime", speed=20.0)
-    begin = time.monotonic()
     graph.spin_until(hand.told(b"\x02", "no op from /controller"), "the error")
-    assert time.monotonic() - begin < SOON
     hand.answer = hand.send
     graph.spin_until(lambda: hand.levels[-1][0] == b"\x00", "the end of the error")
 

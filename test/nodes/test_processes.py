@@ -20,7 +20,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from foreign_readers import differences
 
 from stiction_ros.cli.shared.node_processes import NodeProcesses, ros_environment
-from stiction_ros.nodes.shared.peers import GRACE
 from stiction_ros.online.replays.result import Match
 from stiction_ros.online.replays.run import replay
 from stiction_ros.online.session import Scenario, run_live
@@ -29,7 +28,6 @@ from stiction_ros.records.bag.run_metadata import run_metadata
 from stiction_ros.records.run.log import read_run
 
 PATIENCE = 120.0
-SOON = 10.0  # s, on a machine that is busy
 TOPICS = ("clock", "pv", "sp", "op", "stem", "stiction", "loop_model", "mode", "prediction")
 
 
@@ -88,14 +86,9 @@ def core(bag):
 
 def test_every_topic_is_recorded_whole(bag):
     log = read_run(bag)
-    own = {topic: log.published[topic] for topic in log.published if topic != "/diagnostics"}
-    assert {topic: log.recorded.get(topic) for topic in own} == own
+    assert log.published
+    assert {topic: log.recorded.get(topic) for topic in log.published} == log.published
     assert {f"/{topic}" for topic in TOPICS} <= {t for t, n in log.recorded.items() if n}
-
-
-def test_at_most_the_recorders_own_last_diagnostics_are_missing(bag):
-    log = read_run(bag)
-    assert 0 <= log.published["/diagnostics"] - log.recorded["/diagnostics"] <= 1
 
 
 @pytest.mark.parametrize("signal_name", ["op", "pv", "sp", "stem"])
@@ -199,10 +192,7 @@ def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
     wait_until(lambda: not running(str(out)))
 
 
-LEASE = 5.0 + GRACE  # s without a sign of life, of fastdds.xml, and what a partner is given
-
-
-def test_a_partner_that_was_killed_ends_a_run_in_lockstep_soon_with_a_sentence(tmp_path):
+def test_a_partner_that_was_killed_ends_a_run_in_lockstep_with_a_sentence(tmp_path):
     nodes = {name: dict(v) for name, v in Scenario.load(scenario(tmp_path)).nodes.items()}
     nodes["recorder"]["directory"] = str(tmp_path / "bag")
     nodes["plant"]["samples"] = 20_000
@@ -212,9 +202,7 @@ def test_a_partner_that_was_killed_ends_a_run_in_lockstep_soon_with_a_sentence(t
         wait_until(lambda: processes.sample > 0)
         controller = processes._processes["controller"]
         controller.kill()
-        begin = time.monotonic()
         wait_until(lambda: processes._processes["plant"].poll() is not None)
-        assert time.monotonic() - begin < LEASE + SOON
         wait_until(lambda: processes._processes["estimator"].poll() is not None)
     finally:
         processes.stop()

@@ -15,6 +15,7 @@ from graph import Graph
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
+from stiction_ros.nodes import recorder
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.records.bag.messages import read_messages, read_raw
 from stiction_ros.records.bag.run_metadata import run_metadata
@@ -54,6 +55,16 @@ class Desk:
         self.graph.spin_until(
             lambda: self.recorder.writer.counts.get(topic) == number, f"{number} on {topic}"
         )
+
+    def own_counts(self) -> list[int]:
+        """Return what each status of the recorder in the bag says of how many there were."""
+        key = "published:/diagnostics"
+        return [
+            int(value.value)
+            for message in read_messages(self.bag, wanted=lambda t: t.name == "/diagnostics")
+            for value in message.message.status[0].values
+            if value.key == key
+        ]
 
     def close(self) -> dict[str, list[str]]:
         """Finish the bag; return the texts in it by topic."""
@@ -160,6 +171,33 @@ def test_what_nodes_say_of_the_run_is_kept_beside_the_messages(
     assert run_metadata(desk.bag)["loop_model:/loop_model"] == "loop: tank"  # before any close
     desk.close()
     assert run_metadata(desk.bag)["seed"] == "9"
+
+
+def test_its_own_first_and_last_status_are_in_the_bag(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, "DISCOVERY_PERIOD", 3600.0)  # it begins before it looks again
+    desk = Desk(graph, tmp_path)
+    graph.spin_until(lambda: desk.recorder.running, "the recorder to begin")
+    desk.close()
+    assert desk.own_counts() == [1, 2]
+    assert desk.recorder.outlets["/diagnostics"].count == 2
+
+
+@pytest.mark.parametrize("end", ["finish", "trigger_cleanup"])
+def test_what_has_arrived_at_the_end_is_in_the_bag(end: str, graph: Graph, tmp_path: Path) -> None:
+    desk = Desk(graph, tmp_path, regex="/(text|word)")
+    publishers = [desk.publisher(topic) for topic in ("/text", "/word")]
+    desk.heard("/text", "/word")
+    for number in range(20):
+        for publisher in publishers:
+            publisher.publish(String(data=str(number)))
+    assert all(publisher.wait_for_all_acked() for publisher in publishers)
+    if end == "trigger_cleanup":
+        desk.recorder.trigger_deactivate()
+    getattr(desk.recorder, end)()
+    told = [str(number) for number in range(20)]
+    assert desk.close() == {"/text": told, "/word": told}
 
 
 def test_a_storage_that_refuses_is_told_and_recording_goes_on(

@@ -66,25 +66,43 @@ class Inlet:
     """A subscription, and the nodes whose first message must not be missed."""
 
     def __init__(
-        self, subscription: Subscription, writers: tuple[str, ...], qos: QoSProfile
+        self,
+        subscription: Subscription,
+        writers: tuple[str, ...],
+        qos: QoSProfile,
+        *,
+        informed: bool = False,
     ) -> None:
+        """Note a subscription.
+
+        Args:
+            subscription: that is read.
+            writers: names of the nodes.
+            qos: asked for.
+            informed: whether the callback is also told what the middleware knows of a message.
+        """
         self.subscription = subscription
         self.writers = writers
         self.qos = qos
+        self._told = 2 if informed else 1
 
     def drain(self) -> int:
         """Take all that is queued now, hand each message to the callback, and count them."""
         taken = 0
-        while taken < self.qos.depth:
-            with self.subscription.handle:
-                found = self.subscription.handle.take_message(
-                    self.subscription.msg_type, self.subscription.raw
-                )
-            if found is None:
-                break
+        while taken < self.qos.depth and self.take():
             taken += 1
-            self.subscription.callback(found[0])
         return taken
+
+    def take(self) -> bool:
+        """Hand the oldest message that is queued to the callback; tell whether there was one."""
+        with self.subscription.handle:
+            found = self.subscription.handle.take_message(
+                self.subscription.msg_type, self.subscription.raw
+            )
+        if found is None:
+            return False
+        self.subscription.callback(*found[: self._told])
+        return True
 
 
 class Peers:

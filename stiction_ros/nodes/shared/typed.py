@@ -9,6 +9,7 @@ from rclpy.guard_condition import GuardCondition
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from rclpy.utilities import try_shutdown
 
@@ -62,7 +63,7 @@ def quality(
 
 def subscribe_raw(
     node: Node, kind: Any, topic: str, take: RawTake, qos: QoSProfile, **options: Any
-) -> None:
+) -> Subscription:
     """Subscribe to messages as bytes, with what the middleware tells of each.
 
     Args:
@@ -74,7 +75,8 @@ def subscribe_raw(
         options: go to the subscription.
     """
     untyped: Any = node
-    untyped.create_subscription(kind, topic, take, qos, raw=True, **options)
+    made: Subscription = untyped.create_subscription(kind, topic, take, qos, raw=True, **options)
+    return made
 
 
 def parameter_value(name: str, kind: Parameter.Type, value: object) -> Any:

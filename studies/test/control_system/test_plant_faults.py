@@ -1,8 +1,9 @@
 """Faults between bridge and plant: a real server in a process, real sessions, no mocks.
 
 After each of them: no OP was taken without a grant, none beyond limits or rate, OP stepped by
-less than 1 % at each transfer of control, and the plant's own controllers have the valves within
-the time of the watchdog.
+less than 1 % at each transfer of control, and the plant's own controllers have the valves. That
+they have them within the time of the watchdog is shown in test_control_system.py, by a clock of
+the test.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bridge_runner import BridgeProcess, BridgeRunner
-from plant_process import PlantProcess, wait_until
+from plant_process import BUDGET, PlantProcess, wait_until
 
 from stiction_ros.cli.main import main
 from stiction_ros.opcua import session
@@ -27,14 +28,13 @@ from stiction_ros.opcua.grant import GrantState
 from stiction_ros.opcua.loop_bridge import OrderKind, WriteOrder
 from stiction_ros.opcua.plant_link import LinkSettings, PlantLink, Written
 from stiction_ros.opcua.security import Credentials, fingerprint, load_certificate
-from stiction_ros.opcua.session import ANSWER, open_client
+from stiction_ros.opcua.session import open_client
 from stiction_studies.faults.bridge.relay import Relay
 
 pytestmark = pytest.mark.alone
 
 WATCHDOG = 1.5  # s
 RATE = 0.1 * 60.0  # % a sample, as the tag map says
-MARGIN = 1.0  # s of a busy machine, beside the watchdog's time
 SMOOTH = 1.0  # %
 TAKEN = 4  # OPs before a fault: enough to move OP by more than 1 %
 STILL = {"set_points": None}  # a move of a set-point moves OP as well
@@ -83,11 +83,9 @@ class Trial:
         modes = [one for one in self.events() if one["event"] == "mode"]
         return modes[-1] if modes and modes[-1]["mode"] == "AUTO" else None
 
-    def taken_over(self, since: float) -> dict[str, Any]:
-        """Wait until the plant has taken over; it was in time."""
-        last = wait_until(self.automatic, "the plant to take over")
-        assert last["wall"] - since < WATCHDOG + MARGIN
-        return dict(last)
+    def taken_over(self) -> dict[str, Any]:
+        """Wait until the plant has taken over, and return how."""
+        return dict(wait_until(self.automatic, "the plant to take over"))
 
     def close(self) -> None:
         for runner in self.runners:
@@ -100,10 +98,9 @@ class Trial:
 
     disturbed: tuple[str, ...] = ()
 
-    def disturb(self, name: str, value: float) -> float:
+    def disturb(self, name: str, value: float) -> None:
         self.disturbed += (name,)
         self.plant.disturb(name, value)
-        return time.monotonic()
 
     def judge(self, refused: int = 0) -> None:
         """Hold what the plant has noted against the rules."""
@@ -156,8 +153,8 @@ def test_mode_taken_back_in_mid_move(trial: Trial) -> None:
 
 def test_bad_quality(trial: Trial) -> None:
     runner = trial.granted()
-    since = trial.disturb("QUALITY", 1.0)
-    assert trial.taken_over(since)["alarm"] == "request taken back"
+    trial.disturb("QUALITY", 1.0)
+    assert trial.taken_over()["alarm"] == "request taken back"
     assert runner.bridge.grant.reason == "PV of bad quality"
     assert np.isnan(runner.samples[-1].pv).all()
     trial.judge()
@@ -165,7 +162,8 @@ def test_bad_quality(trial: Trial) -> None:
 
 def test_stamps_in_the_past(trial: Trial) -> None:
     runner = trial.granted()
-    trial.taken_over(trial.disturb("PAST", 86_400.0))
+    trial.disturb("PAST", 86_400.0)
+    trial.taken_over()
     assert runner.bridge.grant.reason == "PV of bad quality"
     assert np.isnan(runner.samples[-1].pv).all()
     wait_until(lambda: runner.bridge.sampler.counts["new_runs"], "their being believed")
@@ -174,8 +172,8 @@ def test_stamps_in_the_past(trial: Trial) -> None:
 
 def test_the_plants_heartbeat_stands_still(trial: Trial) -> None:
     runner = trial.granted()
-    since = trial.disturb("ALIVE", 1.0)
-    trial.taken_over(since)
+    trial.disturb("ALIVE", 1.0)
+    trial.taken_over()
     assert runner.bridge.grant.reason == "the plant's heartbeat stands still"
     trial.judge()
 
@@ -183,7 +181,7 @@ def test_the_plants_heartbeat_stands_still(trial: Trial) -> None:
 def test_the_controller_is_gone(trial: Trial) -> None:
     runner = trial.granted()
     runner.commands = False
-    trial.taken_over(time.monotonic())
+    trial.taken_over()
     assert runner.bridge.grant.reason.startswith("no op from")
     trial.judge()
 
@@ -201,9 +199,8 @@ def test_a_thousand_changes_a_second(trial: Trial) -> None:
 
 def test_a_server_that_is_slow_by_two_seconds(trial: Trial) -> None:
     runner = trial.granted()
-    since = trial.disturb("DELAY", 2.0)
-    last = wait_until(trial.automatic, "the plant to take over")
-    assert last["wall"] - since < WATCHDOG + 2.0 + MARGIN  # the write of the fault is slow as well
+    trial.disturb("DELAY", 2.0)
+    trial.taken_over()
     wait_until(lambda: runner.state is GrantState.IDLE, "the end of the grant")
     trial.judge(refused=1)
 
@@ -213,7 +210,7 @@ def test_the_connection_is_cut_and_comes_back(trial: Trial) -> None:
     try:
         runner = trial.granted(f"opc.tcp://127.0.0.1:{relay.port}/plant")
         relay.cut()
-        assert trial.taken_over(time.monotonic())["alarm"].startswith("watchdog")
+        assert trial.taken_over()["alarm"].startswith("watchdog")
         wait_until(lambda: runner.state is GrantState.IDLE, "the end of the grant")
         wait_until(lambda: np.isnan(runner.samples[-1].pv).all(), "samples without values")
         count = len(trial.ops())
@@ -245,9 +242,8 @@ def test_the_bridge_is_killed(trial: Trial) -> None:
 
         wait_until(granted, "the grant", pause=0.1)
         wait_until(lambda: len(trial.ops()) > TAKEN, "OPs that are taken")
-        since = time.monotonic()
         process.stop(signal.SIGKILL)
-        assert trial.taken_over(since)["alarm"].startswith("watchdog")
+        assert trial.taken_over()["alarm"].startswith("watchdog")
     finally:
         process.stop(signal.SIGKILL)
     trial.judge()
@@ -316,17 +312,17 @@ def test_what_cannot_be_trusted_gets_no_session(
     assert not any(word in link.reason for link in runner.links for word in words)
 
 
-def test_a_connection_that_is_closed_at_once_is_not_waited_for(plant: PlantProcess) -> None:
+def test_a_connection_that_is_closed_at_once_is_not_waited_for(
+    plant: PlantProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "ANSWER", 3600.0)  # whoever waits for it waits in vain
     relay = Relay(plant.port)
     try:
         relay.cut()
         for _ in range(3):
-            begin = time.monotonic()
+            opening = open_client(f"opc.tcp://127.0.0.1:{relay.port}/plant", plant.credentials())
             with pytest.raises(OSError, match=r"closes|reset|refused"):
-                asyncio.run(
-                    open_client(f"opc.tcp://127.0.0.1:{relay.port}/plant", plant.credentials())
-                )
-            assert time.monotonic() - begin < ANSWER  # else it was waited for
+                asyncio.run(asyncio.wait_for(opening, BUDGET))
     finally:
         relay.close()
 

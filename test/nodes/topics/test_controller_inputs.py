@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from graph import Graph
+from graph import BUDGET, Graph
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
@@ -86,7 +86,7 @@ class Bench:
     def queued(self, count: int) -> None:
         """Wait until ``count`` PV lie in the node's queue, without serving it."""
         self.graph.spin_some(0)
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + BUDGET
         while time.monotonic() < end:
             self.node.drain_signals()
             if len(self.node.port._queue) >= count:
@@ -328,7 +328,7 @@ def test_a_hostile_loop_model_is_refused_beside_the_loop(
     bench.model.publish(String(data=HOSTILE[case]))
     bench.graph.spin_until(lambda: given, "the model")
     bench.sample(2)
-    assert isinstance(given[0].exception(timeout=10.0), InputError)
+    assert isinstance(given[0].exception(timeout=BUDGET), InputError)
     bench.graph.spin_until(lambda: not bench.node.reading, "the refusal")
     assert bench.node.live._offered is None
     bench.sample(3)

@@ -22,7 +22,7 @@ from stiction_ros.records.storage.mcap_format import MAGIC
 from stiction_ros.records.storage.mcap_scan import McapScan
 
 SAMPLES = 300
-PATIENCE = 5.0  # s for one reading
+PATIENCE = 60.0  # s for one reading, which takes some milliseconds
 KINDS = ("zstd", "lz4", "none", "mcap")
 Message = tuple[str, int, bytes]
 
