@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from stiction_ros.cli import extensions
 from stiction_ros.cli.main import COMMANDS
 
 HEAVY = {"scipy", "numba", "casadi", "daqp", "matplotlib"}
@@ -68,7 +69,8 @@ def test_help_loads_no_command() -> None:
 
 def test_what_is_wrong_is_told_without_loading_what_computes() -> None:
     """All of it in one process, as whatever one command loads is still there for the next."""
-    asked = [*([command, "--no-such-option"] for command in COMMANDS), *WRONG]
+    commands = [*COMMANDS, *extensions.commands()]
+    asked = [*([command, "--no-such-option"] for command in commands), *WRONG]
     code = (
         "import sys; from stiction_ros.cli.main import main\n"
         "for given in ASKED:\n"

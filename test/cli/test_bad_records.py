@@ -10,7 +10,7 @@ import pytest
 
 from stiction_ros.cli.main import main
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "identification"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "identification"))
 from simulated_loops import example1
 
 Rows = list[list[float | str]]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from stiction_ros.cli import extensions
 from stiction_ros.cli.main import COMMANDS, main
 
 
@@ -45,5 +46,5 @@ def test_bash_ends_what_is_typed(
 def test_every_shell_knows_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     for shell in ("bash", "zsh", "fish"):
         told = script(shell, capsys)
-        assert all(name in told for name in COMMANDS)
+        assert all(name in told for name in (*COMMANDS, *extensions.commands()))
         assert "--op-unit" in told or "-l op-unit" in told

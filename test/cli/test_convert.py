@@ -13,7 +13,7 @@ from stiction_ros.cli.main import main
 from stiction_ros.cli.report import holds_live_run
 from stiction_ros.intake.record_file import open_record
 
-BAGS = Path(__file__).parents[3] / "bags"
+BAGS = Path(__file__).parents[2] / "bags"
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "discrepancy"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "discrepancy"))
 
 from gap_loops import loop, record, with_cause
 

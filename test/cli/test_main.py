@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stiction_ros.cli import extensions
 from stiction_ros.cli.main import COMMANDS, main, parser
 from stiction_ros.config_files import find_config
 from stiction_ros.effects import HeStiction
+
+ALL = (*COMMANDS, *extensions.commands())
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +33,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", ALL)
 def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         parser().parse_args([name, "--help"])
@@ -41,7 +44,7 @@ def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[
 def test_without_a_command_all_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 2
     err = capsys.readouterr().err
-    assert all(name in err for name in COMMANDS)
+    assert all(name in err for name in ALL)
 
 
 @pytest.mark.parametrize(

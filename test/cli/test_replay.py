@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "records"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "records"))
 from bag_cutting import cut_bag
 
 from stiction_ros.cli.main import main
 from stiction_ros.intake.record_file import open_record
 from stiction_ros.records.run.log import read_run
 
-BAGS = Path(__file__).parents[3] / "bags"
+BAGS = Path(__file__).parents[2] / "bags"
 
 
 @pytest.fixture(scope="module")

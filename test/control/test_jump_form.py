@@ -118,7 +118,7 @@ def test_a_margin_is_never_zero() -> None:
     assert form.margin(FrictionSpread(0.0, 0.0), 0.3, 0.0) > 0.0
 
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def test_the_pages_agree_on_the_laws_that_controllers_plan_for() -> None:

@@ -29,6 +29,7 @@ from stiction_ros.nodes.opcua import OpcuaNode
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state, to_ns
 from stiction_ros.opcua.grant import GrantState
+from stiction_studies.faults.bridge.relay import Relay
 
 OPS = (55.0, 45.0)
 

@@ -7,6 +7,7 @@ import configparser
 import importlib.metadata
 import re
 import sys
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -109,6 +110,10 @@ def test_every_requirement_is_pinned_and_explained() -> None:
     extras = config()["options.extras_require"]
     wanted = requirements(config()["options"]["install_requires"])
     wanted |= requirements("\n".join(extras[name] for name in extras))
+    studies = tomllib.loads((ROOT / "studies" / "pyproject.toml").read_text())["project"]
+    assert studies["dependencies"] == ["stiction_ros"]
+    for names in studies["optional-dependencies"].values():
+        wanted |= requirements("\n".join(names))
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     assert all("==" in line for line in lines if line and not line.startswith("#"))
     assert wanted <= requirements("\n".join(line for line in lines if "==" in line))

@@ -6,11 +6,13 @@ import argparse
 import functools
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stiction_ros.cli.shared.seeds import add_jobs, run_each
 from stiction_ros.errors import InputError
-from stiction_studies.field import field_loop
-from stiction_studies.field.exports.plant import PlantLoop, export_plant, loop_seed, plant_loop
+
+if TYPE_CHECKING:
+    from stiction_studies.field.exports.plant import PlantLoop
 
 DESCRIPTION = (
     "plant: simulate many loops of a plant and write the exports of its historian, in five forms "
@@ -26,11 +28,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def made(seed: int, number: int) -> PlantLoop:
     """Return one loop of a plant; a worker process can run it."""
+    from stiction_studies.field import field_loop
+    from stiction_studies.field.exports.plant import loop_seed, plant_loop
+
     return plant_loop(field_loop(loop_seed(seed, number)), seed, number)
 
 
 def run_plant(options: argparse.Namespace) -> int:
     """Make a plant and write it."""
+    from stiction_studies.field.exports.plant import export_plant
+
     if options.loops < 1:
         raise InputError(f"{options.loops} is too few", where="--loops", fix="use 1 or more")
     if options.seed < 0:

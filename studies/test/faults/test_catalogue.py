@@ -16,7 +16,7 @@ from stiction_studies.faults.fault import Fault
 from stiction_studies.faults.loop.setting_up import NAMES, case_parameters
 from stiction_studies.faults.terms import LEVELS, Pace
 
-PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
+PAGE = Path(__file__).parents[3] / "docs" / "faults.md"
 every_fault = pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
 
 
