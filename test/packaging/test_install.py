@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from stiction_ros.cli.extensions import OF_STUDIES
 from stiction_ros.nodes.__main__ import NODES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,11 +57,15 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pip_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install into a new environment that sees the packages of this one after its own."""
+    """Install into a new environment that sees what this one has, but for package and studies."""
     prefix = tmp_path_factory.mktemp("pip") / "environment"
+    shared = tmp_path_factory.mktemp("shared")
+    for entry in Path(sysconfig.get_path("purelib")).iterdir():
+        if not entry.name.startswith(("stiction", "__editable__")):
+            (shared / entry.name).symlink_to(entry)
     run(sys.executable, "-m", "venv", "--without-pip", prefix)
     site = prefix / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
-    (site / "shared.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    (site / "shared.pth").write_text(f"{shared}\n")
     options = ["--no-deps", "--no-index", "--no-build-isolation"]
     python = prefix / "bin" / "python"
     run(sys.executable, "-m", "pip", "--python", python, "install", *options, tree)
@@ -107,6 +112,20 @@ def test_every_node_is_an_executable(prefix: Path) -> None:
     assert found == set(NODES)
     for name in found:
         assert os.access(prefix / "lib" / "stiction_ros" / name, os.X_OK)
+
+
+def test_the_core_alone_lists_only_what_works(pip_prefix: Path, tmp_path: Path) -> None:
+    assert not list(pip_prefix.rglob("stiction_studies*"))
+    command = pip_prefix / "bin" / "stiction"
+    listed = {line.split()[0] for line in run(command, "--help").splitlines() if line.strip()}
+    assert {"identify", "simulate", "survey", "gap", "replay", "demo"} <= listed
+    assert not listed & {name.partition(" ")[0] for name in OF_STUDIES} - {"demo", "experiment"}
+    history = tmp_path / "history.csv"
+    run(command, "simulate", "flow.loop.yaml", "--samples", "600", "--out", history)
+    assert history.stat().st_size > 0
+    told = subprocess.run([str(command), "paper"], capture_output=True, text=True)
+    assert told.returncode == 2
+    assert "stiction-studies" in told.stderr
 
 
 def test_only_the_command_is_in_bin(prefix: Path) -> None:
