@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 76_672
+LINES = 76_676
 LINES_OF_STUDIES = 23_056
 NUMERIC_CONSTANTS = 1_015
 

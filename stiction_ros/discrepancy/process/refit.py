@@ -129,7 +129,9 @@ def problems_of(run: FreeRun, stems: FloatArray | None = None) -> list[Problem]:
     ]
 
 
-def refit_output(problem: Problem, own: Equation, longest: int, rounds: int = REFIT_ROUNDS) -> Fitted:
+def refit_output(
+    problem: Problem, own: Equation, longest: int, rounds: int = REFIT_ROUNDS
+) -> Fitted:
     """Return an output's best equation of the same orders over all delays up to ``longest``.
 
     Starts are the model's own coefficients and, per delay, those of an equation-error fit that
@@ -159,7 +161,9 @@ def _nested(problem: Problem, own: Equation, longest: int, rounds: int) -> list[
     return [dataclasses.replace(found, b=tuple(padded))]
 
 
-def refit_process(model: LoopModel, runs: Runs, longest: int, rounds: int = REFIT_ROUNDS) -> LoopModel:
+def refit_process(
+    model: LoopModel, runs: Runs, longest: int, rounds: int = REFIT_ROUNDS
+) -> LoopModel:
     """Return the model with ARX coefficients that fit the free run best, by Gauss-Newton.
 
     Effects and orders stay. The likelihood is that of the innovations on the fitted rows, as
