@@ -7,7 +7,8 @@ next.
 Floors, lowest first; each imports only what stands below it, and nothing below
 :mod:`stiction_ros.nodes` imports rclpy::
 
-    effects  processes  records  loop  identification  control  tuning  online  report  cli  nodes
+    effects  processes  records  intake  loop  identification  discrepancy, control  paper
+    control_settings  online  opcua  gain  survey  report  cli  nodes
 
 Examples:
     >>> from stiction_ros import LoopModel, find_config, identify, simulate

@@ -82,7 +82,7 @@ class StepResult:
         strategy: name of the strategy that gave ``op``, see :mod:`.strategies`.
         age: samples since ``plan`` was made; 0 for a plan of this step.
         optimality_gap: cost above the mixed-integer optimum as a share of it; None where it
-            was not asked for or not found, see :mod:`.formulations.certificate`.
+            was not asked for or not found, see :mod:`.certificate`.
 
     Examples:
         >>> import numpy as np

@@ -107,23 +107,25 @@ OPENS = {  # what can listen, by its name in a call
     "SyncManager",
 }
 KNOWN = {
-    ("opcua/plant/server.py", "set_endpoint"),  # the plant of the demonstration
-    ("opcua/plant/process.py", "bind"),  # asks for a port that is free, and lets it go
-    ("faults/bridge/relay.py", "create_server"),  # of the suite of faults
-    ("nodes/topics/controller_inputs.py", "listen"),  # to topics
-    ("nodes/controller.py", "listen"),
-    ("cli/plant/listen.py", "Listener"),
+    ("stiction_ros/nodes/topics/controller_inputs.py", "listen"),  # to topics
+    ("stiction_ros/nodes/controller.py", "listen"),
+    ("stiction_ros/cli/listen.py", "Listener"),
+    ("stiction_studies/control_system/server.py", "set_endpoint"),  # of the demonstration
+    ("stiction_studies/control_system/process.py", "bind"),  # asks for a free port, lets it go
+    ("stiction_studies/faults/bridge/relay.py", "create_server"),  # of the suite of faults
 }
 
 
 def test_nothing_else_of_the_package_can_listen() -> None:
-    root = Path(str(stiction_ros.__file__)).parent
+    root = Path(str(stiction_ros.__file__)).parents[1]
+    packages = (root / "stiction_ros", root / "studies" / "stiction_studies")
     found = set()
-    for path in root.rglob("*.py"):
+    for path in (path for package in packages for path in package.rglob("*.py")):
+        name = str(path.relative_to(root)).removeprefix("studies/")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call):
                 called = getattr(node.func, "attr", getattr(node.func, "id", ""))
                 if called in OPENS:
-                    found.add((str(path.relative_to(root)), called))
+                    found.add((name, called))
     assert found <= KNOWN
     assert {one for one in KNOWN if one[1] in ("set_endpoint", "create_server")} <= found

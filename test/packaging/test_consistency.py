@@ -9,6 +9,7 @@ import re
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import stiction_ros
@@ -18,7 +19,6 @@ ROOT = Path(__file__).resolve().parents[2]
 # Python module → distribution in setup.cfg, where the names differ.
 DISTRIBUTION = {
     "PIL": "pillow",
-    "do_mpc": "do-mpc",
     "mcap_ros2": "mcap-ros2-support",
     "yaml": "pyyaml",
 }
@@ -28,7 +28,6 @@ OPTIONAL = {
     "cryptography",
     "dask",
     "distributed",
-    "do_mpc",
     "openpyxl",
     "pyarrow",
 }
@@ -59,6 +58,11 @@ def manifest() -> ElementTree.Element:
     return ElementTree.parse(ROOT / "package.xml").getroot()
 
 
+def studies() -> dict[str, Any]:
+    text = (ROOT / "studies" / "pyproject.toml").read_text(encoding="utf-8")
+    return dict(tomllib.loads(text)["project"])
+
+
 def imports() -> set[str]:
     """Return the top-level modules that the package imports, its own and Python's left out."""
     found: set[str] = set()
@@ -74,6 +78,7 @@ def imports() -> set[str]:
 def test_version_is_the_same_everywhere() -> None:
     assert manifest().findtext("version") == stiction_ros.__version__
     assert importlib.metadata.version("stiction_ros") == stiction_ros.__version__
+    assert studies()["version"] == stiction_ros.__version__
 
 
 def test_manifest_agrees_with_setup() -> None:
@@ -83,9 +88,9 @@ def test_manifest_agrees_with_setup() -> None:
     assert root.findtext("name") == metadata["name"]
     assert root.findtext("license") == metadata["license"]
     assert root.findtext("description") == metadata["description"]
-    maintainer = root.find("maintainer")
-    assert maintainer is not None
-    assert maintainer.get("email") == metadata["maintainer_email"]
+    assert root.findtext("maintainer") == metadata["maintainer"]
+    assert root.findtext("author") == metadata["author"]
+    assert all(one.get("email") for one in root.findall("maintainer"))  # REP 149 asks for it
     assert root.findtext("export/build_type") == "ament_python"
 
 
@@ -110,10 +115,8 @@ def test_every_requirement_is_pinned_and_explained() -> None:
     extras = config()["options.extras_require"]
     wanted = requirements(config()["options"]["install_requires"])
     wanted |= requirements("\n".join(extras[name] for name in extras))
-    studies = tomllib.loads((ROOT / "studies" / "pyproject.toml").read_text())["project"]
-    assert studies["dependencies"] == ["stiction_ros"]
-    for names in studies["optional-dependencies"].values():
-        wanted |= requirements("\n".join(names))
+    of_studies = studies()["optional-dependencies"].values()
+    wanted |= requirements("\n".join(line for lines in of_studies for line in lines))
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     assert all("==" in line for line in lines if line and not line.startswith("#"))
     assert wanted <= requirements("\n".join(line for line in lines if "==" in line))

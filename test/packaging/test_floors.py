@@ -37,15 +37,15 @@ def test_every_sub_package_stands_in_a_contract() -> None:
     ("module", "line"),
     [
         ("stiction_ros.loop", "from stiction_ros.control import MpcController"),
-        ("stiction_ros.loop", "import stiction_studies.field"),
-        ("stiction_studies.field", "from stiction_ros.loop import LoopModel"),
         ("stiction_ros.online", "import rclpy"),
+        ("stiction_ros.gain", "import stiction_studies"),
+        ("stiction_studies.field", "from stiction_ros.loop import LoopModel"),
     ],
 )
 def test_an_import_that_runs_up_is_noticed(tmp_path: Path, module: str, line: str) -> None:
     small_tree(tmp_path)
     assert lint(tmp_path).returncode == 0
-    tmp_path.joinpath(*module.split("."), "wrong.py").write_text(line + "\n")
+    (tmp_path / module.replace(".", "/") / "wrong.py").write_text(line + "\n")
     done = lint(tmp_path)
     assert done.returncode == 1
     assert f"{module}.wrong" in done.stdout
@@ -70,12 +70,11 @@ def small_tree(folder: Path) -> None:
     # The imports that are left out of the contracts are not in this small tree.
     lines = [row for row in text.splitlines() if " -> stiction_ros" not in row]
     (folder / "pyproject.toml").write_text("\n".join(lines), encoding="utf-8")
-    for package, top in (("stiction_ros", ROOT), ("stiction_studies", ROOT / "studies")):
-        for path in (top / package).glob("*.py"):
-            there = folder / package / path.name
-            there.parent.mkdir(exist_ok=True)
-            there.write_text("")
-        for path in (top / package).glob("*/__init__.py"):
-            (folder / package / path.parent.name).mkdir()
-            (folder / package / path.parent.name / "__init__.py").write_text("")
+    for package in (ROOT / "stiction_ros", ROOT / "studies" / "stiction_studies"):
+        for path in (package / "__init__.py", *package.glob("*/__init__.py")):
+            copy = folder / path.relative_to(package.parent)
+            copy.parent.mkdir(parents=True)
+            copy.write_text("")
+        for path in package.glob("[!_]*.py"):
+            (folder / package.name / path.name).write_text("")
     (folder / "stiction_ros" / "control" / "__init__.py").write_text("class MpcController: ...\n")
