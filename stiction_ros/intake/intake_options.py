@@ -9,6 +9,7 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets.stamps import DateOrder
+from stiction_ros.intake.words import by_word
 
 
 class OpUnit(enum.StrEnum):
@@ -31,12 +32,7 @@ TO_PERCENT = {
 }
 """Factor and offset that make % of an OP."""
 
-_OP_UNITS = {
-    **dict.fromkeys(("%", "percent", "pct", "prozent", "% open"), OpUnit.PERCENT),
-    **dict.fromkeys(("share", "fraction", "frac", "ratio", "0-1", "0..1", "0…1"), OpUnit.SHARE),
-    **dict.fromkeys(("ma", "4-20ma", "4-20 ma", "4..20 ma"), OpUnit.CURRENT),
-    **dict.fromkeys(("other",), OpUnit.OTHER),
-}
+_OP_UNITS = {word: OpUnit(unit) for word, unit in by_word("op_units").items()}
 
 
 class TimeUnit(enum.StrEnum):
@@ -62,16 +58,7 @@ SECONDS = {
     TimeUnit.NANOSECONDS: 1e-9,
 }
 
-_TIME_UNITS = {
-    **{unit.value: unit for unit in TimeUnit},
-    **dict.fromkeys(("sec", "second", "seconds", "epoch", "unix"), TimeUnit.SECONDS),
-    **dict.fromkeys(("msec", "millisecond", "milliseconds", "millis"), TimeUnit.MILLISECONDS),
-    **dict.fromkeys(("µs", "μs", "usec", "microseconds"), TimeUnit.MICROSECONDS),
-    **dict.fromkeys(("nsec", "nanoseconds"), TimeUnit.NANOSECONDS),
-    **dict.fromkeys(("minute", "minutes"), TimeUnit.MINUTES),
-    **dict.fromkeys(("hour", "hours"), TimeUnit.HOURS),
-    **dict.fromkeys(("day", "d"), TimeUnit.DAYS),
-}
+_TIME_UNITS = {word: TimeUnit(unit) for word, unit in by_word("time_units").items()}
 
 
 @dataclasses.dataclass(frozen=True)

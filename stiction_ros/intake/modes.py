@@ -12,18 +12,10 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.repairs import Rules, plural
 from stiction_ros.intake.sheets.cells import number
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
+from stiction_ros.intake.words import pattern_of
 from stiction_ros.records.quality import Quality
 
-AUTOMATIC = re.compile(
-    r"a|auto?|automati[ck]|cas|casc|cascade|kaskade|c|r-?cas|remote|remote cascade|rsp|rsv|b-auto|"
-    r"b-?cas|backup cascade|pri|normal|nml|a-?cas|auto-cas|on|true|closed|sup|supervisory|dcs",
-    re.IGNORECASE,
-)
-MANUAL = re.compile(
-    r"m|man|manual|manuell|hand|lo|local|local override|iman|init|initiali[sz]ation|tra?c?k|"
-    r"tracking|oos|out of service|rout|roman|remote out|off|false|open|shed|fail|bad",
-    re.IGNORECASE,
-)
+AUTOMATIC, MANUAL = pattern_of("automatic"), pattern_of("manual")
 """Words of modes; in tracking and initialisation OP follows something else than the controller."""
 
 STILL = 0.02

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
+from stiction_ros.intake.words import WORDS
 from stiction_ros.records.parts import stretches
 from stiction_ros.records.quality import Quality, QualityArray
 
@@ -33,11 +34,7 @@ FAR = 5.0
 SENTINEL_FAR = 0.5
 """The same for numbers that stand for bad values."""
 
-SENTINELS = (
-    *(-99.0, -999.0, -999.25, -999.99, -9999.0, -9999.99, -99999.0, 9999.0, 99999.0, 999999.0),
-    *(-32768.0, 32767.0, 65535.0, -2147483648.0, 2147483647.0, 1e10, -1e10, 1e20, -1e20, 1e30),
-    *(-1e30, 3.4028234663852886e38, -3.4028234663852886e38, 9.96921e36),
-)
+SENTINELS: tuple[float, ...] = tuple(WORDS["sentinels"])
 """Numbers that loggers and controllers write in the place of a bad value."""
 
 FEWEST_USUAL = 10

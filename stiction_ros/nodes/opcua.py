@@ -14,12 +14,12 @@ from std_srvs.srv import Trigger
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
+from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
 from stiction_ros.nodes.shared.managed import LATCHED_QOS, READER_QOS, SIGNAL_QOS, ManagedNode
 from stiction_ros.nodes.shared.messages import to_ns, values_of
 from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.shared.typed import trigger
-from stiction_ros.nodes.opcua_topics import LoopTopics, grant_keys
 from stiction_ros.online.plain_settings import OpcuaNodeSettings
 from stiction_ros.opcua import require_asyncua
 from stiction_ros.opcua.heartbeat import IDENTITIES

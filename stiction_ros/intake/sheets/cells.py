@@ -13,18 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.intake.words import pattern_of
 
 Cells = Sequence[str] | NDArray[np.float64] | NDArray[np.datetime64]
 """One column of a piece of a table: text, numbers or stamps."""
 
-BAD_WORDS = re.compile(
-    r"bad|bad input|i/?o timeout|(scan )?timeout|no ?data|no good data|no result|pt created|"
-    r"not connect(ed)?|comm (fail|error)|configure|scan off|out of serv|(under|over) range|"
-    r"shutdown|calc failed|error|#n/a|#(value|ref|name|num|div/0)[!?]|n/?a|-?nan|null|<null>|"
-    r"none|nil|[+-]?inf(inity)?|-+|[?*]|invalid|uncertain|unreliable|stale|no sample|missing|"
-    r"(arc )?off-?line|undefined|questionable|equip fail|intf shut|dcs failed|-?1\.#(ind|qnan|inf)",
-    re.IGNORECASE,
-)
+BAD_WORDS = pattern_of("bad_words")
 """What historians write in the place of a number; anything else that is no number counts too."""
 
 SHOWN = 30

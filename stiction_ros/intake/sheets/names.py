@@ -3,37 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-SIGNAL_WORDS: Mapping[str, tuple[str, ...]] = {
-    "pv": ("pv", "meas", "process_value", "processvalue", "pv_in", "me", "istwert", "mesure"),
-    "sp": (
-        *("sp", "sv", "spt", "setpoint", "set_point", "set point", "wsp", "sollwert"),
-        "consigne",
-    ),
-    "op": (
-        *("op", "out", "mv", "co", "output", "opout", "lmn", "cout", "stellwert", "stellgrad"),
-        *("stellgröße", "stellgrösse", "stellgroesse", "sortie"),
-    ),
-    "stem": ("stem", "zt", "pos", "position", "travel"),
-    "mode": ("mode", "md", "mode_act", "modeact", "a/m", "am", "auto", "betriebsart"),
-}
-"""Last part of a tag, in the words of makers of control systems and of users, by signal."""
+from stiction_ros.intake.words import WORDS, by_word, columns_named
 
-TIME_NAMES = (
-    *("t", "time", "timestamp", "time stamp", "datetime", "date time", "date/time", "stamp", "ts"),
-    *("_time", "utc", "local time", "zeit", "zeitstempel", "date", "datum", "record time"),
-)
-TAG_NAMES = (
-    *("tag", "tagname", "tag name", "point", "pointname", "point name", "name", "sensor", "item"),
-    *("itemid", "item id", "variable", "signal", "id", "point id", "pointid"),
-)
-VALUE_NAMES = ("value", "val", "_value", "reading", "wert", "numeric value", "messwert")
-QUALITY_NAMES = ("quality", "status", "qual", "opc quality", "quality code", "opcquality", "q")
-UNIT_NAMES = ("unit", "units", "uom", "eu", "engunits", "eng units", "einheit")
+SIGNAL_WORDS: Mapping[str, Sequence[str]] = WORDS["signals"]
+"""Last part of a tag, by signal."""
 
-SIGNALS = {word: signal for signal, words in SIGNAL_WORDS.items() for word in words}
+TIME_NAMES, TAG_NAMES = columns_named("time"), columns_named("tag")
+VALUE_NAMES, QUALITY_NAMES = columns_named("value"), columns_named("quality")
+UNIT_NAMES = columns_named("unit")
+
+SIGNALS: Mapping[str, str] = by_word("signals")
 """Word to signal."""
 
 OR_ROW = "(or a row for this file in --tags)"

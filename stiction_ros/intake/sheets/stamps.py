@@ -6,7 +6,7 @@ import dataclasses
 import datetime
 import enum
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,20 +16,12 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, number
 from stiction_ros.intake.sheets.names import OR_ROW
+from stiction_ros.intake.words import by_word
 
 DAY = 86400.0
 
-_MONTHS = {
-    **{
-        m: k
-        for k, m in enumerate(
-            ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"], 1
-        )
-    },
-    **{"mär": 3, "mrz": 3, "mai": 5, "okt": 10, "dez": 12, "avr": 4, "fév": 2, "fev": 2, "aoû": 8},
-    **{"déc": 12, "ene": 1, "abr": 4, "ago": 8, "dic": 12, "set": 9, "out": 10, "juil": 7},
-}
-"""First letters of the months in English, German, French, Spanish, Portuguese."""
+_MONTHS: Mapping[str, int] = by_word("months")
+"""First letters of the months in several languages."""
 
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[^\W\d_]{3,9}\.?)[./-](\d{2,4})")
 _CLOCK = re.compile(
@@ -38,18 +30,8 @@ _CLOCK = re.compile(
 _ZONE = re.compile(r"(?:Z|[+-]\d\d:?\d\d)$")
 
 
-_OFFSETS = {
-    **dict.fromkeys(("UTC", "GMT", "WET"), "+00:00"),
-    **dict.fromkeys(("CET", "MEZ", "WEST"), "+01:00"),
-    **dict.fromkeys(("CEST", "MESZ", "EET"), "+02:00"),
-    "EEST": "+03:00",
-    "EDT": "-04:00",
-    **dict.fromkeys(("EST", "CDT"), "-05:00"),
-    "MDT": "-06:00",
-    **dict.fromkeys(("MST", "PDT"), "-07:00"),
-    "PST": "-08:00",
-}
-"""Zones by their names, of which each is one alone; CST, IST and BST are several."""
+_OFFSETS: Mapping[str, str] = by_word("zones")
+"""Zones by their names, of which each is one alone."""
 
 _NAMED = re.compile(rf"\s*\b({'|'.join(_OFFSETS)})$")
 

@@ -17,13 +17,14 @@ from stiction_ros.intake.tables.block import Block, Clock, Column, FlagArray, Ke
 from stiction_ros.intake.tables.clock import in_seconds
 from stiction_ros.intake.tables.plan import Plan, Shape
 from stiction_ros.intake.tables.tags import TagList
+from stiction_ros.intake.words import WORDS
 from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 
 OPC_GOOD = 192
 """Codes of OPC from which a value is good."""
 
-_BAD = ("bad", "uncertain", "questionable", "invalid", "no ", "i/o", "comm", "not ", "substituted")
+_BAD = tuple(WORDS["bad_beginnings"])
 
 
 def blocks_of(
