@@ -44,6 +44,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "gain": ("seeds", "jobs"),
     "plant": ("truth", "survey"),
     "stability": ("seeds", "method", "data", "jobs"),
+    "exports": ("seeds", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
@@ -56,8 +57,9 @@ def add(commands: Any) -> None:
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
         "loops that share nothing with it), how often identification is (field), whether its "
-        "answers hold still (stability), whether what gain promises comes about (gain), and what "
-        "the list of a survey is worth (plant).",
+        "answers hold still (stability), whether what gain promises comes about (gain), what "
+        "the list of a survey is worth (plant), and whether exports are read as they were "
+        "written (exports).",
     )
     parser.add_argument(
         "name",
@@ -232,6 +234,12 @@ def _gain(options: argparse.Namespace, machine: str) -> int:
     return bench_gain.run(options, machine)
 
 
+def _exports(options: argparse.Namespace, machine: str) -> int:
+    from stiction_studies.benches.accuracy import exports as bench_exports
+
+    return bench_exports.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -244,5 +252,6 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "gain": _gain,
     "plant": bench_plant.run,
     "stability": bench_stability.run,
+    "exports": _exports,
     "world": bench_world.run,
 }

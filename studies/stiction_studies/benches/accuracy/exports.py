@@ -1,0 +1,147 @@
+"""``stiction bench exports``: one loop written as many random exports, read, and compared."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import enum
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.seeds import run_seeds
+from stiction_ros.errors import InputError
+from stiction_ros.intake import IntakeOptions, Loop, loops
+from stiction_ros.records.quality import Quality
+from stiction_studies.benches.accuracy.share import Share, shares_table
+from stiction_studies.field.exports.random_export import Export, write_random_export
+
+FIRST, LAST = 10_000, 10_199
+"""Seeds when none are given; those below 1000 are for tuning."""
+
+DIGITS = 2e-6
+"""Share of a value by which it may be off: exports have seven digits."""
+
+
+class Reading(enum.StrEnum):
+    """How an export was read."""
+
+    EQUAL = "equal"
+    REFUSED = "refused"
+    TOLD = "differs, with a note that says so"
+    SILENT = "differs in silence"
+
+
+@dataclasses.dataclass(frozen=True)
+class Read:
+    """One export.
+
+    Attributes:
+        seed: of it.
+        drawn: what it is like, in words.
+        reading: how it was read.
+        said: the reason of a refusal, or what differs and the notes.
+    """
+
+    seed: int
+    drawn: str
+    reading: Reading
+    said: str
+
+
+def judge(seed: int) -> Read:
+    """Write one export, read it as ``stiction identify`` does, and compare."""
+    with tempfile.TemporaryDirectory() as folder:
+        export = write_random_export(seed, Path(folder))
+        try:
+            found = list(loops(export.files, IntakeOptions()))
+        except InputError as error:
+            return Read(seed, str(export.drawn), Reading.REFUSED, str(error))
+    mine = [loop for loop in found if "TIC7" not in loop.name]
+    if len(mine) != 1:
+        said = "; ".join(f"{loop.name}: {loop.problem or 'read'}" for loop in mine)
+        refused = bool(mine) and all(loop.problem for loop in mine)
+        return Read(seed, str(export.drawn), Reading.REFUSED if refused else Reading.SILENT, said)
+    if mine[0].problem is not None:
+        return Read(seed, str(export.drawn), Reading.REFUSED, mine[0].problem)
+    fault = difference(export, mine[0])
+    if fault is None:
+        return Read(seed, str(export.drawn), Reading.EQUAL, "; ".join(mine[0].notes))
+    notes = "; ".join(mine[0].notes)
+    told = Reading.TOLD if _confessed(mine[0]) else Reading.SILENT
+    return Read(seed, str(export.drawn), told, f"{fault}; notes: {notes or 'none'}")
+
+
+def _confessed(loop: Loop) -> bool:
+    """Return whether a note says that samples are not as they were measured."""
+    words = ("brought onto", "instants", "interpolated", "unit", "cut at", "left out")
+    return any(word in note for note in loop.notes for word in words)
+
+
+def difference(export: Export, loop: Loop) -> str | None:
+    """Return how the good samples of a loop differ from what was written; None where they do not.
+
+    Args:
+        export: and its truth.
+        loop: as read.
+    """
+    key = {round(float(op), 5): row for row, op in enumerate(export.op)}
+    seen: list[int] = []
+    for part in loop.parts:
+        good = np.flatnonzero(part.quality == Quality.GOOD)
+        if abs(part.sample_time / export.scan - 1.0) > 1e-3:
+            return f"sample time {part.sample_time:.6g} s for {export.scan:.6g} s"
+        rows = [_row_of(float(part.op[k, 0]), export, key) for k in good.tolist()]
+        for k, row in zip(good.tolist(), rows, strict=True):
+            if row is None:
+                return f"OP {part.op[k, 0]:.6g} stands in no row"
+            if abs(part.pv[k, 0] - export.pv[row]) > DIGITS * abs(export.pv[row]):
+                return f"OP of row {row} beside another PV"
+            if export.bad[row]:
+                return f"row {row} of bad quality is good"
+        known = [row for row in rows if row is not None]
+        steps = np.diff(export.place[known]) - np.diff(good)
+        if len(steps) and np.any(steps != 0):
+            return "samples are moved in time"
+        seen += known
+    lost = len(export.op) - int(export.bad.sum()) - len(set(seen))
+    return f"{lost} rows lost" if lost else None
+
+
+def _row_of(value: float, export: Export, key: dict[float, int]) -> int | None:
+    row = key.get(round(value, 5))
+    if row is None:
+        row = int(np.argmin(np.abs(export.op - value)))
+    return row if abs(export.op[row] - value) <= 20.0 * DIGITS * abs(value) else None
+
+
+def run(options: argparse.Namespace, machine: str) -> int:
+    """Run the benchmark; exit code 1 where one differs in silence."""
+    rows = run_seeds(judge, options.seeds or (FIRST, LAST), options.jobs or 1, "exports")
+    document = {
+        "name": "exports",
+        "machine": machine,
+        "rows": [],
+        "exports": [dataclasses.asdict(row) for row in rows],
+    }
+    hand_over(options.json, document, lambda: show(rows))
+    return int(any(row.reading is Reading.SILENT for row in rows))
+
+
+def show(rows: Sequence[Read]) -> None:
+    """Print how often exports are read as written, and each that is not."""
+    counts: Counter[Any] = Counter(row.reading for row in rows)
+    console = Console()
+    wanted = {Reading.SILENT: "0"}
+    console.print(
+        shares_table(Share(r.value, counts[r], len(rows), wanted.get(r, "")) for r in Reading)
+    )
+    for row in rows:
+        if row.reading is not Reading.EQUAL:
+            console.print(f"{row.seed} ({row.drawn}): {row.reading}: {row.said}", highlight=False)
