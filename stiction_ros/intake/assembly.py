@@ -19,6 +19,8 @@ from stiction_ros.intake.repairs import (
     checked,
     filled,
     in_order,
+    plural,
+    sorted_rows,
     with_times,
     with_values,
     without_outliers,
@@ -65,7 +67,12 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     timed = [with_times(block, rules) for block in found.blocks]
     if not options.as_given:
         timed = [with_values(block, rules, shared=found.shared) for block in timed]
-    block = joined([checked(one, rules) for one in timed])
+    if len(timed) > 1:
+        timed = [sorted_rows(one, rules) for one in timed]
+    block, differing = joined([checked(one, rules) for one in timed])
+    for name, count in differing.items():
+        said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"
+        rules.tell(f"{said}: the later table counts", block, said, "leave one of them out")
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()
     block = without_outliers(block, rules)
