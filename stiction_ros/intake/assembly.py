@@ -25,9 +25,10 @@ from stiction_ros.intake.repairs import (
     with_values,
     without_outliers,
 )
-from stiction_ros.intake.reported import is_reported, on_grid
+from stiction_ros.intake.reported import at_pv, is_reported, on_grid
 from stiction_ros.intake.shown import columns_of, modes_of, spreads_of
 from stiction_ros.intake.tables.block import Block, joined
+from stiction_ros.records.parts import ALIKE
 from stiction_ros.records.record import Record
 from stiction_ros.records.whole import Source, Whole
 
@@ -133,16 +134,19 @@ def _refuse_incomplete(found: Found) -> None:
 
 def _records(run: Block, found: Found, options: IntakeOptions, rules: Rules) -> tuple[Record, ...]:
     source = Source(found.record, str(run.path), run.place)
-    if is_reported(run) or options.sample_time is not None:
-        return _resampled(run, found, options, rules)
-    told = len(rules.told)
-    try:
-        return _whole(filled(run, rules)).records(source)
-    except InputError:
-        if options.strict or options.as_given or len(run.time) < 3:
-            raise
-        del rules.told[told:]
-        return _resampled(run, found, options, rules)
+    told, wanted = len(rules.told), options.sample_time
+    own = at_pv(run, rules) if is_reported(run) else run
+    if own is not None:
+        try:
+            kept = _whole(filled(own, rules)).records(source)
+            if wanted is None or all(abs(r.sample_time / wanted - 1.0) <= ALIKE for r in kept):
+                return kept
+        except InputError:
+            mixed = own is not run or wanted is not None
+            if not mixed and (options.strict or options.as_given or len(run.time) < 3):
+                raise
+    del rules.told[told:]
+    return _resampled(run, found, options, rules)
 
 
 def _resampled(

@@ -289,7 +289,8 @@ def _spread(block: Block, first: IndexArray) -> _Spread | None:
     line = np.polyval(np.polyfit(rows, block.time - stamps[0], 1), rows) + stamps[0]
     late, scan = line - block.time, float(line[1] - line[0])
     twice = evenly(np.flatnonzero(inner > 1))
-    if np.ptp(late) <= step + 0.5 * scan and (usual > 1 or (len(twice) > 1 and twice.all())):
+    fits = bool(np.ptp(inner)) and np.ptp(late) <= step + 0.5 * scan
+    if fits and (usual > 1 or (len(twice) > 1 and twice.all())):
         return _Spread(step, f"{step / scan:.3g}", line - late.min())
     if usual < 2:
         return None

@@ -128,10 +128,35 @@ def test_an_empty_cell_of_a_later_table_hides_no_value(tmp_path: Path) -> None:
     check_rows(loop, ROWS, STEP)
 
 
-def test_rows_of_a_wide_table_that_jitter(tmp_path: Path) -> None:
+@pytest.mark.parametrize("wanted", [None, 5.0])
+def test_rows_of_a_wide_table_that_jitter(tmp_path: Path, wanted: float | None) -> None:
     random = np.random.default_rng(2)
     times = 5.0 * (np.arange(ROWS) + random.uniform(-0.25, 0.25, ROWS))
     rows = [[f"{t:.3f}", str(op(k)), str(pv(k)), "200"] for k, t in enumerate(times)]
-    loop = one(write(tmp_path / "loop.csv", text(rows, HEADER)))
+    loop = one(write(tmp_path / "loop.csv", text(rows, HEADER)), sample_time=wanted)
     check_rows(loop, ROWS, 5.0)
     assert "sample times jitter by up to" in said(loop)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_tags_on_clocks_of_their_own(tmp_path: Path, jitter: float) -> None:
+    random = np.random.default_rng(5)
+    rows = []
+    for signal, of, late in (("OP", op, 0.3), ("PV", pv, 0.7)):
+        times = STEP * (np.arange(300) + late + random.uniform(-jitter, jitter, 300))
+        rows += [[f"F1.{signal}", f"{t:.3f}", str(of(k))] for k, t in enumerate(times)]
+    loop = one(write(tmp_path / "tall.csv", text(rows, ["Tag", "t", "Value"])))
+    check_rows(loop, 300, STEP)
+    assert "OP and PV have stamps of their own: taken at the 300 of PV" in said(loop)
+    assert loop.parts[0].mask is None
+
+
+def test_signals_kept_when_they_changed_are_still_brought_onto_a_grid(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    rows = [
+        [f"F1.{signal}", iso(k), str(of(k))]
+        for signal, of in (("OP", op), ("PV", pv))
+        for k in np.flatnonzero(random.random(400) < 0.3).tolist()
+    ]
+    loop = one(write(tmp_path / "tall.csv", text(rows, ["Tag", "time", "Value"])))
+    assert "reports when values changed" in said(loop)
