@@ -213,10 +213,12 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
 
 
 def sorted_rows(block: Block, rules: Rules) -> Block:
-    """Return the rows of one of several tables with increasing stamps, each once."""
-    steps = np.diff(block.time)
-    if np.count_nonzero(steps < 0) > np.count_nonzero(steps > 0):
-        block = block.rows(np.arange(len(block.time))[::-1])
+    """Return the rows of one of several tables by :func:`in_order`, as one block."""
+    told = len(rules.told)
+    runs = in_order(block, rules)
+    if len(runs) == 1:
+        return runs[0]
+    del rules.told[told:]
     return _without_repeats(block.rows(np.argsort(block.time, kind="stable")), rules)
 
 
@@ -229,7 +231,8 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
     first = np.flatnonzero(np.insert(last[:-1], 0, True))
     group = np.cumsum(np.insert(last[:-1], 0, True)) - 1
     columns: dict[Key, Column] = {}
-    spread = _spread(block, first)
+    moved = np.ptp(np.sign(np.diff(block.lines))) > 0
+    spread = None if moved else _spread(block, first)
     if spread is not None:
         rules.told.append(
             f"stamps lack what is below {spread.step:g} s: {spread.usual} rows on each, spread "

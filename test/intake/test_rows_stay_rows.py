@@ -109,11 +109,23 @@ def test_files_that_overlap_and_differ_are_counted(tmp_path: Path) -> None:
 
 def test_strict_refuses_two_values_on_a_stamp(tmp_path: Path) -> None:
     path = write(tmp_path / "t.csv", text(tall("OP") + tall("PV"), ["Tag", "time", "Value"]))
-    with pytest.raises(InputError, match=r"F1.OP: 3 rows with a stamp that was there already"):
+    with pytest.raises(InputError, match=r"sort the rows and remove those that are there twice"):
         one_loop(path, IntakeOptions(strict=True))
     single = {row[0] + row[1]: row for row in tall("OP") + tall("PV")}
     mended = text(list(single.values()), ["Tag", "time", "Value"])
     check_rows(one(write(path, mended), strict=True), ROWS, STEP)
+
+
+def test_the_hour_that_comes_twice_with_one_value_a_row(tmp_path: Path) -> None:
+    count, hour = 900, 360
+    rows = [
+        [f"F1.{signal}", iso(k if k < 500 else k - hour), str(of(k))]
+        for signal, of in (("OP", op), ("PV", pv))
+        for k in range(count)
+    ]
+    loop = one(write(tmp_path / "t.csv", text(rows, ["Tag", "time", "Value"])))
+    check_rows(loop, count, STEP)
+    assert "the clock is set back by an hour" in said(loop)
 
 
 def test_an_empty_cell_of_a_later_table_hides_no_value(tmp_path: Path) -> None:
