@@ -1,10 +1,9 @@
 """Signals that were reported when they changed, brought onto a regular grid.
 
 OP, SP and modes hold until the next report; PV goes straight from report to report, as in
-records with missing rows: a loop simulated with such reports has a truer f_S and f_D than where
-both hold, and where both go straight, which rounds off the stairs of OP. What is not known
-between two reports is lost, which is said. Tags asked regularly, each on its own clock, are
-reports only in their stamps: PV keeps its values.
+records with missing rows. What is not known between two reports is lost, which is said. Tags
+asked regularly, each on its own clock, are reports only in their stamps: PV keeps its values, and
+OP holds, as a line through the stairs of OP gives another friction.
 """
 
 from __future__ import annotations
