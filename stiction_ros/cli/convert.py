@@ -25,8 +25,8 @@ def add(commands: Any) -> None:
         "convert",
         help="convert a record between CSV and bag",
         description="Write a record in another form: OUT ending in .csv becomes a CSV file, "
-        "anything else a rosbag2 directory. Slightly irregular samples are brought onto a "
-        "regular grid; a record with gaps, or of several runs, becomes OUT_1, OUT_2 and so on. "
+        "anything else a rosbag2 directory. Rows whose times are slightly irregular are "
+        "a sample each; a record with gaps, or of several runs, becomes OUT_1, OUT_2 and so on. "
         "What was done is told.",
     )
     parser.add_argument("record", metavar="RECORD", help="CSV file or bag")

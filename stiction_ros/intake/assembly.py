@@ -19,13 +19,16 @@ from stiction_ros.intake.repairs import (
     checked,
     filled,
     in_order,
+    plural,
+    sorted_rows,
     with_times,
     with_values,
     without_outliers,
 )
-from stiction_ros.intake.reported import is_reported, on_grid
+from stiction_ros.intake.reported import at_pv, is_reported, on_grid
 from stiction_ros.intake.shown import columns_of, modes_of, spreads_of
 from stiction_ros.intake.tables.block import Block, joined
+from stiction_ros.records.parts import ALIKE
 from stiction_ros.records.record import Record
 from stiction_ros.records.whole import Source, Whole
 
@@ -65,7 +68,12 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     timed = [with_times(block, rules) for block in found.blocks]
     if not options.as_given:
         timed = [with_values(block, rules, shared=found.shared) for block in timed]
-    block = joined([checked(one, rules) for one in timed])
+    if len(timed) > 1:
+        timed = [sorted_rows(one, rules) for one in timed]
+    block, differing = joined([checked(one, rules) for one in timed])
+    for name, count in differing.items():
+        said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"
+        rules.tell(f"{said}: the later table counts", block, said, "leave one of them out")
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()
     block = without_outliers(block, rules)
@@ -126,16 +134,19 @@ def _refuse_incomplete(found: Found) -> None:
 
 def _records(run: Block, found: Found, options: IntakeOptions, rules: Rules) -> tuple[Record, ...]:
     source = Source(found.record, str(run.path), run.place)
-    if is_reported(run) or options.sample_time is not None:
-        return _resampled(run, found, options, rules)
-    told = len(rules.told)
-    try:
-        return _whole(filled(run, rules)).records(source)
-    except InputError:
-        if options.strict or options.as_given or len(run.time) < 3:
-            raise
-        del rules.told[told:]
-        return _resampled(run, found, options, rules)
+    told, wanted = len(rules.told), options.sample_time
+    own = at_pv(run, rules) if is_reported(run) else run
+    if own is not None:
+        try:
+            kept = _whole(filled(own, rules)).records(source)
+            if wanted is None or all(abs(r.sample_time / wanted - 1.0) <= ALIKE for r in kept):
+                return kept
+        except InputError:
+            mixed = own is not run or wanted is not None
+            if not mixed and (options.strict or options.as_given or len(run.time) < 3):
+                raise
+    del rules.told[told:]
+    return _resampled(run, found, options, rules)
 
 
 def _resampled(

@@ -92,8 +92,8 @@ def read_csv_parts(
 ) -> tuple[Record, ...]:
     """Read a table as :func:`read_csv` does, split where it has gaps.
 
-    A step of more than 5.5 usual ones is a gap. Slightly irregular samples are brought onto a
-    regular grid, see :func:`stiction_ros.records.regular.regular_part`; the notes of each
+    A step of more than 5.5 usual ones is a gap. Rows whose times are slightly irregular are
+    a sample each, see :func:`stiction_ros.records.regular.regular_part`; the notes of each
     record say what was done.
 
     Raises:

@@ -22,6 +22,7 @@ from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.words import WORDS
 from stiction_ros.records.parts import stretches
 from stiction_ros.records.quality import Quality, QualityArray
+from stiction_ros.records.regular import evenly
 
 IndexArray = NDArray[np.intp]
 
@@ -211,6 +212,16 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
     return [_without_repeats(block.rows(order), rules)]
 
 
+def sorted_rows(block: Block, rules: Rules) -> Block:
+    """Return the rows of one of several tables by :func:`in_order`, as one block."""
+    told = len(rules.told)
+    runs = in_order(block, rules)
+    if len(runs) == 1:
+        return runs[0]
+    del rules.told[told:]
+    return _without_repeats(block.rows(np.argsort(block.time, kind="stable")), rules)
+
+
 def _without_repeats(block: Block, rules: Rules) -> Block:
     """Return the last row of each stamp, with what earlier ones have where it has nothing."""
     last = np.append(np.diff(block.time) > 0, True)
@@ -220,11 +231,13 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
     first = np.flatnonzero(np.insert(last[:-1], 0, True))
     group = np.cumsum(np.insert(last[:-1], 0, True)) - 1
     columns: dict[Key, Column] = {}
-    spread = _spread(block, first)
+    moved = np.ptp(np.sign(np.diff(block.lines))) > 0
+    spread = None if moved else _spread(block, first)
     if spread is not None:
-        note = f"stamps lack what is below {spread.step:g} s: "
-        note += f"{spread.usual} rows on each, spread evenly"
-        rules.told.append(note)
+        rules.told.append(
+            f"stamps lack what is below {spread.step:g} s: {spread.usual} rows on each, spread "
+            "evenly"
+        )
         return dataclasses.replace(block, time=spread.time)
     for key, column in block.columns.items():
         here = np.flatnonzero(~column.blank)
@@ -232,20 +245,20 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
         blank = np.ones(len(first), dtype=np.bool_)
         values[group[here]] = column.values[here]
         blank[group[here]] = False
-        differing += int(np.count_nonzero(column.values[here] != values[group[here]]))
+        there = here[np.isfinite(column.values[here])]
+        differing += int(np.count_nonzero(column.values[there] != values[group[there]]))
         columns[key] = dataclasses.replace(column, values=values, blank=blank)
     kept = block.rows(last)
-    repeats = len(last) - len(first)
-    note = f"{plural(repeats, 'row')} with a stamp that was there already"
-    rules.told.append(
-        f"{note}: the last value counts, {differing} differ" if differing else f"{note} left out"
-    )
+    of = f"{next(iter(columns.values())).name}: " if len(columns) == 1 else ""
+    said = f"{of}{plural(len(last) - len(first), 'row')} with a stamp that was there already"
+    note = f"{said}: the last value counts, {differing} differ" if differing else f"{said} left out"
+    rules.tell(note, block, said, "remove those that are there twice")
     return dataclasses.replace(kept, columns=columns)
 
 
 class _Spread(NamedTuple):
     step: float
-    usual: int
+    usual: str
     time: FloatArray
 
 
@@ -253,7 +266,8 @@ def _spread(block: Block, first: IndexArray) -> _Spread | None:
     """Return times of rows whose stamps were cut off, as minutes without their seconds.
 
     Then every stamp has as many rows but for one, stamps follow each other evenly, and what stands
-    in the rows differs; None for rows that are there twice.
+    in the rows differs; where a stamp has one row, those with two come evenly. None for rows that
+    are there twice.
 
     Args:
         block: rows in order.
@@ -272,13 +286,22 @@ def _spread(block: Block, first: IndexArray) -> _Spread | None:
         for key, column in block.columns.items()
         if key.signal in ("op", "pv")
     ]
-    if usual < 2 or not even or not np.any(differs, axis=0).mean() > DIFFERENT:
+    if not even or not np.any(differs, axis=0).mean() > DIFFERENT:
+        return None
+    rows, step = np.arange(len(block.time)), float(steps[0])
+    line = np.polyval(np.polyfit(rows, block.time - stamps[0], 1), rows) + stamps[0]
+    late, scan = line - block.time, float(line[1] - line[0])
+    twice = evenly(np.flatnonzero(inner > 1))
+    fits = bool(np.ptp(inner)) and np.ptp(late) <= step + 0.5 * scan
+    if fits and (usual > 1 or (len(twice) > 1 and twice.all())):
+        return _Spread(step, f"{step / scan:.3g}", line - late.min())
+    if usual < 2:
         return None
     within = np.arange(len(block.time)) - np.repeat(first, counts)
     of = np.maximum(np.repeat(counts, counts), usual)
     within[: counts[0]] += max(usual - int(counts[0]), 0)  # the first stamp has its last rows
-    time = block.time + float(steps[0]) * within / of
-    return _Spread(float(steps[0]), usual, np.asarray(time))
+    time = block.time + step * within / of
+    return _Spread(step, str(usual), np.asarray(time))
 
 
 def without_outliers(block: Block, rules: Rules) -> Block:

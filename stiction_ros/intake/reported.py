@@ -1,7 +1,9 @@
 """Signals that were reported when they changed, brought onto a regular grid.
 
 OP, SP and modes hold until the next report; PV goes straight from report to report, as in
-records with missing rows. What is not known between two reports is lost, which is said.
+records with missing rows. What is not known between two reports is lost, which is said. Tags
+asked regularly, each on its own clock, are reports only in their stamps: PV keeps its values, and
+OP holds, as a line through the stairs of OP gives another friction.
 """
 
 from __future__ import annotations
@@ -45,6 +47,57 @@ def is_reported(block: Block) -> bool:
         if key.signal in ("op", "pv")
     ]
     return min(shares) < COVERED
+
+
+def at_pv(block: Block, rules: Rules) -> Block | None:
+    """Return the rows of PV with what every other signal was last, or None.
+
+    So nothing measured is moved where each tag is asked as often as the other on a clock of its
+    own: PV has no value but its own, and OP is what the valve had been given.
+
+    Args:
+        block: as :func:`on_grid` takes it.
+        rules: what was done is noted there.
+
+    Returns:
+        None where there are several PV, or PV has fewer stamps than another signal.
+    """
+    outputs = [key for key in block.columns if key.signal == "pv"]
+    stamps = {key: _reports(block, column) for key, column in block.columns.items()}
+    busiest = max(map(len, stamps.values()))
+    if len(outputs) != 1 or len(stamps[outputs[0]]) < COVERED * busiest:
+        return None
+    begin = max((at[0] for key, at in stamps.items() if key.signal == "op" and len(at)), default=0)
+    chosen = ~block.columns[outputs[0]].blank & (block.time >= begin)
+    time = block.time[chosen]
+    if len(time) < 2:
+        return None
+    mask: QualityArray = np.zeros(len(time), dtype=np.uint8)
+    columns = {}
+    for key, column in block.columns.items():
+        at, values = stamps[key], column.values[~column.blank]
+        if not len(at):
+            continue
+        before = np.searchsorted(at, time, side="right") - 1
+        if key.signal == "op":  # none came since the row before
+            mask[time - at[before] > 1.5 * float(np.median(np.diff(time)))] = Quality.HELD
+        held = np.where(before < 0, np.nan, values[before])
+        if key.signal == "mode":
+            held = values[np.maximum(before, 0)]
+        columns[key] = dataclasses.replace(column, values=held, blank=before < 0)
+    if block.mask is not None:
+        given = block.mask[chosen]
+        mask = np.where(given != Quality.GOOD, given, mask)
+    rules.tell(
+        f"OP and PV have stamps of their own: taken at the {len(time)} of PV, with the last value "
+        "of OP and SP at each",
+        block,
+        "OP and PV have stamps of their own",
+        "leave --strict out, or export all tags at the same times",
+    )
+    return dataclasses.replace(
+        block, time=time, lines=block.lines[chosen], columns=columns, mask=mask
+    )
 
 
 def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block]:

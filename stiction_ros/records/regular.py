@@ -1,4 +1,8 @@
-"""Makes a regular record of samples that are slightly irregular, and says what it did."""
+"""Makes a regular record of samples that are slightly irregular, and says what it did.
+
+A row is a sample: its values stay together and are never mixed with those of its neighbours.
+Each row gets a place, an integer; only places without a row are filled.
+"""
 
 from __future__ import annotations
 
@@ -6,28 +10,31 @@ import dataclasses
 import itertools
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.sampling import TOLERATED
+from stiction_ros.records.sampling import TOLERATED, shortest
 
 GAP = 5.5
 """A step of more usual steps than this is a gap: the record is split there."""
 
 SLIGHT = 0.1
-"""Share of the samples that a repair may make up for; more is irregular."""
-
-WIDEST = 200
-"""Frequencies looked at on either side of the usual one."""
+"""Share of the places that may be without a row, and the mean square by which steps may stray
+from their mean, over that mean: rows missing at random make the one as large as the other."""
 
 HOLE = 1.5
 """A step of more usual steps than this is a hole in which samples are missing."""
 
-EXACT = 1e-6
-"""Share of a step by which a row may be off a regular time and is taken as it is."""
+CAUGHT_UP = 0.25
+"""Steps by which rows may still be late when the delay of one of them is over: half of what a
+row may be off its place."""
 
 SHORTEST = 3
 """Samples that a repair needs at least."""
+
+WHOLE = 1e-3
+"""Share of the smallest step by which others are off its multiples in rounded stamps, at most."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,26 +44,38 @@ class Part:
     Attributes:
         first, last: rows of the file that it is made of, ``last`` not included.
         time: regular times, shape (N,), s; the given ones where nothing was repaired.
-        left: for each time the row, counted from ``first``, given at or before it, shape (N,).
-        weight: share of the next row in a linear interpolation, in [0, 1), shape (N,).
-        missing: whether no row is within half a step of a time, shape (N,).
+        place: of each row among the times, increasing, shape (rows,).
         note: what was done; empty for nothing.
     """
 
     first: int
     last: int
     time: FloatArray
-    left: np.ndarray[tuple[int], np.dtype[np.intp]]
-    weight: FloatArray
-    missing: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    place: IntArray
     note: str = ""
 
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Which times no row has, shape (N,)."""
+        found = np.ones(len(self.time), dtype=np.bool_)
+        found[self.place] = False
+        return found
+
+    @property
+    def left(self) -> IntArray:
+        """For each time the row, counted from ``first``, at or before it, shape (N,)."""
+        return np.cumsum(~self.missing) - 1
+
     def interpolated(self, values: FloatArray) -> FloatArray:
-        """Return measured values, shape (rows, …), at the regular times, shape (N, …)."""
+        """Return measured values, shape (rows, …), straight between rows, shape (N, …)."""
         rows = values[self.first : self.last]
-        before, after = rows[self.left], rows[np.minimum(self.left + 1, len(rows) - 1)]
-        weight = self.weight.reshape(-1, *[1] * (values.ndim - 1))
-        return np.where(weight > 0, before + weight * (after - before), before)
+        left, missing = self.left, np.flatnonzero(self.missing)
+        found = np.array(rows[left], dtype=np.float64)
+        before = left[missing]
+        width = self.place[before + 1] - self.place[before]
+        share = ((missing - self.place[before]) / width).reshape(-1, *[1] * (values.ndim - 1))
+        found[missing] += share * (rows[before + 1] - rows[before])
+        return found
 
     def held(self, values: FloatArray) -> FloatArray:
         """Return values that are held between two rows, such as OP and SP, shape (N, …)."""
@@ -64,17 +83,16 @@ class Part:
 
     def quality(self, mask: QualityArray | None) -> QualityArray | None:
         """Return the mask at the regular times, of all rows' ``mask``, None when all are good."""
-        if mask is None and not self.missing.any():
+        missing, left = self.missing, self.left
+        if mask is None and not missing.any():
             return None
-        count = len(self.time)
         if mask is None:
-            found = np.zeros(count, dtype=np.uint8)
-        else:
-            rows = mask[self.first : self.last]
-            after = rows[np.minimum(self.left + 1, len(rows) - 1)]
-            found = rows[self.left].copy()
-            found[(self.weight > 0) & (after == Quality.BAD)] = Quality.BAD
-        found[self.missing & (found == Quality.GOOD)] = Quality.HELD
+            mask = np.zeros(self.last, dtype=np.uint8)
+        rows = mask[self.first : self.last]
+        found = np.array(rows[left], dtype=np.uint8)
+        after = rows[np.minimum(left + 1, len(rows) - 1)]
+        found[missing & (after == Quality.BAD)] = Quality.BAD
+        found[missing & (found == Quality.GOOD)] = Quality.HELD
         return found
 
 
@@ -94,74 +112,105 @@ def split_at_gaps(time: FloatArray, longest: float = GAP) -> list[tuple[int, int
 def regular_part(time: FloatArray, first: int, last: int) -> Part:
     """Return rows ``first`` up to ``last`` on a regular grid.
 
-    Rows that keep to the grid within a tenth of a step are taken as they are. Otherwise, when
-    at least nine tenths of the grid's times have a row within half a step, the values are
-    brought onto the grid: measured ones by linear interpolation, OP and SP by holding.
+    The sample time is the time from the first row to the last over the places between them.
+    Rows are taken as they are when their steps differ by a tenth at most, and when more than a
+    tenth of the places would be without a row, or steps stray as much as that makes them.
 
     Args:
         time: increasing times of all rows, shape (rows,), s.
         first, last: the stretch, without a gap inside.
     """
     given = time[first:last]
-    count = len(given)
-    plain = Part(
-        first, last, given, np.arange(count), np.zeros(count), np.zeros(count, dtype=np.bool_)
-    )
+    plain = Part(first, last, given, np.arange(len(given)))
     if len(given) < SHORTEST:
         return plain
     steps = np.diff(given)
     usual = float(np.median(steps))
     if (np.abs(steps - usual) <= TOLERATED * usual).all():
         return plain
-    grid = _grid(given, usual)
-    number, step = len(grid), float(grid[1] - grid[0])
-    nearest = np.abs(grid[:, None] - given[_neighbours(given, grid)]).min(axis=1)
-    moved = int(np.count_nonzero(nearest > TOLERATED * step))
-    missing = nearest > 0.5 * step
-    far = int(np.count_nonzero(missing))
-    spare = max(len(given) - number, 0)
-    if far + spare > SLIGHT * number:
+    counts = _of_rounded(given)
+    rounded = counts is not None
+    if counts is None:
+        counts = _of_late(steps)
+    place = np.concatenate([[0], np.cumsum(counts)])
+    number = int(place[-1]) + 1
+    scan = float(given[-1] - given[0]) / (number - 1)
+    off = steps / scan - counts
+    far = number - len(given)
+    if far > SLIGHT * number or (not rounded and np.mean(off[counts == 1] ** 2) > SLIGHT):
         return plain
-    left = np.clip(np.searchsorted(given, grid + 1e-9 * step, side="right") - 1, 0, len(given) - 1)
-    span = np.diff(given, append=given[-1] + step)[left]
-    weight = np.clip((grid - given[left]) / span, 0.0, 1.0)
-    weight[(left == len(given) - 1) | (weight < EXACT)] = 0.0
-    note = (
-        f"resampled to one sample each {step:.6g} s: {moved} of {number} were off by more than "
-        f"{TOLERATED:.0%} of a step, {far} of them missing; pv and stem are interpolated, op and "
-        "sp held"
-    )
-    return Part(first, last, grid, left, weight, missing, note)
+    worst = float(np.abs(off).max())
+    step = shortest(given[0], given[-1], number - 1, min(max(worst, 1e-5), 0.5))
+    said = []
+    if rounded:
+        said.append(f"stamps are rounded, samples are {step:.6g} s apart")
+    elif worst > TOLERATED:
+        said.append(f"sample times jitter by up to {worst:.0%}, taken as regular, {step:.6g} s")
+    if far:
+        said.append(
+            f"{far} of {number} samples missing between rows: pv and stem are interpolated, op "
+            "and sp held"
+        )
+    return Part(first, last, given[0] + step * np.arange(number), place, "; ".join(said))
 
 
-def _grid(given: FloatArray, usual: float) -> FloatArray:
-    """Return the regular times that fit ``given`` best, shape (N,), two at least.
+def evenly(rows: IntArray) -> NDArray[np.bool_]:
+    """Return which distances of rows are the usual one, or one row off it, shape (R - 1,).
 
-    The frequency is the one near 1 / ``usual`` at which the times are most in step; offset and
-    step then follow by least squares.
+    Halves that are rounded to even make them differ in turn, so two are looked at together.
     """
-    elapsed = given - given[0]
-    middle = int(np.rint(elapsed[-1] / usual))
-    reach = min(2 + middle // 20, WIDEST)
-    best, phase = 0.0, 0.0
-    cycles = middle
-    for candidate in range(max(middle - reach, 1), middle + reach + 1):
-        turns = np.exp(2j * np.pi * candidate * elapsed / elapsed[-1]).mean()
-        if abs(turns) > best:
-            best, phase, cycles = abs(turns), float(np.angle(turns)) / (2 * np.pi), candidate
-    place = np.rint(elapsed * cycles / elapsed[-1] - phase)
-    place -= place[0]
-    centred = place - place.mean()
-    step = float(centred @ elapsed / (centred @ centred))
-    begin = float(elapsed.mean() - step * place.mean())
-    return np.asarray(given[0] + begin + step * np.arange(max(int(place[-1]) + 1, 2)))
+    if len(rows) < 3:
+        return np.zeros(max(len(rows) - 1, 0), dtype=np.bool_)
+    usual = float(np.median(rows[2:] - rows[:-2])) / 2.0
+    return np.asarray(np.abs(np.diff(rows) - usual) <= 1.0)
 
 
-def _neighbours(
-    given: FloatArray, grid: FloatArray
-) -> np.ndarray[tuple[int, int], np.dtype[np.intp]]:
-    """Return for each time of the grid the rows before and after it, shape (N, 2)."""
-    after = np.searchsorted(given, grid)
-    return np.stack(
-        [np.clip(after - 1, 0, len(given) - 1), np.clip(after, 0, len(given) - 1)], axis=1
-    )
+def _of_late(steps: FloatArray) -> IntArray:
+    """Return how many places each step takes, shape (rows - 1,): one for all but holes.
+
+    A step of n places is one of a late row when the n - 1 steps before or after make up for it.
+    """
+    elapsed = float(steps.sum())
+    counts = np.ones(len(steps), dtype=np.int64)
+    seen: set[int] = set()
+    while (total := int(counts.sum())) not in seen:
+        seen.add(total)
+        turns = steps / (elapsed / total)
+        counts = np.maximum(np.floor(turns + (2.0 - HOLE)), 1.0).astype(np.int64)
+        for row in np.flatnonzero(counts > 1).tolist():
+            many = int(counts[row])
+            around = (turns[max(row - many + 1, 0) : row + 1], turns[row : row + many])
+            if any(len(a) == many and a.sum() < many + CAUGHT_UP for a in around):
+                counts[row] = 1
+    return counts
+
+
+def _of_rounded(given: FloatArray) -> IntArray | None:
+    """Return how many places each step takes where the stamps have too few digits, or None.
+
+    Then steps are multiples of the last digit, and those of two come evenly: one more each time
+    that the scan has run ahead of the digits. Missing rows do not come evenly. A step takes the
+    fewest places with which all stamps so far are within half a digit of regular times.
+    """
+    steps = np.diff(given)
+    turns = steps / float(steps.min())
+    whole = np.rint(turns)
+    long = np.flatnonzero(whole == 2.0)
+    even = evenly(long)
+    spoiled = 2.0 * SLIGHT  # a missing row stands within a distance and makes two of it
+    if len(even) < 2 or np.mean(even) < 1.0 - spoiled or np.abs(turns - whole).max() > WHOLE:
+        return None
+    share = 1.0 / float(np.diff(long)[even].mean())
+    scan = 1.0 + share
+    drift = 0.25 * share**2  # from one long step to the next a quarter of what they tell apart
+    low, high, behind = -0.5, 0.5, 0.0
+    counts = np.ones(len(steps), dtype=np.int64)
+    for row, turn in enumerate(whole.tolist()):
+        low, high, behind = low - drift, high + drift, behind + turn - scan
+        more = max(int(np.ceil((behind - 0.5 - high) / scan - WHOLE)), 0)
+        behind -= more * scan
+        counts[row] += more
+        if behind + 0.5 < low:
+            low, high = behind - 0.5, behind + 0.5
+        low, high = max(low, behind - 0.5), min(high, behind + 0.5)
+    return counts

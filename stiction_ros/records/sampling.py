@@ -57,17 +57,22 @@ def sample_time(
             where=where,
             fix="cut the record there or resample it",
         )
-    step = _shortest(time, max(float(jitter[worst]), 1e-5))
+    step = shortest(time[0], time[-1], len(steps), max(float(jitter[worst]), 1e-5))
     if jitter[worst] <= SILENT:
         return step, ()
     note = f"sample times jitter by up to {100 * jitter[worst]:.2g} %, taken as regular"
     return step, (note,)
 
 
-def _shortest(time: FloatArray, tolerance: float) -> float:
-    """Return the shortest decimal that moves the last sample by ``tolerance`` steps at most."""
-    steps = len(time) - 1
-    mean = float(time[-1] - time[0]) / steps
+def shortest(first: float, last: float, steps: int, tolerance: float) -> float:
+    """Return the shortest decimal that is the step from one time to another, s.
+
+    Args:
+        first, last: times, s.
+        steps: between them.
+        tolerance: steps by which the last time may be moved.
+    """
+    mean = float(last - first) / steps
     for digits in range(1, 15):
         short = float(f"{mean:.{digits}g}")
         if abs(short - mean) * steps <= tolerance * mean:

@@ -59,8 +59,8 @@ class Whole:
     def records(self, source: Source, notes: Sequence[str] = ()) -> tuple[Record, ...]:
         """Return one record for each stretch without a gap.
 
-        A step of more than 5.5 usual ones is a gap. Slightly irregular samples are brought
-        onto a regular grid, short holes are held, and the mask says where.
+        A step of more than 5.5 usual ones is a gap. Each row is a sample, also
+        where its stamp is slightly off; short holes are held, and the mask says where.
 
         Args:
             source: of the samples.

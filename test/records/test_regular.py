@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from stiction_ros.errors import InputError
 from stiction_ros.intake.record_file import read_csv, read_csv_parts
 from stiction_ros.records.record import Record
-from stiction_ros.records.regular import regular_part, split_at_gaps
+from stiction_ros.records.regular import split_at_gaps
 
 
 def parts_of(tmp_path: Path, times: np.ndarray, **columns: np.ndarray) -> tuple[Record, ...]:
@@ -29,23 +29,12 @@ def test_a_regular_record_is_left_alone(tmp_path: Path) -> None:
     assert record.op[:, 0].tolist() == list(range(10))
 
 
-def test_jitter_is_resampled_and_told(tmp_path: Path) -> None:
+def test_jitter_is_told(tmp_path: Path) -> None:
     times = np.arange(200.0) + np.random.default_rng(3).uniform(-0.3, 0.3, 200)
     (record,) = parts_of(tmp_path, times)
     assert record.sample_time == pytest.approx(1.0, abs=0.01)
-    assert len(record) == 200
-    # PV is a line over time, so linear interpolation is exact inside.
-    expected = 2.0 * (record.start + record.time) + 1.0
-    np.testing.assert_allclose(record.pv[1:-1, 0], expected[1:-1], atol=1e-3)
-    assert record.notes[0].startswith("resampled to one sample each ")
-    assert "pv and stem are interpolated, op and sp held" in record.notes[0]
-
-
-def test_op_takes_no_value_that_was_not_given(tmp_path: Path) -> None:
-    times = np.arange(100.0) + np.random.default_rng(4).uniform(-0.3, 0.3, 100)
-    (record,) = parts_of(tmp_path, times)
-    assert set(record.op[:, 0].tolist()) <= set(range(100))
-    assert (np.diff(record.op[:, 0]) >= 0).all()
+    (note,) = record.notes
+    assert note == "sample times jitter by up to 58%, taken as regular, 1 s"
 
 
 def test_single_missing_rows_are_filled_and_counted(tmp_path: Path) -> None:
@@ -54,7 +43,9 @@ def test_single_missing_rows_are_filled_and_counted(tmp_path: Path) -> None:
     assert len(record) == 100
     np.testing.assert_allclose(record.pv[:, 0], 2.0 * np.arange(100.0) + 1.0, rtol=1e-12)
     assert record.op[20, 0] == record.op[19, 0]
-    assert "3 of 100 were off by more than 10% of a step, 3 of them missing" in record.notes[0]
+    assert record.notes == (
+        "3 of 100 samples missing between rows: pv and stem are interpolated, op and sp held",
+    )
 
 
 def test_a_gap_splits(tmp_path: Path) -> None:
@@ -94,17 +85,3 @@ times = st.lists(st.floats(0.01, 20.0), min_size=1, max_size=60).map(
 def test_stretches_cover_every_row_once(times: np.ndarray) -> None:
     edges = split_at_gaps(times)
     assert [row for first, last in edges for row in range(first, last)] == list(range(len(times)))
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.integers(5, 80), st.floats(0.0, 0.45), st.integers(0, 2**31))
-def test_interpolation_stays_between_the_rows_given(count: int, jitter: float, seed: int) -> None:
-    random = np.random.default_rng(seed)
-    given_times = np.arange(float(count)) + random.uniform(-jitter, jitter, count)
-    values = random.standard_normal((count, 2))
-    part = regular_part(given_times, 0, count)
-    found = part.interpolated(values)
-    assert len(found) == len(part.time)
-    low, high = values.min(axis=0), values.max(axis=0)
-    assert ((found >= low - 1e-12) & (found <= high + 1e-12)).all()
-    assert {tuple(row) for row in part.held(values)} <= {tuple(row) for row in values}

@@ -117,13 +117,15 @@ class Block:
         return f"{self.row_word} {self.lines[row]}"
 
 
-def joined(blocks: list[Block]) -> Block:
+def joined(blocks: list[Block]) -> tuple[Block, dict[str, int]]:
     """Return blocks of one loop on one clock: every stamp that one of them has is a row.
 
-    Where two blocks give one signal at one stamp the later block counts.
+    Where two blocks give one signal at one stamp the later block counts; how often they differ
+    there is returned by the names of their columns.
     """
     if len(blocks) == 1:
-        return blocks[0]
+        return blocks[0], {}
+    differing: Counter[str] = Counter()
     start = min(block.clock.start for block in blocks)
     moved = [block.time + (block.clock.start - start) for block in blocks]
     everything = np.concatenate(moved)
@@ -147,11 +149,16 @@ def joined(blocks: list[Block]) -> Block:
                 known = tuple(dict.fromkeys((*known, *column.known)))
                 codes = np.array([known.index(word) for word in column.known], dtype=np.float64)
                 given = codes[given.astype(np.intp)]
-            into.values[at], into.blank[at] = given, column.blank[there]
+            full = ~column.blank[there]
+            rows, given = at[full], given[full]
+            told, same = ~into.blank[rows], into.values[rows] == given
+            same |= np.isnan(into.values[rows]) & np.isnan(given)
+            differing[column.name] += int(np.count_nonzero(told & ~same))
+            into.values[rows], into.blank[rows] = given, False
             columns[key] = dataclasses.replace(
                 into, known=known, words=into.words + column.words, said=into.said or column.said
             )
-    return Block(
+    whole = Block(
         path=blocks[0].path,
         row_word="sample",
         clock=blocks[0].clock._replace(start=start),
@@ -161,3 +168,4 @@ def joined(blocks: list[Block]) -> Block:
         notes=tuple(dict.fromkeys(note for block in blocks for note in block.notes)),
         stray=next((block.stray for block in blocks if block.stray), ""),
     )
+    return whole, dict(+differing)
