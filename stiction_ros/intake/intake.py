@@ -236,7 +236,11 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
                 yield Loop(name, (table.sheet.path,), (), problem=str(error))
     if not blocks and group and group[0].plan.shape is Shape.LONG:
         sheet = group[0].sheet
-        said = "has no tag such as FIC101.PV or FIC101/OP; say which belong together with --tags F"
+        column = sheet.layout.given[group[0].plan.tag]
+        said = (
+            f"has no tag such as FIC101.PV or FIC101/OP in column {column}; say which belong "
+            "together with --tags F, or name the columns with --long TAG,TIME,VALUE"
+        )
         yield Loop(sheet.name, (sheet.path,), (), problem=f"{sheet.path}: {said}")
     for name in list(blocks):
         own = tuple(blocks.pop(name))

@@ -14,6 +14,9 @@ from stiction_ros.intake.sheets.names import is_name
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
 
+SPACE = " "
+"""What stands for white space of any length."""
+
 WHOLE = 0.6
 """Share of the usual number of cells that a row of data has at least."""
 
@@ -58,11 +61,23 @@ def delimiter_of(lines: Sequence[str]) -> str:
     bare = [re.sub('"[^"]*"', "", line) for line in lines if line.strip()]
     if bare and (named := re.fullmatch(r"\s*sep=(.)\s*", bare[0])):
         return named[1]
+    spaces = [line.split() for line in bare]
+    numbers = [row for row in spaces if len(row) > 1 and all(map(is_number, row))]
+    if len(numbers) > 0.5 * len(bare) and not any(mark in "".join(bare) for mark in "\t;|"):
+        return SPACE
     for delimiter in DELIMITERS:
         counts = [line.count(delimiter) for line in bare]
         if sum(count > 0 for count in counts) > 0.5 * len(counts):
             return delimiter
+    if sum(len(row) > 1 for row in spaces) > 0.5 * len(bare):
+        return SPACE
     return max(DELIMITERS, key=lambda d: bare[0].count(d) if bare else 0)
+
+
+def spaced(line: str) -> list[str]:
+    """Return what white space separates in a line; in one without any, commas or semicolons."""
+    cells = line.split()
+    return cells if len(cells) != 1 else re.split("[,;]", cells[0])
 
 
 def layout_of(rows: Sequence[Sequence[str]]) -> Layout:

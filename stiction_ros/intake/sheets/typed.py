@@ -17,7 +17,7 @@ import numpy as np
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets import text
 from stiction_ros.intake.sheets.cells import Cells
-from stiction_ros.intake.sheets.layout import BRACKETS, Layout
+from stiction_ros.intake.sheets.layout import BRACKETS, LOOKED_AT, Layout
 from stiction_ros.intake.sheets.sheet import PIECE, Piece, RowSheet, Sheet, stem, text_sheet
 
 INSTALL = "install the extra: pip install 'stiction_ros[survey]'"
@@ -32,7 +32,7 @@ def open_sheets(path: Path) -> list[Sheet]:
     first = text.magic(path)
     if first.startswith(text.PARQUET):
         return [ParquetSheet(path)]
-    if first.startswith(text.ZIP) and path.suffix.lower() in (".xlsx", ".xlsm"):
+    if first.startswith(text.ZIP) and _holds_workbook(path):
         return _workbook(path)
     return [text_sheet(path)]
 
@@ -104,8 +104,14 @@ class _Book:
         self.path = path
         with self.damage_told(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and the like, which are not read
-            self.book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        weakref.finalize(self, self.book.close)
+            # From an open file: openpyxl asks for the end of a name.
+            files = [path.open("rb"), path.open("rb")]
+            self.book, self.formulas = (
+                openpyxl.load_workbook(file, read_only=True, data_only=values)
+                for file, values in zip(files, (True, False), strict=True)
+            )
+        for opened in (self.book, self.formulas, *files):
+            weakref.finalize(self, opened.close)
 
     @contextlib.contextmanager
     def damage_told(self) -> Iterator[None]:
@@ -115,7 +121,9 @@ class _Book:
         except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"is no workbook ({error})", where=str(self.path)) from None
+            raise InputError(
+                f"is no workbook ({error})", where=str(self.path), fix="save it as .xlsx or CSV"
+            ) from None
 
     @contextlib.contextmanager
     def rows(self, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
@@ -126,6 +134,36 @@ class _Book:
                 for line, row in enumerate(self.book[title].iter_rows(values_only=True), start=1)
             )
 
+    def refuse_unstored(self, title: str) -> None:
+        """Raise where a cell of the first rows has a formula and no value.
+
+        Raises:
+            InputError: it has, as programs that write workbooks leave it.
+        """
+        with self.damage_told():
+            pairs = zip(
+                self.formulas[title].iter_rows(max_row=LOOKED_AT),
+                self.book[title].iter_rows(max_row=LOOKED_AT),
+                strict=False,
+            )
+            for cell, value in ((c, v) for rows in pairs for c, v in zip(*rows, strict=False)):
+                if str(cell.value or "").startswith("=") and value.value is None:
+                    raise InputError(
+                        f"cell {cell.coordinate} of {title} is a formula without its value",
+                        where=str(self.path),
+                        fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
+                    )
+
+
+def _holds_workbook(path: Path) -> bool:
+    """Return whether an archive is a workbook, or is called one."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            inner = any(name.startswith("xl/workbook.") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError):
+        inner = False
+    return inner or path.suffix.lower() in (".xlsx", ".xlsm")
+
 
 def _workbook(path: Path) -> list[Sheet]:
     book = _Book(path)
@@ -134,6 +172,7 @@ def _workbook(path: Path) -> list[Sheet]:
     refused: list[InputError] = []
     for title in titles:
         try:
+            book.refuse_unstored(title)
             rows = functools.partial(book.rows, title)
             found.append(RowSheet(path, f"{stem(path)}:{title}", rows, ""))
         except InputError as error:

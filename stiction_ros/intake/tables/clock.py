@@ -36,6 +36,10 @@ SHORT = 0.05
 """Step, as a number, below which times as large as a spreadsheet's days may be such days."""
 
 
+NO_TIME = -1
+"""Place of the times of a table that has none."""
+
+
 class TimeColumn(NamedTuple):
     """Where the times stand.
 
@@ -69,11 +73,10 @@ def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
         stem, _, unit = header.rpartition("_")
         if stem.casefold() in TIME_NAMES and known_time_unit(unit) is not None:
             return TimeColumn(index)
-    first = next((piece.columns[0] for piece in sheet.pieces()), ())
-    if len(first) and (
-        (isinstance(first, np.ndarray) and first.dtype.kind == "M") or is_stamp(str(first[0]))
-    ):
-        return TimeColumn(0)
+    for index, cells in enumerate(next((piece.columns for piece in sheet.pieces()), ())):
+        dated = isinstance(cells, np.ndarray) and cells.dtype.kind == "M"
+        if len(cells) and (dated or is_stamp(str(cells[0]))):
+            return TimeColumn(index)
     return TimeColumn(sheet.column("t", "--time COLUMN"))
 
 
