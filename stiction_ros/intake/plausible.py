@@ -195,7 +195,7 @@ def _refuse_by_values(block: Block, said: str) -> None:
     if _like_percent(pv[1]):
         least, most = np.nanmin(pv[1]), np.nanmax(pv[1])
         reason = f"{said}, and {pv[0]} holds {least:.4g} to {most:.4g}"
-        raise _swapped(block, reason, "--op-unit other")
+        raise _swapped(block, reason, ("--op-unit", "other"))
 
 
 def _like_percent(values: FloatArray) -> bool:
@@ -221,8 +221,8 @@ def refuse_twice(block: Block) -> None:
                     f"one signal is given twice: {measured.name} is {output.name} at all of "
                     f"{len(block.time)} samples",
                     where=str(block.path),
-                    fix=f"name the column of the other one with --op {op.tag}=COLUMN "
-                    f"--pv {pv.tag}=COLUMN {OR_ROW}, or export it",
+                    fix=f"name the column of each with --op {op.tag}=COLUMN --pv {pv.tag}=COLUMN, or "
+                    "the tag with --tags F; export the one that is missing",
                 )
 
 
@@ -274,13 +274,13 @@ def _centred(error: FloatArray) -> bool:
     return abs(float(error.mean())) <= OFFSET * float(error.std())
 
 
-def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
+def _swapped(block: Block, reason: str, otherwise: tuple[str, ...] = ()) -> InputError:
     """Return the error of a block whose one OP and one PV look swapped.
 
     Args:
         block: as read.
         reason: why.
-        otherwise: what to say if they are not; empty names the columns as they are.
+        otherwise: what to say, too, if they are not.
     """
     op, pv = (
         next(
@@ -289,7 +289,8 @@ def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
         for signal in ("op", "pv")
     )
     exchanged = shlex.join(["--op", f"{op[0]}={pv[1]}", "--pv", f"{pv[0]}={op[1]}"])
-    as_they_are = otherwise or shlex.join(["--op", f"{op[0]}={op[1]}", "--pv", f"{pv[0]}={pv[1]}"])
+    same = ["--op", f"{op[0]}={op[1]}", "--pv", f"{pv[0]}={pv[1]}", *otherwise]
+    as_they_are = shlex.join(same)
     return InputError(
         f"OP and PV look swapped: {reason}",
         where=str(block.path),

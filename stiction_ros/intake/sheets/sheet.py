@@ -145,7 +145,9 @@ class RowSheet(Sheet):
             raise InputError("is empty", where=where, fix="give a CSV file with a header")
         self.layout = layout_of(top)
         if not self.layout.header or all(is_number(cell) for cell in self.layout.header):
-            names = (delimiter or ",").join(("t", "OP", "PV", "SP")[: max(len(top[0]), 2)])
+            names = (delimiter or ",").join(
+                ("OP", "PV") if len(top[0]) < 3 else ("t", "OP", "PV", "SP")[: len(top[0])]
+            )
             raise InputError(
                 "has no header, its first line is numbers",
                 where=where,

@@ -452,7 +452,7 @@ def _qualities(
     signal = {tag: k for k in signals if (tag := read_tag(header[k])) is not None}
     beside: dict[int, tuple[int, ...]] = {}
     whole: list[int] = []
-    names_at = {_folded(name): k for k, name in enumerate(header)}
+    names_at = {_folded(name): k for k, name in enumerate(header) if k not in places}
     for place in places:
         named, of = read_tag(header[place]), names_at.get(_folded(without_quality(header[place])))
         if named is not None:
