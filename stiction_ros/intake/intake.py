@@ -231,17 +231,17 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
             read_blocks = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
             for name, read in read_blocks.items():
                 blocks.setdefault(name, []).extend(read)
+            if not read_blocks:
+                column = table.sheet.layout.given[table.plan.tag]
+                said = (
+                    f"{table.sheet.path}: has no tag such as FIC101.PV or FIC101/OP in column "
+                    f"{column}; say which belong together with --tags F, or name the columns "
+                    "with --long TAG,TIME,VALUE"
+                )
+                yield Loop(table.sheet.name, (table.sheet.path,), (), problem=said)
         except InputError as error:
             for name in table.plan.loops or [table.sheet.name]:
                 yield Loop(name, (table.sheet.path,), (), problem=str(error))
-    if not blocks and group and group[0].plan.shape is Shape.LONG:
-        sheet = group[0].sheet
-        column = sheet.layout.given[group[0].plan.tag]
-        said = (
-            f"has no tag such as FIC101.PV or FIC101/OP in column {column}; say which belong "
-            "together with --tags F, or name the columns with --long TAG,TIME,VALUE"
-        )
-        yield Loop(sheet.name, (sheet.path,), (), problem=f"{sheet.path}: {said}")
     for name in list(blocks):
         own = tuple(blocks.pop(name))
         single = group[0].plan.shape is Shape.ONE

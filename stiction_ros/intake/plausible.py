@@ -221,7 +221,7 @@ def refuse_twice(block: Block) -> None:
                     f"one signal is given twice: {measured.name} is {output.name} at all of "
                     f"{len(block.time)} samples",
                     where=str(block.path),
-                    fix=f"name the column of each with --op {op.tag}=COLUMN --pv {pv.tag}=COLUMN, or "
+                    fix=f"name each with --op {op.tag}=COLUMN --pv {pv.tag}=COLUMN, or "
                     "the tag with --tags F; export the one that is missing",
                 )
 

@@ -136,7 +136,7 @@ def checked(block: Block, rules: Rules) -> Block:
             raise InputError(
                 f"column {column.name} holds no number{f', but {shown}' if shown else ''}",
                 where=str(block.path),
-                fix="choose others with --op TAG=COLUMN --pv TAG=COLUMN, or other tags with --tags F",
+                fix="choose others with --op TAG=COLUMN --pv TAG=COLUMN, or tags with --tags F",
             )
         if not missing.any():
             continue

@@ -10,7 +10,22 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from exports import HEADER, ROWS, STEP, check, iso, one, op, pv, said, styled, table, text, write
+from exports import (
+    HEADER,
+    ROWS,
+    STEP,
+    check,
+    iso,
+    one,
+    op,
+    pv,
+    read,
+    said,
+    styled,
+    table,
+    text,
+    write,
+)
 
 from stiction_ros.intake import CsvColumns, Loop
 from stiction_ros.records.quality import Quality
@@ -193,3 +208,23 @@ def test_a_unit_of_stamps_is_no_other_shape(tmp_path: Path) -> None:
     assert "--op TAG=COLUMN --pv TAG=COLUMN" in str(one(path).problem)
     columns = CsvColumns(op={"V": "Klappe"}, pv={"P": "Menge"})
     check(one(path, columns=columns))
+
+
+@pytest.mark.parametrize("header", [["Timestamp", "{}", "State"], ["time", "value", "Source"]])
+def test_a_file_for_each_tag_with_words_beside_is_no_long_table(
+    tmp_path: Path, header: list[str]
+) -> None:
+    for name, value in (("PV", pv), ("OP", op), ("SP", lambda k: 200.0)):
+        rows = [[iso(k), str(value(k)), "a" if k % 3 else "b"] for k in range(ROWS)]
+        given = [word.format(f"F.{name}") for word in header]
+        write(tmp_path / f"F.{name}.csv", text(rows, given))
+    check(one(tmp_path))
+
+
+def test_a_long_table_of_strange_tags_is_told_beside_others(tmp_path: Path) -> None:
+    header = ["A", "B", "C"]
+    write(tmp_path / "a.csv", text(long(), header))
+    write(tmp_path / "b.csv", text([["TT" + row[0][-2:], *row[1:]] for row in long()], header))
+    first, second = sorted(read(tmp_path), key=lambda loop: loop.name)
+    check(first)
+    assert "has no tag such as FIC101.PV or FIC101/OP in column A" in str(second.problem)

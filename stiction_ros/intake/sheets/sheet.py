@@ -68,8 +68,11 @@ class Sheet(abc.ABC):
         return []
 
     @abc.abstractmethod
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         """Yield the rows of data.
+
+        Args:
+            rows: in each piece; None takes :data:`PIECE` cells.
 
         Raises:
             InputError: the file is damaged.
@@ -165,9 +168,9 @@ class RowSheet(Sheet):
         self._names = [_plain(cell) for cell in top[self.layout.place]]
         self._again: list[tuple[int, list[str]]] = []
 
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         width = len(self.layout.header)
-        size = max(PIECE // width, 256)
+        size = rows or max(PIECE // width, 256)
         with self._rows() as opened:
             filled = (
                 (line, cells)
@@ -176,8 +179,8 @@ class RowSheet(Sheet):
             )
             data = self._by_name(itertools.islice(filled, self.layout.first, None))
             while piece := list(itertools.islice(data, size)):
-                lines, rows = zip(*piece, strict=True)
-                padded = [row[:width] + [""] * (width - len(row)) for row in rows]
+                lines, cells = zip(*piece, strict=True)
+                padded = [row[:width] + [""] * (width - len(row)) for row in cells]
                 yield Piece(list(zip(*padded, strict=True)), np.array(lines))
 
     def _by_name(self, rows: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import datetime
 import functools
+import re
 import warnings
 import weakref
 import zipfile
@@ -17,10 +18,18 @@ import numpy as np
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets import text
 from stiction_ros.intake.sheets.cells import Cells
-from stiction_ros.intake.sheets.layout import BRACKETS, LOOKED_AT, Layout
+from stiction_ros.intake.sheets.layout import BRACKETS, Layout
 from stiction_ros.intake.sheets.sheet import PIECE, Piece, RowSheet, Sheet, stem, text_sheet
 
 INSTALL = "install the extra: pip install 'stiction_ros[survey]'"
+
+TOP = 1 << 16
+"""Bytes of a sheet in which formulas without values are looked for."""
+
+UNSTORED = re.compile(
+    rb'<c r="([A-Z]+\d+)"[^>]*><f(?:[^>]*/>|[^>]*>[^<]*</f>)(?:<v */>|<v></v>)?</c>'
+)
+"""A cell with a formula and no value."""
 
 
 def open_sheets(path: Path) -> list[Sheet]:
@@ -62,8 +71,8 @@ class ParquetSheet(Sheet):
     def row_word(self) -> str:
         return "row"
 
-    def pieces(self) -> Iterator[Piece]:
-        size = max(PIECE // max(len(self.layout.header), 1), 256)
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
+        size = rows or max(PIECE // max(len(self.layout.header), 1), 256)
         first = 1
         with self._open() as file:
             for batch in file.iter_batches(batch_size=size):
@@ -105,12 +114,9 @@ class _Book:
         with self.damage_told(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and the like, which are not read
             # From an open file: openpyxl asks for the end of a name.
-            files = [path.open("rb"), path.open("rb")]
-            self.book, self.formulas = (
-                openpyxl.load_workbook(file, read_only=True, data_only=values)
-                for file, values in zip(files, (True, False), strict=True)
-            )
-        for opened in (self.book, self.formulas, *files):
+            file = path.open("rb")
+            self.book = openpyxl.load_workbook(file, read_only=True, data_only=True)
+        for opened in (self.book, file):
             weakref.finalize(self, opened.close)
 
     @contextlib.contextmanager
@@ -135,24 +141,23 @@ class _Book:
             )
 
     def refuse_unstored(self, title: str) -> None:
-        """Raise where a cell of the first rows has a formula and no value.
+        """Raise where a cell at the top has a formula and no value.
 
         Raises:
             InputError: it has, as programs that write workbooks leave it.
         """
-        with self.damage_told():
-            pairs = zip(
-                self.formulas[title].iter_rows(max_row=LOOKED_AT),
-                self.book[title].iter_rows(max_row=LOOKED_AT),
-                strict=False,
+        with (
+            self.damage_told(),
+            zipfile.ZipFile(self.path) as archive,
+            archive.open(self.book[title]._worksheet_path) as file,
+        ):
+            found = UNSTORED.search(file.read(TOP))
+        if found:
+            raise InputError(
+                f"cell {found[1].decode()} of {title} is a formula without its value",
+                where=str(self.path),
+                fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
             )
-            for cell, value in ((c, v) for rows in pairs for c, v in zip(*rows, strict=False)):
-                if str(cell.value or "").startswith("=") and value.value is None:
-                    raise InputError(
-                        f"cell {cell.coordinate} of {title} is a formula without its value",
-                        where=str(self.path),
-                        fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
-                    )
 
 
 def _holds_workbook(path: Path) -> bool:

@@ -73,7 +73,7 @@ def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
         stem, _, unit = header.rpartition("_")
         if stem.casefold() in TIME_NAMES and known_time_unit(unit) is not None:
             return TimeColumn(index)
-    for index, cells in enumerate(next((piece.columns for piece in sheet.pieces()), ())):
+    for index, cells in enumerate(next((piece.columns for piece in sheet.pieces(1)), ())):
         dated = isinstance(cells, np.ndarray) and cells.dtype.kind == "M"
         if len(cells) and (dated or is_stamp(str(cells[0]))):
             return TimeColumn(index)

@@ -85,7 +85,8 @@ def plan_of(sheet: Sheet, options: IntakeOptions, tags: TagList | None) -> Plan:
         InputError: a column is missing or there twice, or the options do not fit.
     """
     columns = options.columns
-    top = next((piece.columns for piece in sheet.pieces()), [[] for _ in sheet.layout.header])
+    empty: Sequence[Cells] = [[] for _ in sheet.layout.header]
+    top = next((piece.columns for piece in sheet.pieces(LOOKED_AT)), empty)
     if options.long is None and (columns.op or columns.pv or options.as_given):
         return _one_loop(sheet, options, top)
     long = _long(sheet, options, tags, top)
@@ -142,20 +143,24 @@ def _long_by_shape(
     sheet: Sheet, named: str | None, tags: TagList | None, top: Sequence[Cells]
 ) -> tuple[int, TimeColumn, int] | None:
     """Return the columns of tag, time and value by what stands in them; None for another table."""
-    header = sheet.layout.header
-    if any(told is not None and told.signal in ("op", "pv") for told in map(read_tag, header)):
+    header, read = sheet.layout.header, read_tag if tags is None else tags.read
+    here = [told for told in map(read, header) if told is not None]
+    if any(told.loop or told.signal in ("op", "pv") for told in here):
         return None
     kinds = [_kind(cells) for cells in top]
-    texts = [k for k, kind in enumerate(kinds) if kind == "text" and _repeats(top[k])]
-    tag = next((k for k in texts if _names_signals(top[k], tags)), None)
+    beside = {_first(sheet, UNIT_NAMES), *_quality_places(sheet, (), top)}
+    texts = [
+        k for k, kind in enumerate(kinds) if kind == "text" and _repeats(top[k]) and k not in beside
+    ]
+    tag = next((k for k in texts if any(t.loop for t in map(read, set(top[k])) if t)), None)
     stamps = [k for k, kind in enumerate(kinds) if kind == "stamp" and not _still(top[k])]
-    if not stamps or (tag is None and len(texts) != 1):
+    if not stamps or (tag is None and (len(texts) != 1 or read(sheet.name))):
         return None
     listed = [k for k in stamps if header[k].casefold() in TIME_NAMES]
     time = time_column(sheet, named) if named else TimeColumn((listed or stamps)[0])
     place = texts[0] if tag is None else tag
     numbers = [k for k, kind in enumerate(kinds) if kind == "number" and k != time.place]
-    values = [k for k in numbers if quality_kind(header[k]) is None]
+    values = [k for k in numbers if k not in beside]
     if len(values) > 1:
         values = [k for k in values if not _is_count(top[k], top[place])] or values
     if len(values) > 1:
@@ -179,7 +184,7 @@ def _kind(cells: Cells) -> str:
         return "stamp" if cells.dtype.kind == "M" else "number"
     counts = Counter(
         "stamp" if is_stamp(cell) else "number" if is_number(cell) else "text"
-        for cell in cells[:LOOKED_AT]
+        for cell in cells[:: max(len(cells) // 100, 1)]
         if cell.strip()
     )
     return counts.most_common(1)[0][0] if counts else ""
@@ -190,15 +195,7 @@ def _repeats(cells: Cells) -> bool:
 
 
 def _still(cells: Cells) -> bool:
-    return len(cells) > 1 and len(set(cells[:LOOKED_AT])) == 1
-
-
-def _names_signals(cells: Cells, tags: TagList | None) -> bool:
-    for word in set(cells):
-        told = read_tag(str(word)) if tags is None else tags.read(str(word))
-        if told is not None and told.loop:
-            return True
-    return False
+    return len(cells) > 1 and len(set(cells)) == 1
 
 
 def _is_count(cells: Cells, names: Cells) -> bool:
