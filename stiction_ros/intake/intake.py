@@ -23,7 +23,7 @@ from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
 from stiction_ros.records.storage.files import METADATA
 
 OTHERS = 8
-"""Loops that an error lists."""
+"""Names that an error or a remark lists."""
 
 
 def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:

@@ -228,3 +228,23 @@ def test_a_long_table_of_strange_tags_is_told_beside_others(tmp_path: Path) -> N
     first, second = sorted(read(tmp_path), key=lambda loop: loop.name)
     check(first)
     assert "has no tag such as FIC101.PV or FIC101/OP in column A" in str(second.problem)
+
+
+def test_tags_above_columns_that_are_all_called_value(tmp_path: Path) -> None:
+    tags = "F.PV,,F.OP,,F.SP\n"
+    rows = shifted(["Timestamp", "Value", "Timestamp", "Value", "Timestamp", "Value"])
+    loop = one(write(tmp_path / "a.csv", tags + rows))
+    check_shifted(loop)
+    assert set(loop.columns.values()) == {"F.PV", "F.OP", "F.SP"}
+
+
+def test_one_value_a_row_with_date_and_time_of_day(tmp_path: Path) -> None:
+    rows = [[tag, *stamp.split(), value] for tag, stamp, value in long()]
+    loop = one(write(tmp_path / "a.csv", text(rows, ["Tag", "Date", "Time", "Result"])))
+    check(loop)
+    assert "2024-10-17" in loop.summary
+
+
+def test_one_value_a_row_with_times_as_numbers(tmp_path: Path) -> None:
+    rows = [[tag, str(10 * (k // 3)), value] for k, (tag, _, value) in enumerate(long())]
+    check(one(write(tmp_path / "a.csv", text(rows, ["point", "t", "v"]))))

@@ -11,13 +11,10 @@ from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
-from stiction_ros.intake.intake import is_bag, strange_files
+from stiction_ros.intake.intake import OTHERS, is_bag, strange_files
 from stiction_ros.intake.intake_options import OpUnit, TimeUnit
 from stiction_ros.intake.repairs import plural
 from stiction_ros.intake.sheets.stamps import DateOrder
-
-NAMED = 8
-"""Names that a remark lists."""
 
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
@@ -186,8 +183,8 @@ def tell_strangers(file: str | Path | None, what: str, names: Sequence[str]) -> 
         names: that nothing has.
     """
     if names:
-        more = " and others" if len(names) > NAMED else ""
-        print(f"{file}: no {what} is called {', '.join(names[:NAMED])}{more}", file=sys.stderr)
+        more = " and others" if len(names) > OTHERS else ""
+        print(f"{file}: no {what} is called {', '.join(names[:OTHERS])}{more}", file=sys.stderr)
 
 
 def _signals(loop: Loop) -> Iterator[str]:

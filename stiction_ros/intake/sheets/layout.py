@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number, is_stamp
-from stiction_ros.intake.sheets.names import is_name
+from stiction_ros.intake.sheets.names import VALUE_NAMES, is_name, read_tag
 
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
@@ -94,7 +94,11 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
         return Layout((), (), (), first, 0)
     width = len(rows[first]) if first < len(rows) else max(map(len, above))
     place = _header_place(above, width)
-    given = tuple(" ".join(cell.split()) for cell in above[place])
+    given = [" ".join(cell.split()) for cell in above[place]]
+    alike = [k for k, name in enumerate(given) if place and name.casefold() in VALUE_NAMES]
+    for k in alike if len(alike) > 1 else ():  # their tags stand above them
+        near = next((cell for cell in above[place - 1][k::-1] if cell.strip()), "")
+        given[k] = " ".join(near.split()) if read_tag(near) else given[k]
     header, units = [], []
     for name in given:
         found = BRACKETS.search(name)
@@ -108,7 +112,7 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
             below.remove(row)
             break
     skipped = place + len(below)
-    return Layout(tuple(header), given, tuple(units), first, skipped, told + place)
+    return Layout(tuple(header), tuple(given), tuple(units), first, skipped, told + place)
 
 
 def _paired(units: Sequence[str], row: Sequence[str]) -> list[tuple[str, str]]:

@@ -23,9 +23,6 @@ from stiction_ros.intake.sheets.sheet import PIECE, Piece, RowSheet, Sheet, stem
 
 INSTALL = "install the extra: pip install 'stiction_ros[survey]'"
 
-TOP = 1 << 16
-"""Bytes of a sheet in which formulas without values are looked for."""
-
 UNSTORED = re.compile(
     rb'<c r="([A-Z]+\d+)"[^>]*><f(?:[^>]*/>|[^>]*>[^<]*</f>)(?:<v */>|<v></v>)?</c>'
 )
@@ -151,7 +148,7 @@ class _Book:
             zipfile.ZipFile(self.path) as archive,
             archive.open(self.book[title]._worksheet_path) as file,
         ):
-            found = UNSTORED.search(file.read(TOP))
+            found = UNSTORED.search(file.read(PIECE))
         if found:
             raise InputError(
                 f"cell {found[1].decode()} of {title} is a formula without its value",

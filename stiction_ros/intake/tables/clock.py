@@ -36,10 +36,6 @@ SHORT = 0.05
 """Step, as a number, below which times as large as a spreadsheet's days may be such days."""
 
 
-NO_TIME = -1
-"""Place of the times of a table that has none."""
-
-
 class TimeColumn(NamedTuple):
     """Where the times stand.
 
@@ -50,6 +46,10 @@ class TimeColumn(NamedTuple):
 
     place: int
     beside: int | None = None
+
+
+ROWS_APART = TimeColumn(-1)
+"""That of a table whose rows are a sample time apart, without times."""
 
 
 def time_column(sheet: Sheet, name: str | None) -> TimeColumn:

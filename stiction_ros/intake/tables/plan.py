@@ -27,16 +27,13 @@ from stiction_ros.intake.sheets.names import (
 )
 from stiction_ros.intake.sheets.sheet import Sheet, stem
 from stiction_ros.intake.tables.block import Key
-from stiction_ros.intake.tables.clock import NO_TIME, TimeColumn, time_column
+from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, time_column
 from stiction_ros.intake.tables.qualities import all_of_quality
 from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE, tagged_columns
 
 LOOKED_AT = 1000
 """Rows by which it is told what stands in a column."""
-
-FEWEST = 10
-"""Rows from which it is told that values do not repeat themselves."""
 
 OPTIONS = {"op": "--op TAG=COLUMN", "pv": "--pv TAG=COLUMN", "sp": "--sp TAG=COLUMN"}
 
@@ -153,11 +150,11 @@ def _long_by_shape(
         k for k, kind in enumerate(kinds) if kind == "text" and _repeats(top[k]) and k not in beside
     ]
     tag = next((k for k in texts if any(t.loop for t in map(read, set(top[k])) if t)), None)
-    stamps = [k for k, kind in enumerate(kinds) if kind == "stamp" and not _still(top[k])]
+    stamps = [k for k in range(len(top)) if _is_clock(header[k], top[k]) and not _still(top[k])]
     if not stamps or (tag is None and (len(texts) != 1 or read(sheet.name))):
         return None
     listed = [k for k in stamps if header[k].casefold() in TIME_NAMES]
-    time = time_column(sheet, named) if named else TimeColumn((listed or stamps)[0])
+    time = time_column(sheet, named) if named or listed else TimeColumn(stamps[0])
     place = texts[0] if tag is None else tag
     numbers = [k for k, kind in enumerate(kinds) if kind == "number" and k != time.place]
     values = [k for k in numbers if k not in beside]
@@ -283,7 +280,7 @@ def _times(
             raise
         if options.sample_time is not None:
             note = f"no column holds a time: rows are taken {options.sample_time:g} s apart"
-            return TimeColumn(NO_TIME), {}, [note]
+            return ROWS_APART, {}, [note]
         raise InputError(
             "has no column t",
             where=str(sheet.path),
@@ -480,7 +477,7 @@ def _quality_places(sheet: Sheet, taken: Collection[int | None], top: Sequence[C
 
 def _few(cells: Cells) -> bool:
     """Return whether cells are words, or whole numbers and shares of few kinds, as codes are."""
-    return _kind(cells) in ("text", "") or _repeats(cells) or len(cells) < FEWEST
+    return _kind(cells) in ("text", "") or _repeats(cells)
 
 
 def _folded(name: str) -> str:

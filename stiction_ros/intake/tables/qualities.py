@@ -10,12 +10,6 @@ from stiction_ros.intake.sheets.cells import BAD_WORDS, Words, number
 from stiction_ros.intake.sheets.names import quality_kind
 from stiction_ros.intake.words import WORDS, pattern_of
 
-OPC_GOOD = 192
-"""Codes of OPC from which a value is good."""
-
-OPC_UA_UNCERTAIN = 2**30
-"""Codes of OPC UA from which a value is uncertain or bad; 0 is good."""
-
 _BAD, _GOOD = tuple(WORDS["bad_beginnings"]), pattern_of("good_words")
 _YES, _NO = tuple(WORDS["yes_words"]), tuple(WORDS["no_words"])
 
@@ -69,8 +63,8 @@ def _bad_codes(codes: dict[str, float], kind: str) -> dict[str, bool | None]:
     if most == 100.0 or (kind == "sure" and most < 100.0):
         half = 50.0 if most > 1.0 else 0.5
         return {word: code < half for word, code in codes.items()}
-    if most >= OPC_UA_UNCERTAIN:
-        return {word: code >= OPC_UA_UNCERTAIN for word, code in codes.items()}
-    if most >= OPC_GOOD:
-        return {word: code < OPC_GOOD for word, code in codes.items()}
+    if most >= WORDS["opc_ua_uncertain"]:
+        return {word: code >= WORDS["opc_ua_uncertain"] for word, code in codes.items()}
+    if most >= WORDS["opc_good"]:
+        return {word: code < WORDS["opc_good"] for word, code in codes.items()}
     return dict.fromkeys(codes)

@@ -17,7 +17,7 @@ from stiction_ros.intake.sheets.names import read_tag, unit_in
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Stamps
 from stiction_ros.intake.tables.block import Block, Clock, Column, FlagArray, Key
-from stiction_ros.intake.tables.clock import NO_TIME, TimeColumn, in_seconds
+from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
 from stiction_ros.intake.tables.plan import Plan, Shape
 from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
@@ -57,7 +57,7 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
     lines: list[NDArray[np.int64]] = []
     for piece in sheet.pieces():
         for clock, cells in stamps.items():
-            if clock.place != NO_TIME:
+            if clock != ROWS_APART:
                 cells.add(_stamp_cells(piece.columns, clock))
         for accumulated in (numbers, words):
             for index, column in accumulated.items():
@@ -154,7 +154,7 @@ def _times(
     lines: NDArray[np.int64],
 ) -> _Timed:
     index = place.place
-    if index == NO_TIME:
+    if place == ROWS_APART:
         apart = (options.sample_time or 1.0) * np.arange(len(lines), dtype=np.float64)
         return _Timed(apart, Clock(0.0, dated=False, zoned=False), "", "")
     times = stamps.times(str(sheet.path))
