@@ -13,7 +13,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.modes import manual_marked
-from stiction_ros.intake.plausible import in_percent, refuse_swapped
+from stiction_ros.intake.plausible import in_percent, refuse_swapped, refuse_twice
 from stiction_ros.intake.repairs import (
     Rules,
     checked,
@@ -65,6 +65,8 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     """
     _refuse_incomplete(found)
     rules = Rules(options.strict)
+    for note, block in {note: one for one in found.blocks for note in one.mended}.items():
+        rules.tell(note, block, note)
     timed = [with_times(block, rules) for block in found.blocks]
     if not options.as_given:
         timed = [with_values(block, rules, shared=found.shared) for block in timed]
@@ -79,6 +81,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     block = without_outliers(block, rules)
     unit = "its own unit"
     if not options.as_given:
+        refuse_twice(block)
         block, unit, note = in_percent(block, options.op_unit, named=found.named)
         rules.told.extend([note] if note else [])
         if not found.named:

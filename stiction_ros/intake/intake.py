@@ -23,7 +23,7 @@ from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
 from stiction_ros.records.storage.files import METADATA
 
 OTHERS = 8
-"""Loops that an error lists."""
+"""Names that an error or a remark lists."""
 
 
 def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
@@ -231,13 +231,17 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
             read_blocks = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
             for name, read in read_blocks.items():
                 blocks.setdefault(name, []).extend(read)
+            if not read_blocks:
+                column = table.sheet.layout.given[table.plan.tag]
+                said = (
+                    f"{table.sheet.path}: has no tag such as FIC101.PV or FIC101/OP in column "
+                    f"{column}; say which belong together with --tags F, or name the columns "
+                    "with --long TAG,TIME,VALUE"
+                )
+                yield Loop(table.sheet.name, (table.sheet.path,), (), problem=said)
         except InputError as error:
             for name in table.plan.loops or [table.sheet.name]:
                 yield Loop(name, (table.sheet.path,), (), problem=str(error))
-    if not blocks and group and group[0].plan.shape is Shape.LONG:
-        sheet = group[0].sheet
-        said = "has no tag such as FIC101.PV or FIC101/OP; say which belong together with --tags F"
-        yield Loop(sheet.name, (sheet.path,), (), problem=f"{sheet.path}: {said}")
     for name in list(blocks):
         own = tuple(blocks.pop(name))
         single = group[0].plan.shape is Shape.ONE

@@ -20,6 +20,15 @@ class OpUnit(enum.StrEnum):
     """0 to 1."""
     CURRENT = "ma"
     """4 to 20 mA."""
+    PSI = "psi"
+    """3 to 15 psi, see IEC 60382."""
+    BAR = "bar"
+    """0.2 to 1 bar, see IEC 60382."""
+    KILOPASCAL = "kpa"
+    """20 to 100 kPa, see IEC 60382."""
+    VOLT_10 = "0-10v"
+    VOLT_1_5 = "1-5v"
+    VOLT_2_10 = "2-10v"
     OTHER = "other"
     """Anything else; OP is taken as it is."""
 
@@ -28,6 +37,12 @@ TO_PERCENT = {
     OpUnit.PERCENT: (1.0, 0.0),
     OpUnit.SHARE: (100.0, 0.0),
     OpUnit.CURRENT: (6.25, -25.0),
+    OpUnit.PSI: (100.0 / 12.0, -25.0),
+    OpUnit.BAR: (125.0, -25.0),
+    OpUnit.KILOPASCAL: (1.25, -25.0),
+    OpUnit.VOLT_10: (10.0, 0.0),
+    OpUnit.VOLT_1_5: (25.0, -25.0),
+    OpUnit.VOLT_2_10: (12.5, -25.0),
     OpUnit.OTHER: (1.0, 0.0),
 }
 """Factor and offset that make % of an OP."""
@@ -101,7 +116,9 @@ class IntakeOptions:
         op_unit: of every OP; None takes it from the export.
         time_unit: of times that are numbers; None takes it from the export.
         dates: which comes first in dates; None finds out.
-        sample_time: s, of signals that were reported when they changed; None finds it.
+        sample_time: s, of signals that were reported when they changed, and of rows without a
+            time; None finds it.
+        long: columns of tag, time and value of tables with one value a row; None finds them.
         automatic: what MODE shows in automatic; None knows the usual words.
         as_given: whether signals are taken as they are: OP and numbers as times are not brought
             to another unit, and nothing is asked.
@@ -115,6 +132,7 @@ class IntakeOptions:
     time_unit: TimeUnit | None = None
     dates: DateOrder | None = None
     sample_time: float | None = None
+    long: tuple[str, ...] | None = None
     automatic: tuple[str, ...] | None = None
     as_given: bool = False
 

@@ -105,10 +105,12 @@ def _not_automatic(
         told = _by_movement(block, codes, shown)
         if told is not None:
             return told
+    moved = _moves(block, codes, shown)
+    likely = max(sorted(unknown), key=lambda word: max(moved.get(word, [0.0])))
     raise InputError(
         f"{name} shows {', '.join(sorted(words))}, of which it is not known which is automatic",
         where=str(block.path),
-        fix=f"say which with --auto, such as --auto {shlex.quote(sorted(unknown)[-1])}",
+        fix=f"say which with --auto, such as --auto {shlex.quote(likely)}",
     )
 
 
@@ -136,6 +138,16 @@ def _by_movement(
     block: Block, codes: np.ndarray[tuple[int], np.dtype[np.intp]], shown: dict[int, str]
 ) -> set[str] | None:
     """Return the modes in which OP stands still while it moves in others; None when unclear."""
+    shares = _moves(block, codes, shown)
+    still = {word for word, moved in shares.items() if max(moved) <= STILL}
+    busy = {word for word, moved in shares.items() if max(moved) >= BUSY}
+    return still if busy and still | busy == set(shown.values()) else None
+
+
+def _moves(
+    block: Block, codes: np.ndarray[tuple[int], np.dtype[np.intp]], shown: dict[int, str]
+) -> dict[str, list[float]]:
+    """Return the share of samples at which each OP moves, by mode."""
     shares: dict[str, list[float]] = {}
     for key, column in block.columns.items():
         if key.signal != "op":
@@ -147,6 +159,4 @@ def _by_movement(
         for code, word in shown.items():
             if (chosen := inside & (modes == code)).any():
                 shares.setdefault(word, []).append(float(np.mean(moving[chosen])))
-    still = {word for word, moved in shares.items() if max(moved) <= STILL}
-    busy = {word for word, moved in shares.items() if max(moved) >= BUSY}
-    return still if busy and still | busy == set(shown.values()) else None
+    return shares

@@ -12,6 +12,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block
+from stiction_ros.intake.words import WORDS as SAID
 
 PERCENT = (-10.0, 110.0)
 """What an OP in % stays within."""
@@ -36,8 +37,21 @@ while the move grows. Of the field's loops 1 in 160 is called swapped as it is, 
 that are.
 """
 
-WORDS = {OpUnit.PERCENT: "%", OpUnit.SHARE: "0 to 1", OpUnit.CURRENT: "4 to 20 mA"}
+WORDS = {
+    OpUnit.PERCENT: "%",
+    OpUnit.SHARE: "0 to 1",
+    OpUnit.CURRENT: "4 to 20 mA",
+    OpUnit.PSI: "3 to 15 psi",
+    OpUnit.BAR: "0.2 to 1 bar",
+    OpUnit.KILOPASCAL: "20 to 100 kPa",
+    OpUnit.VOLT_10: "0 to 10 V",
+    OpUnit.VOLT_1_5: "1 to 5 V",
+    OpUnit.VOLT_2_10: "2 to 10 V",
+}
 """Units of an OP as notes name them."""
+
+SEVERAL = frozenset(SAID["several"])
+"""Units of OP of which several ranges are usual."""
 
 OWN = "its own unit"
 """What stands for the unit of an OP that is not known to be in %."""
@@ -73,6 +87,14 @@ def in_percent(
         if key.signal == "op" and column.unit
     ]
     unit = given or (units[0] if units else None)
+    for key, column in block.columns.items():
+        if not given and key.signal == "op" and column.unit.casefold() in SEVERAL:
+            raise InputError(
+                f"{column.name} is in {column.unit}, of which several ranges are usual",
+                where=str(block.path),
+                fix="say which with --op-unit 0-10v, --op-unit 1-5v or --op-unit 2-10v, or take "
+                f"OP as it is with --op-unit other {OR_ROW}",
+            )
     ops = [column.values for key, column in block.columns.items() if key.signal == "op"]
     note = ""
     if unit is None:
@@ -106,8 +128,7 @@ def in_percent(
     factor, offset = TO_PERCENT[unit]
     if unit is OpUnit.OTHER:
         return block, OWN, ""
-    by = "OP is said to be in" if given else "the export says"
-    note = _fits(block, unit, by, named=named)
+    note = _fits(block, unit, given=given is not None, named=named)
     if (factor, offset) == (1.0, 0.0):
         return block, "%", note
     columns = {
@@ -120,20 +141,20 @@ def in_percent(
     return dataclasses.replace(block, columns=columns), "%", "; ".join(filter(None, notes))
 
 
-def _fits(block: Block, unit: OpUnit, by: str, *, named: bool) -> str:
+def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
     """Return a note where OP often lies below its unit, as one without its mean does.
 
     Args:
         block: as read.
         unit: of its OP.
-        by: who says so, in words.
+        given: whether a user says so, else the export.
         named: whether a user said which column is OP.
 
     Raises:
         InputError: the median, or many samples, lie outside of the unit.
     """
     factor, offset = TO_PERCENT[unit]
-    note = ""
+    note, by = "", "OP is said to be in" if given else "the export says"
     for key, column in block.columns.items():
         values = column.values[np.isfinite(column.values)]
         if key.signal != "op" or not len(values):
@@ -147,7 +168,8 @@ def _fits(block: Block, unit: OpUnit, by: str, *, named: bool) -> str:
             )
             if not named:
                 _refuse_by_values(block, said)
-            fix = "leave --op-unit out or say another one; --op-unit other takes OP as it is"
+            out = "leave --op-unit out or say another one" if given else "say another --op-unit"
+            fix = f"{out}; --op-unit other takes OP as it is"
             raise InputError(said, where=str(block.path), fix=fix)
         if float(np.mean(percent < PERCENT[0])) >= OFTEN:
             note = (
@@ -173,12 +195,35 @@ def _refuse_by_values(block: Block, said: str) -> None:
     if _like_percent(pv[1]):
         least, most = np.nanmin(pv[1]), np.nanmax(pv[1])
         reason = f"{said}, and {pv[0]} holds {least:.4g} to {most:.4g}"
-        raise _swapped(block, reason, "--op-unit other")
+        raise _swapped(block, reason, ("--op-unit", "other"))
 
 
 def _like_percent(values: FloatArray) -> bool:
     there = values[np.isfinite(values)]
     return bool(len(there)) and PERCENT[0] <= there.min() and bool(there.max() <= PERCENT[1])
+
+
+def refuse_twice(block: Block) -> None:
+    """Raise where PV is OP at every sample, as when one tag is listed for both.
+
+    Raises:
+        InputError: one signal is given twice.
+    """
+    for op, output in block.columns.items():
+        for pv, measured in block.columns.items():
+            if (op.signal, pv.signal) != ("op", "pv"):
+                continue
+            there = output.values[np.isfinite(output.values)]
+            if np.any(there != there[:1]) and np.array_equal(
+                output.values, measured.values, equal_nan=True
+            ):
+                raise InputError(
+                    f"one signal is given twice: {measured.name} is {output.name} at all of "
+                    f"{len(block.time)} samples",
+                    where=str(block.path),
+                    fix=f"name each with --op {op.tag}=COLUMN --pv {pv.tag}=COLUMN, or "
+                    "the tag with --tags F; export the one that is missing",
+                )
 
 
 def refuse_swapped(block: Block) -> None:
@@ -229,13 +274,13 @@ def _centred(error: FloatArray) -> bool:
     return abs(float(error.mean())) <= OFFSET * float(error.std())
 
 
-def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
+def _swapped(block: Block, reason: str, otherwise: tuple[str, ...] = ()) -> InputError:
     """Return the error of a block whose one OP and one PV look swapped.
 
     Args:
         block: as read.
         reason: why.
-        otherwise: what to say if they are not; empty names the columns as they are.
+        otherwise: what to say, too, if they are not.
     """
     op, pv = (
         next(
@@ -244,7 +289,8 @@ def _swapped(block: Block, reason: str, otherwise: str = "") -> InputError:
         for signal in ("op", "pv")
     )
     exchanged = shlex.join(["--op", f"{op[0]}={pv[1]}", "--pv", f"{pv[0]}={op[1]}"])
-    as_they_are = otherwise or shlex.join(["--op", f"{op[0]}={op[1]}", "--pv", f"{pv[0]}={pv[1]}"])
+    same = ["--op", f"{op[0]}={op[1]}", "--pv", f"{pv[0]}={pv[1]}", *otherwise]
+    as_they_are = shlex.join(same)
     return InputError(
         f"OP and PV look swapped: {reason}",
         where=str(block.path),

@@ -137,7 +137,7 @@ def checked(block: Block, rules: Rules) -> Block:
             raise InputError(
                 f"column {column.name} holds no number{f', but {shown}' if shown else ''}",
                 where=str(block.path),
-                fix=f"choose another one with --{key.signal} TAG=COLUMN",
+                fix="choose others with --op TAG=COLUMN --pv TAG=COLUMN, or tags with --tags F",
             )
         if not missing.any():
             continue
@@ -374,7 +374,8 @@ def filled(block: Block, rules: Rules) -> Block:
         if not missing.any():
             continue
         if key.signal in ("sp", "stem") and missing.mean() > 0.5:
-            rules.told.append(f"{column.name} is missing at more than half of the rows, left out")
+            note = f"{column.name} is missing at more than half of the rows, left out"
+            rules.tell(note, block, note)
             columns = {k: c for k, c in columns.items() if k.signal != key.signal}
             continue
         short = missing if key.signal == "sp" else _short(missing)
@@ -387,12 +388,12 @@ def filled(block: Block, rules: Rules) -> Block:
     mask[held & (mask == Quality.GOOD)] = Quality.HELD
     mask[bad] = Quality.BAD
     if held.any():
-        rules.told.append(
-            f"{plural(int(held.sum()), 'sample')} held over at most {HELD} in a row (PV between "
-            "its neighbours)"
-        )
+        samples = plural(int(held.sum()), "sample")
+        note = f"{samples} held over at most {HELD} in a row (PV between its neighbours)"
+        rules.tell(note, block, f"{samples} missing in OP or PV")
     if (bad & ~given).any():
-        rules.told.append(f"{plural(int((bad & ~given).sum()), 'sample')} bad, cut out")
+        note = f"{plural(int((bad & ~given).sum()), 'sample')} bad"
+        rules.tell(f"{note}, cut out", block, note)
     return dataclasses.replace(block, columns=columns, mask=mask if mask.any() else None)
 
 

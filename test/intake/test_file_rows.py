@@ -174,7 +174,7 @@ def test_a_column_that_the_file_lacks_is_told(tmp_path: Path) -> None:
         ("file,dates\na.csv,ymd\n", "line 2: dates ymd is unknown; use dmy, mdy"),
         ("file,time_unit\na.csv,weeks\n", "line 2: time_unit weeks is unknown; use ms"),
         ("file,op_unit,sample_time\na.csv,,-1\n", "line 2: sample_time -1 is none"),
-        ("file,op_unit\na.csv,bar\n", "line 2: unit 'bar' of OP is unknown"),
+        ("file,op_unit\na.csv,rpm\n", "line 2: unit 'rpm' of OP is unknown"),
         ("file,loop,pv,op\na.csv,,PV,OP\n", "line 2: names tags and no loop"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,13 +11,10 @@ from typing import Any
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
-from stiction_ros.intake.intake import is_bag, strange_files
+from stiction_ros.intake.intake import OTHERS, is_bag, strange_files
 from stiction_ros.intake.intake_options import OpUnit, TimeUnit
 from stiction_ros.intake.repairs import plural
 from stiction_ros.intake.sheets.stamps import DateOrder
-
-NAMED = 8
-"""Names that a remark lists."""
 
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +71,16 @@ def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
         "--dates", type=DateOrder, choices=tuple(DateOrder), help="day or month first in dates"
     )
     group.add_argument(
-        "--sample-time", type=float, metavar="S", help="s, for signals kept when they changed"
+        "--sample-time",
+        type=float,
+        metavar="S",
+        help="s, for signals kept when they changed and for rows without a time",
+    )
+    group.add_argument(
+        "--long",
+        type=_three,
+        metavar="TAG,TIME,VALUE",
+        help="columns of a table with one value a row, where they are not found",
     )
     group.add_argument(
         "--auto", action="append", metavar="WORD", help="what MODE shows in automatic"
@@ -115,6 +122,7 @@ def intake_options(options: argparse.Namespace) -> IntakeOptions:
         time_unit=options.time_unit,
         dates=options.dates,
         sample_time=step,
+        long=options.long,
         automatic=None if options.auto is None else tuple(options.auto),
     )
 
@@ -175,8 +183,8 @@ def tell_strangers(file: str | Path | None, what: str, names: Sequence[str]) -> 
         names: that nothing has.
     """
     if names:
-        more = " and others" if len(names) > NAMED else ""
-        print(f"{file}: no {what} is called {', '.join(names[:NAMED])}{more}", file=sys.stderr)
+        more = " and others" if len(names) > OTHERS else ""
+        print(f"{file}: no {what} is called {', '.join(names[:OTHERS])}{more}", file=sys.stderr)
 
 
 def _signals(loop: Loop) -> Iterator[str]:
@@ -190,6 +198,13 @@ def _signals(loop: Loop) -> Iterator[str]:
 def tell(loop: Loop) -> None:
     """Print sample time, span and unit of a loop to standard error."""
     print(f"{loop.name}: {loop.summary}", file=sys.stderr)
+
+
+def _three(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in next(csv.reader([text])))
+    if len(names) != 3 or not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r} is not TAG,TIME,VALUE")
+    return names
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -9,10 +9,13 @@ from collections import Counter
 from collections.abc import Sequence
 
 from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number, is_stamp
-from stiction_ros.intake.sheets.names import is_name
+from stiction_ros.intake.sheets.names import VALUE_NAMES, is_name, read_tag
 
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
+
+SPACE = " "
+"""What stands for white space of any length."""
 
 WHOLE = 0.6
 """Share of the usual number of cells that a row of data has at least."""
@@ -58,11 +61,23 @@ def delimiter_of(lines: Sequence[str]) -> str:
     bare = [re.sub('"[^"]*"', "", line) for line in lines if line.strip()]
     if bare and (named := re.fullmatch(r"\s*sep=(.)\s*", bare[0])):
         return named[1]
+    spaces = [line.split() for line in bare]
+    numbers = [row for row in spaces if len(row) > 1 and all(map(is_number, row))]
+    if len(numbers) > 0.5 * len(bare) and not any(mark in "".join(bare) for mark in "\t;|"):
+        return SPACE
     for delimiter in DELIMITERS:
         counts = [line.count(delimiter) for line in bare]
         if sum(count > 0 for count in counts) > 0.5 * len(counts):
             return delimiter
+    if sum(len(row) > 1 for row in spaces) > 0.5 * len(bare):
+        return SPACE
     return max(DELIMITERS, key=lambda d: bare[0].count(d) if bare else 0)
+
+
+def spaced(line: str) -> list[str]:
+    """Return what white space separates in a line; in one without any, commas or semicolons."""
+    cells = line.split()
+    return cells if len(cells) != 1 else re.split("[,;]", cells[0])
 
 
 def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
@@ -79,7 +94,11 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
         return Layout((), (), (), first, 0)
     width = len(rows[first]) if first < len(rows) else max(map(len, above))
     place = _header_place(above, width)
-    given = tuple(" ".join(cell.split()) for cell in above[place])
+    given = [" ".join(cell.split()) for cell in above[place]]
+    alike = [k for k, name in enumerate(given) if place and name.casefold() in VALUE_NAMES]
+    for k in alike if len(alike) > 1 else ():  # their tags stand above them
+        near = next((cell for cell in above[place - 1][k::-1] if cell.strip()), "")
+        given[k] = " ".join(near.split()) if read_tag(near) else given[k]
     header, units = [], []
     for name in given:
         found = BRACKETS.search(name)
@@ -93,7 +112,7 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
             below.remove(row)
             break
     skipped = place + len(below)
-    return Layout(tuple(header), given, tuple(units), first, skipped, told + place)
+    return Layout(tuple(header), tuple(given), tuple(units), first, skipped, told + place)
 
 
 def _paired(units: Sequence[str], row: Sequence[str]) -> list[tuple[str, str]]:

@@ -12,8 +12,11 @@ SIGNAL_WORDS: Mapping[str, Sequence[str]] = WORDS["signals"]
 """Last part of a tag, by signal."""
 
 TIME_NAMES, TAG_NAMES = columns_named("time"), columns_named("tag")
-VALUE_NAMES, QUALITY_NAMES = columns_named("value"), columns_named("quality")
-UNIT_NAMES = columns_named("unit")
+VALUE_NAMES, UNIT_NAMES = columns_named("value"), columns_named("unit")
+
+_QUALITIES = by_word("qualities")
+_TELLING = re.compile(r"quality|qualit[äé]|qualitaet|validity|confidence|questionable")
+"""Words that tell of a quality wherever they stand in a name."""
 
 SIGNALS: Mapping[str, str] = by_word("signals")
 """Word to signal."""
@@ -23,7 +26,9 @@ OR_ROW = "(or a row for this file in --tags)"
 
 _ATTRIBUTE = re.compile(r"(?i)[./](cv|f_cv|val|value|act|actual|target|measured)$")
 _BLOCK = re.compile(r"(?i)[./](pid\w*|regctl\w*|daca\w*|pic|fic_block|pidx|ctrl)$")
-_QUALITY = re.compile(r"(?i)[ ._:/-](quality|status|qual|q)$")
+_QUALITY = re.compile(rf"(?i)[ ._:/-]({'|'.join(_QUALITIES).replace(' ', '[ _]?')})$")
+_OP_UNITS = (*by_word("op_units"), *WORDS["several"])
+_UNIT = re.compile(rf"(?i)(?:[\s_]+|\s*[\[(])({'|'.join(map(re.escape, _OP_UNITS))})[\])]?$")
 _WORDS = "|".join(sorted(map(re.escape, SIGNALS), key=len, reverse=True))
 _TAG = re.compile(rf"(?i)(.+?)\s*(?:[._:/\\ -]|::)\s*({_WORDS})")
 
@@ -59,13 +64,37 @@ def read_tag(name: str) -> Tag | None:
         return Tag("", signal, quality is not None)
     found = _TAG.fullmatch(bare)
     if found is None:
-        return None
+        unit = _UNIT.search(bare)
+        return read_tag(bare[: unit.start()]) if unit else None
     loop = _BLOCK.sub("", found[1])
     return Tag(loop, SIGNALS[found[2].casefold()], quality is not None)
+
+
+def unit_in(name: str) -> str:
+    """Return the unit of an OP at the end of a name, empty for none: ``OP_psig``, ``OP [V]``."""
+    found = _UNIT.search(name)
+    return found[1] if found else ""
+
+
+def without_quality(name: str) -> str:
+    """Return what stands before the word of a quality: ``FT101`` of ``FT101.Quality``."""
+    return _QUALITY.sub("", name)
+
+
+def quality_kind(name: str) -> str | None:
+    """Return what a number in a column of qualities is, see ``words.yaml``; None for others."""
+    tag, whole = read_tag(name), " ".join(name.split())
+    told = _QUALITY.search(whole) if tag is not None and tag.quality else None
+    folded = re.sub(r"[\W_]|\d+\W*$", "", (told[1] if told else whole).casefold())
+    kind = next(
+        (kind for word, kind in _QUALITIES.items() if word.replace(" ", "") == folded), None
+    )
+    telling = _TELLING.search(folded)
+    return _QUALITIES.get(telling[0], "code") if kind is None and telling else kind
 
 
 def is_name(name: str) -> bool:
     """Return whether a cell looks like the name of a column."""
     folded = " ".join(name.split()).casefold()
-    known = (*TIME_NAMES, *TAG_NAMES, *VALUE_NAMES, *QUALITY_NAMES, *UNIT_NAMES)
-    return folded in known or read_tag(name) is not None
+    known = (*TIME_NAMES, *TAG_NAMES, *VALUE_NAMES, *UNIT_NAMES)
+    return folded in known or quality_kind(name) is not None or read_tag(name) is not None

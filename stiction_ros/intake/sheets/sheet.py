@@ -16,8 +16,15 @@ from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets import text
-from stiction_ros.intake.sheets.cells import Cells, is_number
-from stiction_ros.intake.sheets.layout import LOOKED_AT, Layout, delimiter_of, layout_of
+from stiction_ros.intake.sheets.cells import Cells, is_number, is_stamp
+from stiction_ros.intake.sheets.layout import (
+    LOOKED_AT,
+    SPACE,
+    Layout,
+    delimiter_of,
+    layout_of,
+    spaced,
+)
 from stiction_ros.intake.sheets.names import OR_ROW
 
 PIECE = 200_000
@@ -46,16 +53,26 @@ class Sheet(abc.ABC):
         name: of the table: the file's, and the sheet's of a workbook that has several.
         layout: header, units, where data begin.
         decimal_comma: whether a comma alone in a number is the decimal one.
+        header_once: whether no row of data may be taken for the header that returns.
     """
 
     path: Path
     name: str
     layout: Layout
     decimal_comma: bool = False
+    header_once: bool = False
+
+    @property
+    def mended(self) -> list[str]:
+        """What was put right in the rows that were read last, in sentences."""
+        return []
 
     @abc.abstractmethod
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         """Yield the rows of data.
+
+        Args:
+            rows: in each piece; None takes :data:`PIECE` cells.
 
         Raises:
             InputError: the file is damaged.
@@ -131,10 +148,13 @@ class RowSheet(Sheet):
             raise InputError("is empty", where=where, fix="give a CSV file with a header")
         self.layout = layout_of(top)
         if not self.layout.header or all(is_number(cell) for cell in self.layout.header):
+            names = (delimiter or ",").join(
+                ("OP", "PV") if len(top[0]) < 3 else ("t", "OP", "PV", "SP")[: len(top[0])]
+            )
             raise InputError(
                 "has no header, its first line is numbers",
                 where=where,
-                fix="put the names of the columns above them, such as t,OP,PV,SP",
+                fix=f"put the names of the columns above them, such as {names!r}",
             )
         data = top[self.layout.first :]
         spare = [row for row in data if any(c.strip() for c in row[len(self.layout.header) :])]
@@ -145,21 +165,81 @@ class RowSheet(Sheet):
                 fix="name every column; decimal commas need semicolons or tabs between the cells",
             )
         self.decimal_comma = delimiter != "," or _commas(data)
+        self._names = [_plain(cell) for cell in top[self.layout.place]]
+        self._again: list[tuple[int, list[str]]] = []
 
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         width = len(self.layout.header)
-        size = max(PIECE // width, 256)
+        size = rows or max(PIECE // width, 256)
         with self._rows() as opened:
             filled = (
                 (line, cells)
                 for line, cells in opened
                 if (cells and cells[0]) or any(cell.strip() for cell in cells)
             )
-            data = itertools.islice(filled, self.layout.first, None)
+            data = self._by_name(itertools.islice(filled, self.layout.first, None))
             while piece := list(itertools.islice(data, size)):
-                lines, rows = zip(*piece, strict=True)
-                padded = [row[:width] + [""] * (width - len(row)) for row in rows]
+                lines, cells = zip(*piece, strict=True)
+                padded = [row[:width] + [""] * (width - len(row)) for row in cells]
                 yield Piece(list(zip(*padded, strict=True)), np.array(lines))
+
+    def _by_name(self, rows: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+        """Yield rows without headers that return; behind one in another order cells by name."""
+        self._again = []
+        names = {name for name in self._names if name}
+        order: list[int] | None = None
+        for line, cells in rows:
+            if not names.isdisjoint(cells) and (given := self._header(cells)) is not None:
+                self._again.append((line, given))
+                same = given[: len(self._names)] == self._names
+                order = None if same else self._order(given)
+                continue
+            if order is not None:
+                cells = [cells[k] if k < len(cells) else "" for k in order]
+            yield line, cells
+
+    def _header(self, cells: Sequence[str]) -> list[str] | None:
+        """Return the names in a row that is a header of mostly these columns; None for data."""
+        given = [_plain(cell) for cell in cells]
+        told = [name for name in given if name]
+        known = sum(name in self._names for name in told)
+        data = any(is_number(name) or is_stamp(name) for name in told)
+        return None if self.header_once or data or known < max(2, 0.5 * len(told)) else given
+
+    def _order(self, given: list[str]) -> list[int]:
+        """Return where each column stands in rows under another header; their end for nowhere."""
+        left, found = list(given), []
+        for name in self._names:
+            found.append(left.index(name) if name and name in left else len(left) + 10**6)
+            if name and name in left:
+                left[left.index(name)] = ""
+        return found
+
+    @property
+    def mended(self) -> list[str]:
+        told = []
+        same = [line for line, given in self._again if given[: len(self._names)] == self._names]
+        if same:
+            told.append(
+                f"the header stands again at {self.row_word} {same[0]}"
+                f"{f' and {len(same) - 1} times more' if len(same) > 1 else ''}, left out"
+            )
+        for line, given in self._again:
+            if line in same:
+                continue
+            lost = [name for name in self._names if name and name not in given]
+            new = [name for name in given if name and name not in self._names]
+            told.append(
+                f"the header of {self.row_word} {line} has other columns or another order: what "
+                "follows is read by its names"
+                f"{f', without {chr(44).join(lost)}' if lost else ''}"
+                f"{f'; {chr(44).join(new)} is left out' if new else ''}"
+            )
+        return told
+
+
+def _plain(cell: str) -> str:
+    return " ".join(cell.replace("\ufeff", "").split())
 
 
 def _commas(rows: Sequence[Sequence[str]]) -> bool:
@@ -169,7 +249,7 @@ def _commas(rows: Sequence[Sequence[str]]) -> bool:
 
 
 def text_sheet(path: Path) -> Sheet:
-    """Open a text file; comma, semicolon, tab or bar between the cells.
+    """Open a text file; comma, semicolon, tab, bar or white space between the cells.
 
     Raises:
         InputError: as :func:`stiction_ros.intake.sheets.text.open_text` and :class:`RowSheet`.
@@ -181,6 +261,9 @@ def text_sheet(path: Path) -> Sheet:
     @contextlib.contextmanager
     def rows() -> Iterator[Iterator[tuple[int, list[str]]]]:
         with text.open_text(path) as opened:
+            if delimiter == SPACE:
+                yield ((line, spaced(row)) for line, row in enumerate(opened, start=1))
+                return
             reader = csv.reader(opened, delimiter=delimiter)
             try:
                 yield ((reader.line_num, cells) for cells in reader)
@@ -205,5 +288,5 @@ def stem(path: Path) -> str:
 
 TEXT = ("csv", "tsv", "txt", "tab", "dat", "gz", "zst", "zstd")
 
-SUFFIXES = frozenset(f".{end}" for end in (*TEXT, "parquet", "pq", "xlsx", "xlsm", "mcap"))
+SUFFIXES = frozenset(f".{end}" for end in (*TEXT, "parquet", "pq", "xlsx", "xlsm", "xls", "mcap"))
 """Ends of the names of files that are read from folders."""

@@ -16,7 +16,7 @@ import zstandard
 from stiction_ros.errors import InputError
 
 GZIP, ZSTD, ZIP, OLD_EXCEL = b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
-PARQUET = b"PAR1"
+PARQUET, MARKUP = b"PAR1", (b"<htm", b"<HTM", b"<?xm", b"<!DO", b"<!do", b"<tab", b"<TAB")
 
 HEAD = 4096
 """Bytes by which the encoding is told."""
@@ -69,9 +69,17 @@ def open_text(path: Path) -> Iterator[io.TextIOBase]:
     first = magic(path)
     if first.startswith(ZIP):
         raise InputError("is a zip archive", where=where, fix="unpack it")
+    if first.startswith(MARKUP):
+        raise InputError(
+            "is a page or XML, no table of text",
+            where=where,
+            fix="open it in a spreadsheet program and save it as .xlsx or CSV",
+        )
     if first.startswith(OLD_EXCEL):
         raise InputError(
-            "is an Excel workbook of the old kind", where=where, fix="save it as .xlsx or CSV"
+            "is an Excel workbook of the old kind, or one with a password",
+            where=where,
+            fix="save it as .xlsx without a password, or as CSV",
         )
     try:
         with contextlib.ExitStack() as stack:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import datetime
 import functools
+import re
 import warnings
 import weakref
 import zipfile
@@ -22,6 +23,11 @@ from stiction_ros.intake.sheets.sheet import PIECE, Piece, RowSheet, Sheet, stem
 
 INSTALL = "install the extra: pip install 'stiction_ros[survey]'"
 
+UNSTORED = re.compile(
+    rb'<c r="([A-Z]+\d+)"[^>]*><f(?:[^>]*/>|[^>]*>[^<]*</f>)(?:<v */>|<v></v>)?</c>'
+)
+"""A cell with a formula and no value."""
+
 
 def open_sheets(path: Path) -> list[Sheet]:
     """Open the tables of a file, whatever kind it is; a workbook may hold several.
@@ -32,7 +38,7 @@ def open_sheets(path: Path) -> list[Sheet]:
     first = text.magic(path)
     if first.startswith(text.PARQUET):
         return [ParquetSheet(path)]
-    if first.startswith(text.ZIP) and path.suffix.lower() in (".xlsx", ".xlsm"):
+    if first.startswith(text.ZIP) and _holds_workbook(path):
         return _workbook(path)
     return [text_sheet(path)]
 
@@ -62,8 +68,8 @@ class ParquetSheet(Sheet):
     def row_word(self) -> str:
         return "row"
 
-    def pieces(self) -> Iterator[Piece]:
-        size = max(PIECE // max(len(self.layout.header), 1), 256)
+    def pieces(self, rows: int | None = None) -> Iterator[Piece]:
+        size = rows or max(PIECE // max(len(self.layout.header), 1), 256)
         first = 1
         with self._open() as file:
             for batch in file.iter_batches(batch_size=size):
@@ -104,8 +110,11 @@ class _Book:
         self.path = path
         with self.damage_told(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and the like, which are not read
-            self.book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        weakref.finalize(self, self.book.close)
+            # From an open file: openpyxl asks for the end of a name.
+            file = path.open("rb")
+            self.book = openpyxl.load_workbook(file, read_only=True, data_only=True)
+        for opened in (self.book, file):
+            weakref.finalize(self, opened.close)
 
     @contextlib.contextmanager
     def damage_told(self) -> Iterator[None]:
@@ -115,7 +124,9 @@ class _Book:
         except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"is no workbook ({error})", where=str(self.path)) from None
+            raise InputError(
+                f"is no workbook ({error})", where=str(self.path), fix="save it as .xlsx or CSV"
+            ) from None
 
     @contextlib.contextmanager
     def rows(self, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
@@ -126,6 +137,35 @@ class _Book:
                 for line, row in enumerate(self.book[title].iter_rows(values_only=True), start=1)
             )
 
+    def refuse_unstored(self, title: str) -> None:
+        """Raise where a cell at the top has a formula and no value.
+
+        Raises:
+            InputError: it has, as programs that write workbooks leave it.
+        """
+        with (
+            self.damage_told(),
+            zipfile.ZipFile(self.path) as archive,
+            archive.open(self.book[title]._worksheet_path) as file,
+        ):
+            found = UNSTORED.search(file.read(PIECE))
+        if found:
+            raise InputError(
+                f"cell {found[1].decode()} of {title} is a formula without its value",
+                where=str(self.path),
+                fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
+            )
+
+
+def _holds_workbook(path: Path) -> bool:
+    """Return whether an archive is a workbook, or is called one."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            inner = any(name.startswith("xl/workbook.") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError):
+        inner = False
+    return inner or path.suffix.lower() in (".xlsx", ".xlsm")
+
 
 def _workbook(path: Path) -> list[Sheet]:
     book = _Book(path)
@@ -134,6 +174,7 @@ def _workbook(path: Path) -> list[Sheet]:
     refused: list[InputError] = []
     for title in titles:
         try:
+            book.refuse_unstored(title)
             rows = functools.partial(book.rows, title)
             found.append(RowSheet(path, f"{stem(path)}:{title}", rows, ""))
         except InputError as error:

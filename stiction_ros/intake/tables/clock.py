@@ -48,6 +48,10 @@ class TimeColumn(NamedTuple):
     beside: int | None = None
 
 
+ROWS_APART = TimeColumn(-1)
+"""That of a table whose rows are a sample time apart, without times."""
+
+
 def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
     """Return the column of times: the one named, or the first with a usual name.
 
@@ -69,11 +73,10 @@ def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
         stem, _, unit = header.rpartition("_")
         if stem.casefold() in TIME_NAMES and known_time_unit(unit) is not None:
             return TimeColumn(index)
-    first = next((piece.columns[0] for piece in sheet.pieces()), ())
-    if len(first) and (
-        (isinstance(first, np.ndarray) and first.dtype.kind == "M") or is_stamp(str(first[0]))
-    ):
-        return TimeColumn(0)
+    for index, cells in enumerate(next((piece.columns for piece in sheet.pieces(1)), ())):
+        dated = isinstance(cells, np.ndarray) and cells.dtype.kind == "M"
+        if len(cells) and (dated or is_stamp(str(cells[0]))):
+            return TimeColumn(index)
     return TimeColumn(sheet.column("t", "--time COLUMN"))
 
 

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.sheets.cells import BAD_WORDS, Cells, Numbers, Words, number
-from stiction_ros.intake.sheets.names import read_tag
+from stiction_ros.intake.sheets.cells import Cells, Numbers, Words
+from stiction_ros.intake.sheets.names import read_tag, unit_in
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Stamps
 from stiction_ros.intake.tables.block import Block, Clock, Column, FlagArray, Key
-from stiction_ros.intake.tables.clock import in_seconds
+from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
 from stiction_ros.intake.tables.plan import Plan, Shape
+from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
-from stiction_ros.intake.words import WORDS
 from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
-
-OPC_GOOD = 192
-"""Codes of OPC from which a value is good."""
-
-_BAD = tuple(WORDS["bad_beginnings"])
 
 
 def blocks_of(
@@ -50,13 +48,17 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
                 words[index] = Words()
             else:
                 numbers[index] = Numbers(sheet.decimal_comma)
-    for quality in (*plan.quality.values(), plan.whole_quality):
-        if quality is not None:
-            words[quality] = Words()
-    stamps = Stamps(sheet.decimal_comma, options.dates)
+    for quality in itertools.chain(plan.whole_quality, *plan.quality.values()):
+        words[quality] = Words()
+    stamps = {
+        clock: Stamps(sheet.decimal_comma, options.dates)
+        for clock in (plan.time, *plan.own.values())
+    }
     lines: list[NDArray[np.int64]] = []
     for piece in sheet.pieces():
-        stamps.add(_stamp_cells(piece.columns, plan))
+        for clock, cells in stamps.items():
+            if clock != ROWS_APART:
+                cells.add(_stamp_cells(piece.columns, clock))
         for accumulated in (numbers, words):
             for index, column in accumulated.items():
                 column.add(piece.columns[index])
@@ -68,55 +70,100 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
             where=str(sheet.path),
             fix="a record needs two at least",
         )
-    time, clock, stray, note = _times(sheet, plan, stamps, options, np.concatenate(lines))
-    mask, whole_bad = _whole_quality(sheet, plan, words)
+    place = np.concatenate(lines)
+    timed = {clock: _times(sheet, clock, read, options, place) for clock, read in stamps.items()}
+    mask, whole_bad, told = _whole_quality(sheet, plan, words)
+    notes = [*plan.notes, *(time.note for time in timed.values()), *told]
     found: dict[str, list[Block]] = {}
     for name, signals in plan.loops.items():
-        columns: dict[Key, Column] = {}
+        columns: dict[int, dict[Key, Column]] = {}
+        clocks: list[_Timed] = []
+        own: list[str] = []
         for key, index in signals.items():
+            time = timed[plan.own.get(index, plan.time)]
+            same = next((k for k, other in enumerate(clocks) if other.same(time)), len(clocks))
+            clocks += [time] if same == len(clocks) else []
             if key.signal == "mode":
-                columns[key] = _mode(sheet, index, words[index])
-                continue
-            bad = whole_bad
-            if index in plan.quality:
-                beside = words[plan.quality[index]]
-                bad = beside.where(bad_qualities(beside))
-            columns[key] = _numbers(sheet, index, numbers[index], bad)
+                its = _mode(sheet, index, words[index])
+            else:
+                bad = whole_bad
+                for beside in plan.quality.get(index, ()):
+                    judged, note = bad_qualities(words[beside], sheet.layout.given[beside])
+                    own.append(note)
+                    bad = words[beside].where(judged) | (False if bad is None else bad)
+                its = _numbers(sheet, index, numbers[index], bad)
+            columns.setdefault(same, {})[key] = its
         found[name] = [
-            Block(
-                path=sheet.path,
-                row_word=sheet.row_word,
-                clock=clock,
-                time=time,
-                lines=np.concatenate(lines),
-                columns=columns,
-                mask=mask,
-                notes=tuple(n for n in (*plan.notes, note) if n),
-                stray=stray,
+            _filled_rows(
+                Block(
+                    path=sheet.path,
+                    row_word=sheet.row_word,
+                    clock=clocks[k].clock,
+                    time=clocks[k].seconds,
+                    lines=place,
+                    columns=there,
+                    mask=mask,
+                    notes=tuple(dict.fromkeys(n for n in (*notes, *own) if n)),
+                    stray=clocks[k].stray,
+                    mended=tuple(sheet.mended),
+                ),
+                alone=not plan.own,
             )
+            for k, there in columns.items()
         ]
     return found
 
 
-def _stamp_cells(columns: Sequence[Cells], plan: Plan) -> Cells:
-    date = columns[plan.time.place]
-    if plan.time.beside is None:
+class _Timed(NamedTuple):
+    """Times of a table, as :class:`Block` has them."""
+
+    seconds: NDArray[np.float64]
+    clock: Clock
+    stray: str
+    note: str
+
+    def same(self, other: _Timed) -> bool:
+        """Tell whether other times are these."""
+        equal = np.array_equal(self.seconds, other.seconds, equal_nan=True)
+        return self is other or (self.clock == other.clock and equal)
+
+
+def _filled_rows(block: Block, *, alone: bool) -> Block:
+    """Return the rows of signals with times of their own that hold a time or a value."""
+    blank = np.all([column.blank for column in block.columns.values()], axis=0)
+    there = np.isfinite(block.time) | ~blank
+    if alone or there.all():
+        return block
+    stray = "" if np.isfinite(block.time[there]).all() else block.stray
+    return dataclasses.replace(block.rows(there), stray=stray)
+
+
+def _stamp_cells(columns: Sequence[Cells], time: TimeColumn) -> Cells:
+    date = columns[time.place]
+    if time.beside is None:
         return date
-    clock = columns[plan.time.beside]
+    clock = columns[time.beside]
     return [f"{str(d)[:10]} {c}".strip() for d, c in zip(date, clock, strict=True)]
 
 
 def _times(
-    sheet: Sheet, plan: Plan, stamps: Stamps, options: IntakeOptions, lines: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], Clock, str, str]:
+    sheet: Sheet,
+    place: TimeColumn,
+    stamps: Stamps,
+    options: IntakeOptions,
+    lines: NDArray[np.int64],
+) -> _Timed:
+    index = place.place
+    if place == ROWS_APART:
+        apart = (options.sample_time or 1.0) * np.arange(len(lines), dtype=np.float64)
+        return _Timed(apart, Clock(0.0, dated=False, zoned=False), "", "")
     times = stamps.times(str(sheet.path))
-    index = plan.time.place
     seconds, clock, note = in_seconds(times, sheet, index, options)
     stray = ""
     if times.wrong is not None:
         line = f"{sheet.row_word} {lines[times.wrong.row]}"
         stray = f"column {sheet.layout.given[index]} {times.wrong.said} in {line}"
-    return seconds, clock, stray, " and ".join(n for n in (times.note, note) if n)
+    return _Timed(seconds, clock, stray, " and ".join(n for n in (times.note, note) if n))
 
 
 def _numbers(sheet: Sheet, index: int, read: Numbers, bad: FlagArray | None) -> Column:
@@ -133,7 +180,7 @@ def _numbers(sheet: Sheet, index: int, read: Numbers, bad: FlagArray | None) -> 
         said="" if wrong is None else wrong.said,
         row=0 if wrong is None else wrong.row,
         words=words,
-        unit=sheet.layout.units[index],
+        unit=sheet.layout.units[index] or unit_in(sheet.layout.given[index]),
     )
 
 
@@ -150,38 +197,28 @@ def _mode(sheet: Sheet, index: int, read: Words) -> Column:
 
 def _whole_quality(
     sheet: Sheet, plan: Plan, words: dict[int, Words]
-) -> tuple[QualityArray | None, FlagArray | None]:
-    """Return the mask of a record's own file, or which rows are of bad quality."""
-    if plan.whole_quality is None:
-        return None, None
-    read = words[plan.whole_quality]
-    own = {word: word.strip() for word in read.known}
-    if sheet.layout.given[plan.whole_quality] == QUALITY and QUALITY_WORDS.keys() >= set(
-        own.values()
-    ):
-        table = np.array([QUALITY_WORDS[own[word]] for word in read.known], dtype=np.uint8)
-        return table[read.codes()], None
-    return None, read.where(bad_qualities(read))
+) -> tuple[QualityArray | None, FlagArray | None, list[str]]:
+    """Return the mask of a record's own file, or which rows are of bad quality, and notes."""
+    if len(plan.whole_quality) == 1:
+        read = words[plan.whole_quality[0]]
+        own = {word: word.strip() for word in read.known}
+        if sheet.layout.given[plan.whole_quality[0]] == QUALITY and QUALITY_WORDS.keys() >= set(
+            own.values()
+        ):
+            table = np.array([QUALITY_WORDS[own[word]] for word in read.known], dtype=np.uint8)
+            return table[read.codes()], None, []
+    return None, *_bad_rows(sheet, {index: words[index] for index in plan.whole_quality})
 
 
-def bad_qualities(read: Words) -> set[str]:
-    """Return which words of a column of qualities tell of bad values.
-
-    Numbers are OPC's: good from 192 on. Where no word tells of good or bad, none is bad.
-    """
-    told = {word: number(word.strip()) for word in read.known if word.strip()}
-    codes = [code for code in told.values() if code is not None]
-    if told and len(codes) == len(told):
-        if max(codes) < OPC_GOOD:
-            return set()
-        return {word for word, code in told.items() if code is not None and code < OPC_GOOD}
-    return {
-        word
-        for word in told
-        if (folded := word.strip().casefold()).startswith(_BAD)
-        or BAD_WORDS.fullmatch(folded)
-        or folded in ("b", "false", "u")
-    }
+def _bad_rows(sheet: Sheet, read: dict[int, Words]) -> tuple[FlagArray | None, list[str]]:
+    """Return which rows one of the columns of qualities calls bad, and what is not known."""
+    bad: FlagArray | None = None
+    notes: list[str] = []
+    for index, words in read.items():
+        judged, note = bad_qualities(words, sheet.layout.given[index])
+        bad = words.where(judged) | (False if bad is None else bad)
+        notes += [note] if note else []
+    return bad, notes
 
 
 def _long(
@@ -190,26 +227,26 @@ def _long(
     """Read a table with one value a row: one block a tag."""
     names, values = Words(), Numbers(sheet.decimal_comma)
     text = Words()
-    quality = Words() if plan.whole_quality is not None else None
+    quality = {index: Words() for index in plan.whole_quality}
     units: dict[str, str] = {}
     stamps = Stamps(sheet.decimal_comma, options.dates)
     lines: list[NDArray[np.int64]] = []
     for piece in sheet.pieces():
-        stamps.add(_stamp_cells(piece.columns, plan))
+        stamps.add(_stamp_cells(piece.columns, plan.time))
         names.add(piece.columns[plan.tag])
         values.add(piece.columns[plan.value])
         text.add(_only_words(piece.columns[plan.value]))
-        if quality is not None and plan.whole_quality is not None:
-            quality.add(piece.columns[plan.whole_quality])
+        for index, told in quality.items():
+            told.add(piece.columns[index])
         if plan.unit is not None:
             units.update(zip(piece.columns[plan.tag], piece.columns[plan.unit], strict=True))
         lines.append(piece.lines)
     if not lines:
         raise InputError("has 0 rows of data", where=str(sheet.path))
     place = np.concatenate(lines)
-    time, clock, stray, note = _times(sheet, plan, stamps, options, place)
+    time, clock, stray, note = _times(sheet, plan.time, stamps, options, place)
     numbers, blank = values.values(), values.blank()
-    bad = None if quality is None else quality.where(bad_qualities(quality))
+    bad, notes = _bad_rows(sheet, quality)
     order = np.argsort(names.codes(), kind="stable")
     edges = np.searchsorted(names.codes()[order], np.arange(len(names.known) + 1))
     found: dict[str, list[Block]] = {}
@@ -234,7 +271,7 @@ def _long(
                     np.count_nonzero(bad[rows] & np.isfinite(column.values))
                 )
                 column.values = np.where(bad[rows], np.nan, column.values)
-        column.unit = units.get(name, "").strip()
+        column.unit = units.get(name, "").strip() or unit_in(name)
         found.setdefault(tag.loop, []).append(
             Block(
                 path=sheet.path,
@@ -243,8 +280,9 @@ def _long(
                 time=time[rows],
                 lines=place[rows],
                 columns={key: column},
-                notes=(note,) if note else (),
-                stray=stray,
+                notes=tuple(n for n in (note, *notes) if n),
+                stray="" if np.isfinite(time[rows]).all() else stray,
+                mended=tuple(sheet.mended),
             )
         )
     return found

@@ -74,6 +74,7 @@ def read_rows(path: Path) -> list[TagRow]:
 def _cells(sheet: Sheet) -> list[tuple[str, dict[str, str]]]:
     """Return place and cells of each row by the names of their columns, in small letters."""
     # A list is text: what looks like the first row of numbers is not where it begins.
+    sheet.header_once = True
     sheet.layout = dataclasses.replace(sheet.layout, first=sheet.layout.place + 1)
     header = [name.casefold() for name in sheet.layout.header]
     words = [Words() for _ in header]
