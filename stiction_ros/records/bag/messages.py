@@ -51,7 +51,7 @@ class BagMessage:
 
 
 def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:
-    """Yield every message of a bag as bytes, in the order it was written.
+    """Yield every message of a bag as bytes, each file by log time, see :class:`LogOrder`.
 
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
@@ -63,7 +63,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
     counts: Counter[str] = Counter()
     for file in storage_files(path):
         scan = McapScan(file)
-        yield from scan.messages()
+        yield from scan.messages(by_log_time=True)
         for channel, count in scan.counts.items():
             counts[scan.topics[channel].name] += count
         if notes is not None:
@@ -75,7 +75,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
 def read_messages(
     path: str | Path, *, wanted: Wanted | None = None, notes: list[str] | None = None
 ) -> Iterator[BagMessage]:
-    """Yield the decoded messages of a bag in the order they were written.
+    """Yield the decoded messages of a bag in the order of :func:`read_raw`.
 
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
