@@ -205,5 +205,5 @@ def stem(path: Path) -> str:
 
 TEXT = ("csv", "tsv", "txt", "tab", "dat", "gz", "zst", "zstd")
 
-SUFFIXES = frozenset(f".{end}" for end in (*TEXT, "parquet", "pq", "xlsx", "xlsm", "mcap"))
+SUFFIXES = frozenset(f".{end}" for end in (*TEXT, "parquet", "pq", "xlsx", "xlsm", "mcap", "db3"))
 """Ends of the names of files that are read from folders."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mcap.exceptions import McapError
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
@@ -122,7 +120,7 @@ class MessageDecoder:
             return None
         try:
             message = decoder(raw.data)
-        except (struct.error, ValueError, IndexError, OverflowError, MemoryError, McapError) as e:
+        except Exception as e:  # any definition may stand there, and its decoder raises anything
             raise InputError(
                 f"a message of {topic.name} does not fit its definition ({e})",
                 where=where,
@@ -137,12 +135,15 @@ class MessageDecoder:
             encoding=topic.schema_encoding,
             name=topic.type,
         )
+        said = ""
         try:
             decoder = self._factory.decoder_for(topic.encoding, schema)
         except Exception:  # any text may stand there and the parser's errors share no base
             decoder = None
+        if not any(line.partition("#")[0].strip() for line in topic.definition.splitlines()):
+            said, decoder = "has no definition and ", None
         if decoder is None:
-            self.notes.append(f"topic {topic.name} ({topic.type}) cannot be decoded, left out")
+            self.notes.append(f"topic {topic.name} ({topic.type}) {said}cannot be decoded, left out")
         return decoder
 
 
