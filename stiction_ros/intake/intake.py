@@ -52,6 +52,11 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
 def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
     tables: list[_Table] = []
     for file in _named(_files(paths, options), tags):
+        told = Path(str(file).encode(errors="backslashreplace").decode())
+        if told != file:  # no page and no list could hold it
+            said = f"{told}: its name is not in UTF-8; rename it"
+            yield Loop(stem(told), (told,), (), problem=said)
+            continue
         if is_bag(file):
             yield from _bags(file, options)
             continue

@@ -135,15 +135,15 @@ class MessageDecoder:
             encoding=topic.schema_encoding,
             name=topic.type,
         )
-        said = ""
+        what = f"topic {topic.name} ({topic.type})"
         try:
             decoder = self._factory.decoder_for(topic.encoding, schema)
         except Exception:  # any text may stand there and the parser's errors share no base
             decoder = None
         if not any(line.partition("#")[0].strip() for line in topic.definition.splitlines()):
-            said, decoder = "has no definition and ", None
+            what, decoder = f"{what} has no definition and", None
         if decoder is None:
-            self.notes.append(f"topic {topic.name} ({topic.type}) {said}cannot be decoded, left out")
+            self.notes.append(f"{what} cannot be decoded, left out")
         return decoder
 
 

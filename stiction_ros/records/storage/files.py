@@ -15,8 +15,9 @@ from stiction_ros.records.storage.packed import SUFFIXES, conversion
 
 METADATA = "metadata.yaml"
 
+
 def listed_names(directory: Path) -> tuple[str, ...]:
-    """Return the names of the files that ``metadata.yaml`` tells of; none where it tells nothing."""
+    """Return the names of the files that ``metadata.yaml`` tells of; none where there is none."""
     try:
         names = _information(directory)["relative_file_paths"]
         return tuple(_there(directory, name).name for name in names)
