@@ -7,7 +7,7 @@ import itertools
 import os
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from operator import attrgetter
+from operator import itemgetter
 from typing import BinaryIO, NamedTuple
 
 from stiction_ros.records.storage.bag_metadata import BagTopic
@@ -23,7 +23,7 @@ from stiction_ros.records.storage.mcap_format import (
 )
 from stiction_ros.records.storage.mcap_summary import FOOTER_SIZE, has_footer
 
-_log_time = attrgetter("log_time")
+_log_time = itemgetter(1)
 
 
 class RawMessage(NamedTuple):

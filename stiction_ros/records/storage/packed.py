@@ -18,7 +18,6 @@ SUFFIXES = (".zstd", ".zst")
 
 SQLITE = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"
-_BLOCK = 1 << 16
 
 
 def conversion(bag: Path) -> str:
@@ -60,7 +59,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 def _unpack(source: BinaryIO, target: BinaryIO) -> None:
     """Unpack one frame or several; EOFError where the last one is cut off."""
     frame = zstandard.ZstdDecompressor().decompressobj()
-    while block := source.read(_BLOCK):
+    while block := source.read(zstandard.DECOMPRESSION_RECOMMENDED_INPUT_SIZE):
         while block:
             if frame.eof:
                 frame = zstandard.ZstdDecompressor().decompressobj()
