@@ -42,6 +42,22 @@ class InputError(ValueError):
 
 
 @contextlib.contextmanager
+def foreign(where: object) -> Iterator[None]:
+    """Tell whatever readers of foreign data raise inside the block as an :class:`InputError`.
+
+    Args:
+        where: the file.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # readers of other packages raise anything, of no common base
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"cannot be read ({said})", where=str(where)) from error
+
+
+@contextlib.contextmanager
 def storing(where: object, *, what: str = "written", fix: str = "") -> Iterator[None]:
     """Tell what the storage refuses inside the block as an :class:`InputError`.
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.assembly import Found, loop_of, unread
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
@@ -20,7 +21,10 @@ from stiction_ros.intake.tables.reading import blocks_of
 from stiction_ros.intake.tables.tags import TagList, read_tag_list
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
-from stiction_ros.records.storage.files import METADATA
+from stiction_ros.records.storage.files import listed_names, split_number
+
+BARE = (".mcap", ".db3")
+"""Ends of the names of files that are bags by themselves."""
 
 OTHERS = 8
 """Names that an error or a remark lists."""
@@ -48,18 +52,27 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
 def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
     tables: list[_Table] = []
     for file in _named(_files(paths, options), tags):
+        told = Path(str(file).encode(errors="backslashreplace").decode())
+        if told != file:  # no page and no list could hold it
+            said = f"{told}: its name is not in UTF-8; rename it"
+            yield Loop(stem(told), (told,), (), problem=said)
+            continue
         if is_bag(file):
             yield from _bags(file, options)
             continue
         try:
+            if os.path.exists(file) and not (os.path.isfile(file) or os.path.isdir(file)):
+                raise InputError("is a pipe or a device", where=str(file), fix="save it as a file")
             way = way_of(file, options, tags)
-            sheets = open_sheets(file)
+            with foreign(file):
+                sheets = open_sheets(file)
         except InputError as error:
             yield Loop(stem(file), (file,), (), problem=str(error))
             continue
         for sheet in sheets:
             try:
-                plan = plan_of(sheet, way.options, way.tags)
+                with foreign(file):
+                    plan = plan_of(sheet, way.options, way.tags)
             except InputError as error:
                 yield Loop(sheet.name, (file,), (), problem=str(error))
                 continue
@@ -100,7 +113,7 @@ def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loo
     """
     found = []
     names = []
-    for loop in loops([path], options):
+    for loop in _bags(path, options) if is_bag(path) else loops([path], options):
         names.append(loop.name)
         if name is None or loop.name.casefold() == name.casefold():
             found.append(loop)
@@ -120,11 +133,24 @@ def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loo
 
 
 def is_bag(path: str | Path) -> bool:
-    """Tell whether ``path`` is a bag: a directory of one, or a ``.mcap`` file."""
+    """Tell whether ``path`` is a bag: a ``.mcap`` or ``.db3`` file, packed or not, or a folder.
+
+    A folder is a bag where its ``metadata.yaml`` names its files, or where it holds no other file
+    of a loop than the ``.mcap`` of one bag: a single one, or ``x_0.mcap``, ``x_1.mcap``, ….
+    """
     path = Path(path)
-    if path.is_dir():
-        return (path / METADATA).is_file() or any(path.glob("*.mcap"))
-    return path.suffix.lower() == ".mcap"
+    try:
+        if not path.is_dir():
+            return path.name.lower().removesuffix(".zst").removesuffix(".zstd").endswith(BARE)
+        if listed_names(path):
+            return True
+        inside = list(filter(_may_hold_loops, path.iterdir()))
+    except OSError:
+        return False
+    numbers = [split_number(file) for file in inside]
+    bases = {file.stem.rpartition("_")[0] for file in inside}
+    one = len(inside) == 1 or (len(bases) == 1 and min(numbers) == 0)
+    return one and all(f.suffix == ".mcap" and os.path.isfile(f) for f in inside)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,33 +174,54 @@ def _named(files: Iterator[Path], tags: TagList | None) -> Iterator[Path]:
 
 
 def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
-    """Yield the files of loops; folders give those with a known suffix, the tag list none."""
-    listed = None if options.tags is None else options.tags.resolve()
-    for path in paths:
-        if not path.is_dir() or is_bag(path):
+    """Yield the files of loops; folders give those with a known suffix, the tag list none.
+
+    A bag is one of them, and what stands beside its files is another. What is reached by several
+    ways, such as links, comes once.
+    """
+    seen = set() if options.tags is None else {os.path.realpath(options.tags)}
+    waiting = list(reversed(paths))
+    while waiting:
+        path = waiting.pop()
+        real = os.path.realpath(path)
+        if real in seen:
+            continue
+        seen.add(real)
+        if not os.path.isdir(path):
             yield path
             continue
-        for inner in sorted(path.iterdir()):
-            if inner.name.startswith((".", "~$")) or inner.resolve() == listed:
-                continue
-            if inner.is_dir():
-                yield from _files([inner], options)
-            elif inner.suffix.lower() in SUFFIXES:
-                yield inner
+        try:
+            inside = sorted(path.iterdir(), key=lambda file: (file.is_symlink(), file.name))
+        except OSError:
+            yield path  # whoever opens it tells why it cannot be read
+            continue
+        if is_bag(path):
+            names = listed_names(path) or [file.name for file in inside if file.suffix == ".mcap"]
+            parts = {os.path.realpath(path / name) for name in names}
+            if not parts <= seen:
+                yield path
+            seen |= parts
+        waiting += filter(_may_hold_loops, reversed(inside))
+
+
+def _may_hold_loops(path: Path) -> bool:
+    known = path.suffix.lower() in SUFFIXES or os.path.isdir(path)
+    return known and not path.name.startswith((".", "~$"))
 
 
 def _bags(path: Path, options: IntakeOptions) -> Iterator[Loop]:
     """Yield the loops of a bag: all, or the one of the namespace that was chosen."""
     try:
-        if options.namespace is not None:
-            parts = read_bag_parts(path, namespace=options.namespace)
-            found: dict[str, tuple[Record, ...] | InputError] = {"": parts}
-        else:
-            found = read_bag_loops(path)
+        with foreign(path):
+            if options.namespace is not None:
+                parts = read_bag_parts(path, namespace=options.namespace)
+                found: dict[str, tuple[Record, ...] | InputError] = {"": parts}
+            else:
+                found = read_bag_loops(path)
     except InputError as error:
         found = {"": error}
     for space, read in found.items():
-        name = path.stem + (space if len(found) > 1 else "")
+        name = stem(path) + (space if len(found) > 1 else "")
         if isinstance(read, InputError):
             yield Loop(name, (path,), (), problem=str(read))
             continue
@@ -228,7 +275,8 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
     ways = {table.sheet.path: table.way for table in group}
     for table in group:
         try:
-            read_blocks = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
+            with foreign(table.sheet.path):
+                read_blocks = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
             for name, read in read_blocks.items():
                 blocks.setdefault(name, []).extend(read)
             if not read_blocks:
@@ -250,9 +298,11 @@ def _read(group: Sequence[_Table]) -> Iterator[Loop]:
         named = all(table.plan.named for table in group if table.sheet.path in files)
         found = Found(name, record, own, named, not single)
         try:
-            yield loop_of(found, _options_of(found, ways))
+            with foreign(found.files[0]):
+                loop = loop_of(found, _options_of(found, ways))
         except InputError as error:
-            yield unread(found, str(error))
+            loop = unread(found, str(error))
+        yield loop
 
 
 def _options_of(found: Found, ways: Mapping[Path, FileWay]) -> IntakeOptions:

@@ -175,7 +175,7 @@ def test_the_tables_hold_the_list(tmp_path: Path) -> None:
     values = list(sheet.values)
     assert tuple(values[0]) == HEAD
     assert values[2][HEAD.index("loop")] == "B<&>"
-    assert values[2][HEAD.index("reason")] == "=1+1"
+    assert values[2][HEAD.index("reason")] == "'=1+1"
     assert sheet.cell(3, HEAD.index("reason") + 1).data_type != "f"
     assert values[1][HEAD.index("f_S low")] == 1.8
     assert values[2][HEAD.index("f_S low")] is None

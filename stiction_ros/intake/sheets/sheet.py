@@ -288,5 +288,6 @@ def stem(path: Path) -> str:
 
 TEXT = ("csv", "tsv", "txt", "tab", "dat", "gz", "zst", "zstd")
 
-SUFFIXES = frozenset(f".{end}" for end in (*TEXT, "parquet", "pq", "xlsx", "xlsm", "xls", "mcap"))
+KINDS = (*TEXT, "parquet", "pq", "xlsx", "xlsm", "xls", "mcap", "db3")
+SUFFIXES = frozenset(f".{end}" for end in KINDS)
 """Ends of the names of files that are read from folders."""

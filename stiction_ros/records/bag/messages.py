@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mcap.exceptions import McapError
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
@@ -51,7 +49,7 @@ class BagMessage:
 
 
 def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMessage]:
-    """Yield every message of a bag as bytes, in the order it was written.
+    """Yield every message of a bag as bytes, each file by log time, see :class:`LogOrder`.
 
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
@@ -63,7 +61,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
     counts: Counter[str] = Counter()
     for file in storage_files(path):
         scan = McapScan(file)
-        yield from scan.messages()
+        yield from scan.messages(by_log_time=True)
         for channel, count in scan.counts.items():
             counts[scan.topics[channel].name] += count
         if notes is not None:
@@ -75,7 +73,7 @@ def read_raw(path: str | Path, notes: list[str] | None = None) -> Iterator[RawMe
 def read_messages(
     path: str | Path, *, wanted: Wanted | None = None, notes: list[str] | None = None
 ) -> Iterator[BagMessage]:
-    """Yield the decoded messages of a bag in the order they were written.
+    """Yield the decoded messages of a bag in the order of :func:`read_raw`.
 
     Args:
         path: a rosbag2 directory, finished or not, or a ``.mcap`` file.
@@ -122,7 +120,7 @@ class MessageDecoder:
             return None
         try:
             message = decoder(raw.data)
-        except (struct.error, ValueError, IndexError, OverflowError, MemoryError, McapError) as e:
+        except Exception as e:  # any definition may stand there, and its decoder raises anything
             raise InputError(
                 f"a message of {topic.name} does not fit its definition ({e})",
                 where=where,
@@ -137,12 +135,15 @@ class MessageDecoder:
             encoding=topic.schema_encoding,
             name=topic.type,
         )
+        what = f"topic {topic.name} ({topic.type})"
         try:
             decoder = self._factory.decoder_for(topic.encoding, schema)
         except Exception:  # any text may stand there and the parser's errors share no base
             decoder = None
+        if not any(line.partition("#")[0].strip() for line in topic.definition.splitlines()):
+            what, decoder = f"{what} has no definition and", None
         if decoder is None:
-            self.notes.append(f"topic {topic.name} ({topic.type}) cannot be decoded, left out")
+            self.notes.append(f"{what} cannot be decoded, left out")
         return decoder
 
 

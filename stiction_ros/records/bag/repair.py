@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import shlex
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -20,6 +21,7 @@ from stiction_ros.records.bag.finish import (
 from stiction_ros.records.storage.bag_metadata import BagFile
 from stiction_ros.records.storage.files import METADATA, found_files, listing_notes, refuse_foreign
 from stiction_ros.records.storage.mcap_scan import McapScan
+from stiction_ros.records.storage.packed import SUFFIXES
 
 
 class RepairStatus(enum.StrEnum):
@@ -70,6 +72,9 @@ def repair_bag(path: str | Path, packing: Packing = Packing()) -> Repair:  # noq
         raise InputError("no such bag", where=str(path), fix="check the path")
     if path.is_dir():
         refuse_foreign(path)
+    elif path.suffix in SUFFIXES:
+        fix = f"unpack it with `zstd -d {shlex.quote(str(path))}` and repair what comes of it"
+        raise InputError("is packed", where=str(path), fix=fix)
     files = found_files(path) if path.is_dir() else (path,)
     contents = [_look(file) for file in files]
     notes = [note for content in contents for note in content.notes]

@@ -67,9 +67,11 @@ def loop_runs(
     try:
         space = signals.loop(namespace)
     except InputError as error:
-        unread = [note for note in notes if "cannot be decoded" in note]
+        unread = [note.removesuffix(", left out") for note in notes if "cannot be decoded" in note]
         if unread:
-            raise InputError(error.what, where=error.where, fix="; ".join(unread)) from None
+            what = f"{error.what} that can be read: {', '.join(unread)}"
+            fix = "record it again with definitions in ros2msg, as `ros2 bag record -s mcap` does"
+            raise InputError(what, where=error.where, fix=fix) from None
         raise
     loop = _Loop(signals, space, source)
     said = [*notes, *loop.notes]

@@ -52,17 +52,27 @@ class LoopSignals:
         Args:
             message: of a topic that :func:`is_signal`.
             number: its place in the log.
+
+        Raises:
+            InputError: the definition in the bag is not that of the type.
         """
         key = last_part(message.topic)
-        names, values = message.message.name, message.message.position
+        try:
+            names, values = message.message.name, message.message.position
+            stamp, wrong = stamp_ns(message.message), _wrong(names, values)
+        except (AttributeError, TypeError):
+            raise InputError(
+                f"the definition of {message.topic} is not that of {message.type}",
+                where=self._where,
+                fix="record it again with the one that ROS has",
+            ) from None
         self._given.setdefault(key, [])
-        wrong = _wrong(names, values)
         if wrong:
             self._bad.setdefault(key, Counter())[wrong] += 1
             return
         tags = tuple(str(name) for name in names)
         self._tags.setdefault(key, Counter())[tags] += 1
-        given = Given(number, stamp_ns(message.message), dict(zip(tags, values, strict=True)))
+        given = Given(number, stamp, dict(zip(tags, values, strict=True)))
         self._given[key].append(given)
 
     def tags(self, space: str, signal: str) -> tuple[str, ...]:

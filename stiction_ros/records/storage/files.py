@@ -11,8 +11,24 @@ import yaml
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.storage.bag_metadata import VERSION
+from stiction_ros.records.storage.packed import SUFFIXES, conversion
 
 METADATA = "metadata.yaml"
+
+
+def listed_names(directory: Path) -> tuple[str, ...]:
+    """Return the names of the files that ``metadata.yaml`` tells of; none where there is none."""
+    try:
+        names = _information(directory)["relative_file_paths"]
+        return tuple(_there(directory, name).name for name in names)
+    except (InputError, TypeError, KeyError):
+        return ()
+
+
+def split_number(path: Path) -> int:
+    """Return the split number: ``bag_10.mcap`` comes after ``bag_9.mcap``; -1 without one."""
+    found = re.search(r"_(\d+)$", path.stem)
+    return int(found[1]) if found else -1
 
 
 def storage_files(path: str | Path) -> tuple[Path, ...]:
@@ -44,7 +60,13 @@ def refuse_foreign(directory: Path) -> None:
     except InputError:
         return  # unreadable, so it tells nothing
     if "version" in information and "storage_identifier" in information:
-        _refuse_foreign(information, str(where))
+        _refuse_foreign(information, directory)
+        if str(information.get("compression_mode") or "").lower() == "file":
+            raise InputError(
+                "its files are packed",
+                where=str(directory),
+                fix="unpack them with `zstd -d` and repair each of what comes of it",
+            )
 
 
 def found_files(directory: Path) -> tuple[Path, ...]:
@@ -53,7 +75,7 @@ def found_files(directory: Path) -> tuple[Path, ...]:
     Raises:
         InputError: there is none.
     """
-    files = sorted(directory.glob("*.mcap"), key=lambda file: (_number(file), file.name))
+    files = sorted(directory.glob("*.mcap"), key=lambda file: (split_number(file), file.name))
     if not files:
         raise InputError(
             "holds no .mcap file", where=str(directory), fix="give a rosbag2 directory"
@@ -75,9 +97,9 @@ def listing_notes(path: str | Path, counts: Mapping[str, int]) -> list[str]:
     path = Path(path)
     if not path.is_dir():
         return []
-    there = found_files(path)
+    there = sorted(path.glob("*.mcap"))
     if not (path / METADATA).is_file():
-        numbers = [_number(file) for file in there]
+        numbers = [split_number(file) for file in there]
         missing = sorted(set(range(max(numbers) + 1)) - set(numbers)) if min(numbers) >= 0 else []
         return [f"the file with number {number} is missing" for number in missing]
     information = _information(path)
@@ -107,24 +129,28 @@ def _information(path: Path) -> Mapping[str, Any]:
             "rosbag2_bagfile_information"
         ]
         return {**information}
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError, RecursionError) as error:
+    except Exception as error:  # any text may stand there, and YAML's readers raise anything
         raise _unreadable(where, error) from None
 
 
-def _refuse_foreign(information: Mapping[str, Any], where: str) -> None:
+def _refuse_foreign(information: Mapping[str, Any], directory: Path) -> None:
+    where = directory / METADATA
     try:
         version = int(information["version"])
-        storage = str(information["storage_identifier"])
+        storage = str(information["storage_identifier"] or "")
     except (ValueError, TypeError, KeyError) as error:
-        raise _unreadable(Path(where), error) from None
+        raise _unreadable(where, error) from None
+    if not storage.strip():  # rosbag2 looks at the files then
+        names = listed_names(directory)
+        storage = "sqlite3" if any(".db3" in name for name in names) else "mcap"
     mode = str(information.get("compression_mode") or "")
     if version > VERSION:
-        raise InputError(f"has version {version}, newer than {VERSION}", where=where)
-    if storage != "mcap" or mode.lower() in ("file", "message"):
+        raise InputError(f"has version {version}, newer than {VERSION}", where=str(where))
+    if storage != "mcap" or mode.lower() == "message":
         raise InputError(
             f"the storage is {storage} {mode}".strip(),
-            where=where,
-            fix="convert it with `ros2 bag convert` to plain mcap",
+            where=str(where),
+            fix=conversion(directory),
         )
 
 
@@ -138,18 +164,25 @@ def _unreadable(where: Path, error: Exception) -> InputError:
 
 def _listed_files(path: Path, information: Mapping[str, Any]) -> tuple[Path, ...]:
     where = str(path / METADATA)
-    _refuse_foreign(information, where)
+    _refuse_foreign(information, path)
     try:
-        names = [str(name) for name in information["relative_file_paths"]]
+        files = tuple(_there(path, name) for name in information["relative_file_paths"])
     except (TypeError, KeyError) as error:
         raise _unreadable(path / METADATA, error) from None
-    files = tuple(path / Path(name).name for name in names)
     for file in files:
         if not file.is_file():
             raise InputError(f"{file.name} is missing", where=str(path), fix="put it back")
     if not files:
         raise InputError("lists no file", where=where)
     return files
+
+
+def _there(directory: Path, listed: object) -> Path:
+    """Return a listed file; one that is there packed, or unpacked, in its place counts as well."""
+    file = directory / Path(str(listed)).name
+    plain = file.with_suffix("") if file.suffix in SUFFIXES else file
+    packed = [plain.with_name(plain.name + end) for end in SUFFIXES]
+    return next((one for one in (file, plain, *packed) if one.is_file()), file)
 
 
 def _listed_counts(path: Path, information: Mapping[str, Any]) -> dict[str, int]:
@@ -161,9 +194,3 @@ def _listed_counts(path: Path, information: Mapping[str, Any]) -> dict[str, int]
         }
     except (ValueError, TypeError, KeyError) as error:
         raise _unreadable(path / METADATA, error) from None
-
-
-def _number(path: Path) -> int:
-    """Return the split number: ``bag_10.mcap`` comes after ``bag_9.mcap``; -1 without one."""
-    found = re.search(r"_(\d+)$", path.stem)
-    return int(found[1]) if found else -1

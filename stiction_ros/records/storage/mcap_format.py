@@ -23,6 +23,9 @@ MESSAGE_RECORD = struct.Struct("<BQHIQQ")
 FOOTER_BODY = struct.Struct("<QQI")
 """Start of the summary, start of its offsets, its checksum."""
 
+CHUNK_TIMES = struct.Struct("<QQ")
+"""First and last log time of a chunk, at its beginning."""
+
 U16 = struct.Struct("<H")
 U32 = struct.Struct("<I")
 U64 = struct.Struct("<Q")

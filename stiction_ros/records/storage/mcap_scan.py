@@ -10,12 +10,13 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.storage.bag_metadata import BagTopic
+from stiction_ros.records.storage.log_order import LogOrder, RawMessage
 from stiction_ros.records.storage.mcap_format import (
     CHANNEL,
     CHUNK,
@@ -39,18 +40,12 @@ from stiction_ros.records.storage.mcap_summary import (
     intact_summary,
     message_count,
 )
+from stiction_ros.records.storage.packed import SQLITE, conversion, opened
+
+__all__ = ["BLOCK", "McapScan", "RawMessage"]
 
 BLOCK = 1 << 20  # bytes read at a time
 _HEADS = frozenset({0, CHUNK, DATA_END})  # records that the loop over the file looks at itself
-
-
-class RawMessage(NamedTuple):
-    """One message as bytes: its topic, log and publish time in ns, serialised data."""
-
-    topic: BagTopic
-    log_time: int
-    publish_time: int
-    data: bytes
 
 
 class _DamageError(Exception):
@@ -89,22 +84,38 @@ class McapScan:
         self._salvage = salvage
         self._schemas: dict[int, tuple[str, str, str]] = {}
 
-    def messages(self) -> Iterator[RawMessage]:
+    def messages(self, *, by_log_time: bool = False) -> Iterator[RawMessage]:
         """Yield every complete message in the order of the file.
 
+        Args:
+            by_log_time: in the order of :class:`LogOrder` instead.
+
         Raises:
-            InputError: no such file, not an MCAP file, or damaged inside.
+            InputError: no such file, not an MCAP file, or damaged inside; what is before the
+                damage comes first.
         """
         try:
-            with self.path.open("rb") as file:
-                yield from self._file(file)
+            with opened(self.path) as file:
+                order = LogOrder.of(file) if by_log_time else LogOrder()
+                try:
+                    for messages, place in self._file(file):
+                        yield from order.ready(messages, place)
+                except InputError:
+                    yield from order.rest()
+                    raise
+                yield from order.rest()
         except OSError as error:
             raise InputError(
                 f"cannot be read ({error.strerror or error})", where=str(self.path)
             ) from None
 
-    def _file(self, file: BinaryIO) -> Iterator[RawMessage]:
-        if file.read(len(MAGIC)) != MAGIC:
+    def _file(self, file: BinaryIO) -> Iterator[tuple[list[RawMessage], int]]:
+        """Yield messages, and the place up to which the file was read."""
+        first = file.read(len(MAGIC))
+        if first and SQLITE.startswith(first):
+            what = "is a bag of storage sqlite3"
+            raise InputError(what, where=str(self.path), fix=conversion(self.path))
+        if first != MAGIC:
             raise InputError(
                 "is not an MCAP file",
                 where=str(self.path),
@@ -116,12 +127,16 @@ class McapScan:
         place, checksum = len(MAGIC), zlib.crc32(MAGIC)  # of what comes before ``data``
         data, at = b"", 0
         while True:
+            found: list[RawMessage] = []
             try:
-                at = yield from self._records(data, at)
+                at = self._records(data, at, found)
             except _DamageError as damage:
+                yield found, place + damage.at
                 self._broken(place + damage.at, str(damage))
                 at = _end(data, damage.at)
                 continue
+            if found:
+                yield found, place + at
             opcode, length = _head(data, at)
             end = at + RECORD.size + length
             if opcode < 0 or end > len(data):  # the record goes on behind what was read
@@ -136,10 +151,14 @@ class McapScan:
                     self._torn(file, len(data))
                     return
             elif opcode == CHUNK:
+                found, fault = [], ""
                 try:
-                    yield from self._chunk(data[at + RECORD.size : end])
+                    self._chunk(data[at + RECORD.size : end], found)
                 except (_DamageError, ValueError, struct.error) as error:
-                    self._broken(place + at, str(error))
+                    fault = str(error)
+                yield found, place + end
+                if fault:
+                    self._broken(place + at, fault)
                 at = end
             elif opcode == DATA_END:
                 checksum = zlib.crc32(memoryview(data)[:at], checksum)
@@ -150,8 +169,8 @@ class McapScan:
                 self._torn(file, size - place - at)
                 return
 
-    def _records(self, data: bytes, at: int) -> Generator[RawMessage, None, int]:
-        """Yield the messages from ``at`` on; return where a record of another kind begins."""
+    def _records(self, data: bytes, at: int, found: list[RawMessage]) -> int:
+        """Append the messages from ``at`` on; return where a record of another kind begins."""
         topics, counts, size = self.topics, self.counts, len(data)
         try:
             while at + RECORD.size <= size:
@@ -166,7 +185,9 @@ class McapScan:
                     if channel not in topics or start > end:
                         raise ValueError(f"a message of channel {channel} that is not known")
                     counts[channel] += 1
-                    yield RawMessage(topics[channel], log_time, publish_time, data[start:end])
+                    found.append(
+                        RawMessage(topics[channel], log_time, publish_time, data[start:end])
+                    )
                 else:
                     self._other(opcode, data[body:end])
                 at = end
@@ -174,11 +195,11 @@ class McapScan:
             raise _DamageError(str(error), at) from error
         return at
 
-    def _chunk(self, body: bytes) -> Iterator[RawMessage]:
+    def _chunk(self, body: bytes, found: list[RawMessage]) -> None:
         data, checksum = chunk_data(body)
         if checksum and zlib.crc32(data) != checksum:
             raise ValueError("a chunk's checksum is wrong")
-        end = yield from self._records(data, 0)
+        end = self._records(data, 0, found)
         if end != len(data):
             raise ValueError("a record is longer than its chunk")
 

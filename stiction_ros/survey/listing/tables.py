@@ -40,6 +40,9 @@ HEAD = (
     "page",
 )
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+"""What a text begins with that spreadsheets take for a formula."""
+
 STAMP = (1980, 1, 1, 0, 0, 0)
 """Time of the files inside the XLSX: the same list is the same file."""
 
@@ -82,13 +85,13 @@ state="frozen"/></sheetView></sheetViews>
 
 
 def cells(entry: Entry) -> list[Cell]:
-    """Return the row of a loop under :data:`HEAD`."""
+    """Return the row of a loop under :data:`HEAD`; no text in it is a formula to a spreadsheet."""
     cycle, gain = entry.oscillation, entry.gain or {}
     low, high = entry.f_s_interval or (None, None)
 
     now = (gain.get("now") or {}).get("iae_per_hour")
     changes = [change(entry, what) for what in HEADS]
-    return [
+    found: list[Cell] = [
         entry.rank,
         entry.name,
         entry.status.value,
@@ -112,6 +115,8 @@ def cells(entry: Entry) -> list[Cell]:
         entry.reason or None,
         entry.report,
     ]
+    texts = [isinstance(cell, str) and cell.startswith(FORMULA) for cell in found]
+    return [f"'{cell}" if text else cell for cell, text in zip(found, texts, strict=True)]
 
 
 def write_csv(path: Path, entries: Sequence[Entry]) -> None:

@@ -1,0 +1,69 @@
+"""Storage files that are packed whole, or of another storage."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import zstandard
+
+from stiction_ros.errors import InputError
+
+SUFFIXES = (".zstd", ".zst")
+"""Ends of the names of files that are packed with Zstandard; rosbag2 writes the first."""
+
+SQLITE = b"SQLite format 3\0"
+_ZSTD = b"\x28\xb5\x2f\xfd"
+
+
+def conversion(bag: Path) -> str:
+    """Return how a bag that is not read is made one that is."""
+    source, target = shlex.quote(str(bag)), shlex.quote(f"{bag.absolute().stem}_mcap")
+    return (
+        f"convert it: `pip install rosbags`, then `rosbags-convert --src {source} "
+        f"--dst {target} --dst-storage mcap`, and give {target}"
+    )
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """Open a storage file; one that is packed with Zstandard is unpacked into a temporary file.
+
+    Raises:
+        InputError: packed, and cut off or damaged.
+        OSError: it cannot be read, or the storage refuses.
+    """
+    with path.open("rb") as file:
+        packed = file.read(len(_ZSTD)) == _ZSTD
+        file.seek(0)
+        if not packed:
+            yield file
+            return
+        with tempfile.TemporaryFile() as plain:
+            try:
+                _unpack(file, plain)
+            except (zstandard.ZstdError, EOFError):
+                raise InputError(
+                    "is packed with Zstandard and cut off or damaged",
+                    where=str(path),
+                    fix="pack or copy it anew",
+                ) from None
+            plain.seek(0)
+            yield plain
+
+
+def _unpack(source: BinaryIO, target: BinaryIO) -> None:
+    """Unpack one frame or several; EOFError where the last one is cut off."""
+    frame = zstandard.ZstdDecompressor().decompressobj()
+    while block := source.read(zstandard.DECOMPRESSION_RECOMMENDED_INPUT_SIZE):
+        while block:
+            if frame.eof:
+                frame = zstandard.ZstdDecompressor().decompressobj()
+            target.write(frame.decompress(block))
+            block = frame.unused_data
+    if not frame.eof:
+        raise EOFError
