@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.modes import manual_marked
@@ -62,7 +63,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     """
     _refuse_incomplete(found)
     rules = Rules(options.strict)
-    timed = [with_times(block, rules) for block in found.blocks]
+    timed = put_right([with_times(block, rules) for block in found.blocks], rules)
     if not options.as_given:
         timed = [with_values(block, rules, shared=found.shared) for block in timed]
     block = joined([checked(one, rules) for one in timed])

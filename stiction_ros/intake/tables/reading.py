@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,6 +25,7 @@ from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 OPC_GOOD = 192
 """Codes of OPC from which a value is good."""
 
+_MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
 _BAD = tuple(WORDS["bad_beginnings"])
 
 
@@ -103,7 +105,7 @@ def _stamp_cells(columns: Sequence[Cells], plan: Plan) -> Cells:
     if plan.time.beside is None:
         return date
     clock = columns[plan.time.beside]
-    return [f"{str(d)[:10]} {c}".strip() for d, c in zip(date, clock, strict=True)]
+    return [f"{_MIDNIGHT.sub('', str(d))} {c}".strip() for d, c in zip(date, clock, strict=True)]
 
 
 def _times(
