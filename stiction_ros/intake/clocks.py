@@ -7,6 +7,7 @@ that summer time ends with are one.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.repairs import Rules
-from stiction_ros.intake.summer_time import DAY, Change, ahead, changes, shown
+from stiction_ros.intake.summer_time import Change, ahead, changes, shown
 from stiction_ros.intake.tables.block import Block, FlagArray
+from stiction_ros.texts import DAY, HOUR
 
-HOUR = 3600.0
 FIX = "export the stamps in UTC or with their offset, such as 2024-10-27 02:00:00+01:00"
 
 
@@ -63,13 +64,11 @@ def _refuse_half_days(block: Block) -> None:
     if not len(falls) or hours.min() < 1.0 or hours.max() > 12.0:
         return
     row = int(falls[0]) + 1
-    before, then, *again = (
-        shown(wall[k])[11 * block.clock.daily :]
-        for k in (row - 1, row, *(row + np.flatnonzero(np.isin(wall[row:], wall[:row]))[:1]))
-    )
+    again = row + np.flatnonzero(np.isin(wall[row:], wall[:row]))[:1]
+    first, then, *twice = (shown(wall[k])[11 * block.clock.daily :] for k in (row - 1, row, *again))
     raise InputError(
-        f"a clock of 12 hours without AM and PM: {before} is followed by {then} in "
-        f"{block.place(row)}{''.join(f', {stamp} is there twice' for stamp in again)}",
+        f"the clock has 12 hours, without AM and PM: {first} is followed by {then} in "
+        f"{block.place(row)}{''.join(f', {stamp} is there twice' for stamp in twice)}",
         where=str(block.path),
         fix="export stamps with 24 hours, or with AM and PM",
     )
@@ -87,6 +86,12 @@ class _Rows:
     wall: FloatArray
     rank: NDArray[np.int64]
 
+    @functools.cached_property
+    def usual(self) -> float:
+        """The usual step, s."""
+        steps = np.diff(self.wall)
+        return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+
     def seams(self, change: Change) -> NDArray[np.intp]:
         """Return the rows before which a clock is set by a change, as far as times tell.
 
@@ -94,13 +99,12 @@ class _Rows:
         what is left out, and it is nearer to the whole change than to nothing.
         """
         steps, (low, high) = np.diff(self.wall), change[:2]
-        usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         first, then = self.wall[:-1], self.wall[1:]
         if change.back:
             found = (first > low) & (first <= high) & (then >= low) & (then < high) & (steps <= 0)
         else:
             found = (first <= low) & (then >= high)
-        found &= np.rint((usual - steps) / change.moves) == 1.0
+        found &= np.rint((self.usual - steps) / change.moves) == 1.0
         return np.flatnonzero(found) + 1
 
     def is_doubled(self, change: Change) -> bool:
@@ -128,21 +132,19 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
         _Rows(b.clock.start + b.time, b.lines if b.lines[0] <= b.lines[-1] else -b.lines)
         for b in blocks
     ]
-    days = np.unique(np.concatenate([one.wall[_begins(one.wall // DAY)] // DAY for one in rows]))
-    known = changes(zone, np.arange(days[0], days[-1] + 1.0) if zone else days)
+    known = changes(zone, np.concatenate([one.wall // DAY for one in rows]))
     if not zone:
         known += [change for one in rows for change in _others(one, known)]
     files = _by_file(blocks, rows, known)
     shifts = [np.zeros(len(one.wall)) for one in rows]
     for change in known:
         seen = any(len(one.seams(change)) for one in (*rows, *files.values()))
-        within = [(one.wall > change.low) & (one.wall < change.high) for one in rows]
-        if not zone and not change.back and np.any([part.any() for part in within]):
-            continue
-        if not zone and not seen:
-            mixed = [b for b, one in zip(blocks, rows, strict=True) if one.is_doubled(change)]
-            if change.back and mixed:
-                raise _untold(mixed[0], change)
+        if not zone and change.back and not seen:
+            for block, one in zip(blocks, rows, strict=True):
+                if one.is_doubled(change):
+                    raise _untold(block, change)
+        left_out = any(((r.wall > change.low) & (r.wall < change.high)).any() for r in rows)
+        if not zone and (not seen or (left_out and not change.back)):
             continue
         count = 0
         for block, one, shift in zip(blocks, rows, shifts, strict=True):
@@ -168,21 +170,14 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
     ]
 
 
-def _begins(values: FloatArray) -> NDArray[np.intp]:
-    return np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-
-
 def _others(one: _Rows, known: Sequence[Change]) -> list[Change]:
     """Return the one fall by an hour, within half a step, that no calendar has."""
     back = np.flatnonzero(np.diff(one.wall) < 0.0)
-    if len(back) != 1:
+    if len(back) != 1 or any(len(one.seams(change)) for change in known):
         return []
-    then = float(one.wall[back[0] + 1])
-    change = Change(then, then + HOUR, back=True)
-    first, steps = float(one.wall[back[0]]), np.diff(one.wall)
-    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    exact = min(abs(first + usual - then - HOUR), abs(first - then - HOUR)) <= 0.5 * usual
-    return [change] if exact and not any(len(one.seams(other)) for other in known) else []
+    first, then = one.wall[back[0]], one.wall[back[0] + 1]
+    off = min(abs(first + usual - then - HOUR) for usual in (0.0, one.usual))
+    return [Change(float(then), float(then) + HOUR, back=True)] if off <= 0.5 * one.usual else []
 
 
 def _by_file(
@@ -195,10 +190,10 @@ def _by_file(
         rank = np.concatenate([one.rank for one in own])
         order = np.argsort(rank, kind="stable")
         every = _Rows(np.concatenate([one.wall for one in own])[order], rank[order])
-        falls = set((np.flatnonzero(np.diff(every.wall) < 0.0) + 1).tolist())
-        if falls == {
-            row for change in known if change.back for row in every.seams(change).tolist()
-        }:
+        seams = [every.seams(change) for change in known if change.back]
+        if not np.setdiff1d(
+            np.flatnonzero(np.diff(every.wall) < 0.0) + 1, np.concatenate([[], *seams])
+        ).size:
             found[path] = every
     return found
 
@@ -216,9 +211,12 @@ def _after(block: Block, one: _Rows, file: _Rows | None, change: Change) -> Flag
         if told is not None and len(seams := told.seams(change)) == 1:
             late = one.rank >= told.rank[seams[0]]
             return np.asarray((wall > high) | (wall >= low) & late)
-    if ((wall >= low) & (wall < high)).any():
-        early, late = bool((wall < low).any()), bool((wall >= high).any())
-        if early == late:
+    inside = (wall >= low) & (wall < high)
+    if inside.any():
+        steps, late = np.diff(wall), bool((wall >= high).any())
+        # One pass is there. Were it the other one, there would be a hole longer than all others.
+        hole = np.min(steps[inside[1:] | inside[:-1]], initial=np.inf) + high - low
+        if late == (wall < low).any() or hole <= np.max(steps, initial=high - low):
             raise _untold(block, change)
         return wall >= (low if late else high)
     return wall >= high

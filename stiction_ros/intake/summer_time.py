@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import functools
 import zoneinfo
-from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
-from stiction_ros.intake.words import WORDS
+import numpy as np
 
-DAY = 86400.0
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.intake.tables.clock import SPREADSHEET
+from stiction_ros.intake.words import WORDS
+from stiction_ros.texts import DAY
+
+YEARS = SPREADSHEET[1] - SPREADSHEET[0]
+"""Days from 1970 to 2099."""
 
 
 class Change(NamedTuple):
@@ -43,10 +48,18 @@ class Change(NamedTuple):
         )
 
 
-def changes(zone: str, days: Iterable[float]) -> list[Change]:
-    """Return the changes on local days, counted since 1970, in a zone or where none is known."""
+def changes(zone: str, days: FloatArray) -> list[Change]:
+    """Return the changes of a zone from first to last; without one, those on the days themselves.
+
+    Args:
+        zone: its name; empty for the zones that ``words.yaml`` lists.
+        days: local ones since 1970, one or more for each row.
+    """
+    kept = np.unique(days[np.flatnonzero(np.diff(days, prepend=np.nan))]).clip(0.0, YEARS)
+    if zone:
+        kept = np.arange(kept[0], kept[-1] + 1.0)
+    near = {int(day) + k for day in kept.tolist() for k in (-1, 0, 1)}
     zones = [zone] if zone else WORDS["summer_time"]
-    near = {int(day) + k for day in days for k in (-1, 0, 1)}
     found = {c[:3]: c for each in zones for day in near for c in _on(each, day)}
     return sorted(found.values())
 

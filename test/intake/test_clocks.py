@@ -21,6 +21,7 @@ from .exports import read as read_all
 BERLIN = zoneinfo.ZoneInfo("Europe/Berlin")
 AUTUMN = datetime.datetime(2024, 10, 27, 0, 0, tzinfo=datetime.UTC)  # 02:00 summer time
 SPRING = datetime.datetime(2024, 3, 31, 0, 30, tzinfo=datetime.UTC)  # 01:30 winter time
+BEFORE = datetime.datetime(2024, 10, 17, 6, 0, tzinfo=datetime.UTC)
 STEP, ROWS = 60, 130
 
 Stamp = Callable[[datetime.datetime], str]
@@ -92,14 +93,16 @@ def test_twelve_hours_without_am_and_pm_are_refused(tmp_path: Path, form: Form) 
 
     begin = datetime.datetime(2024, 5, 13, 6, 0, tzinfo=datetime.UTC)
     problem = str(read(form(tmp_path, stamps(half, begin, 600, 156))).problem)
-    assert "12 hours without AM and PM: 2024-05-13 12:50:00 is followed by 2024-05-13 01" in problem
+    assert (
+        "12 hours, without AM and PM: 2024-05-13 12:50:00 is followed by 2024-05-13 01" in problem
+    )
     assert "2024-05-13 06:00:00 is there twice" in problem
 
 
 def test_twelve_hours_of_times_of_the_day_alone(tmp_path: Path) -> None:
     begin = datetime.datetime(2024, 5, 13, 6, 0, tzinfo=datetime.UTC)
     times = stamps(lambda moment: moment.strftime("%I:%M:%S"), begin, 300)
-    assert "12 hours without AM and PM" in str(read(wide(tmp_path, times)).problem)
+    assert "12 hours, without AM and PM" in str(read(wide(tmp_path, times)).problem)
     times = stamps(lambda moment: moment.strftime("%I:%M:%S %p"), begin, 300)
     check(read(wide(tmp_path, times)), step=300)
 
@@ -177,6 +180,13 @@ def test_zones_that_are_utc(tmp_path: Path, style: str) -> None:
     loop = read(wide(tmp_path, stamps(lambda m: style.format(plain(m)), AUTUMN)))
     check(loop)
     assert loop.parts[0].start == AUTUMN.timestamp()
+
+
+@pytest.mark.parametrize("zone", ["", " [Europe/Berlin]"])
+@pytest.mark.parametrize("far", ["0001-01-01 00:00:00", "9999-12-31 23:59:59"])
+def test_the_least_and_the_largest_stamp_do_no_harm(tmp_path: Path, zone: str, far: str) -> None:
+    times = [f"{t}{zone}" for t in [*stamps(plain, BEFORE), far]]
+    assert read(wide(tmp_path, times)).problem is None
 
 
 def test_a_zone_that_is_unknown_is_one_error(tmp_path: Path) -> None:

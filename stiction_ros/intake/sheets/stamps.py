@@ -24,8 +24,13 @@ from stiction_ros.intake.words import by_word
 DAY = 86_400_000_000
 """Microseconds of a day."""
 
-EMPTY, STRANGE = -1, -2
-"""In the place of a date: of an empty cell, and of one that is not understood."""
+
+class _No(enum.IntEnum):
+    """In the place of a date: an empty cell, and one that is not understood."""
+
+    EMPTY = -1
+    STRANGE = -2
+
 
 _MONTHS: Mapping[str, int] = by_word("months")
 """Names of the months in several languages, without accents."""
@@ -121,7 +126,7 @@ class Stamps:
         """Add the next piece of the column."""
         if isinstance(cells, np.ndarray) and cells.dtype.kind == "M":
             whole = cells.astype("datetime64[us]")
-            self._keep(np.where(np.isnat(whole), EMPTY, 1), whole.astype(np.int64), 0)
+            self._keep(np.where(np.isnat(whole), _No.EMPTY, 1), whole.astype(np.int64), 0)
         elif isinstance(cells, np.ndarray) or self._numbers is not None or self._is_numbers(cells):
             if self._numbers is None:
                 self._numbers = Numbers(self.decimal_comma)
@@ -143,7 +148,7 @@ class Stamps:
             strange = ~np.isfinite(read) & ~self._numbers.blank()
             if strange.any():
                 text = next(word for word in self._numbers.words if word)
-                self._firsts[STRANGE] = Wrong(int(np.argmax(strange)), text)
+                self._firsts[_No.STRANGE] = Wrong(int(np.argmax(strange)), text)
             values = np.where(strange, np.inf, read)
             first = float(values[np.argmax(np.isfinite(values))]) if len(values) else 0.0
             first = first if np.isfinite(first) else 0.0
@@ -152,16 +157,16 @@ class Stamps:
         of = np.concatenate(self._of)
         daily = not (days > 0).any()
         if not daily:  # a time of the day alone is no stamp among dates
-            days[days == 0] = STRANGE
-            lone = [self._firsts.pop(day) for day in (0, STRANGE) if day in self._firsts]
-            self._firsts.update({STRANGE: min(lone)} if lone else {})
+            days[days == 0] = _No.STRANGE
+            lone = [self._firsts.pop(day) for day in (0, _No.STRANGE) if day in self._firsts]
+            self._firsts.update({_No.STRANGE: min(lone)} if lone else {})
         numbered, note = self._day_numbers(days, clocks, where)
         there = days >= 0
         offsets, zone = self._offsets(of[there], where)
         stamps = DAY * numbered[days] + clocks - offsets[of]
         first = int(stamps[np.argmax(there)]) if there.any() else 0
         seconds = (stamps - first) / 1e6
-        seconds[days == EMPTY], seconds[days == STRANGE] = np.nan, np.inf
+        seconds[days == _No.EMPTY], seconds[days == _No.STRANGE] = np.nan, np.inf
         zoned = not zone and bool(of[there].any())
         wrong = self._wrong(seconds)
         return Times(seconds, first / 1e6, not daily, zoned, wrong, note, zone, daily)
@@ -197,7 +202,7 @@ class Stamps:
         return True
 
     def _other(self, cells: Sequence[str]) -> None:
-        days = np.full(len(cells), EMPTY, dtype=np.int32)
+        days = np.full(len(cells), _No.EMPTY, dtype=np.int32)
         clocks = np.zeros(len(cells), dtype=np.int64)
         zones = np.zeros(len(cells), dtype=np.int16)
         known: dict[str, tuple[int, str] | None] = {}
@@ -209,17 +214,12 @@ class Stamps:
             if rest not in known:
                 known[rest] = _clock(rest)
             day, clock = self._dates.get(date), known[rest]
-            if day is None:
-                day = self._new(date)
-            if clock is None:
-                day = STRANGE
-            else:
-                clocks[row], zones[row] = (
-                    clock[0],
-                    self._zones.setdefault(clock[1], len(self._zones)),
-                )
-            days[row] = day
-            if day in (0, STRANGE) and day not in self._firsts:
+            day = self._new(date) if day is None else day
+            if clock is not None:
+                clocks[row] = clock[0]
+                zones[row] = self._zones.setdefault(clock[1], len(self._zones))
+            days[row] = day = _No.STRANGE if clock is None else day
+            if day in (0, _No.STRANGE) and day not in self._firsts:
                 self._firsts[day] = Wrong(self._rows + row, cell)
         self._keep(days, clocks, zones)
 
@@ -229,13 +229,10 @@ class Stamps:
         self._of.append(np.array(np.broadcast_to(zones, clocks.shape), dtype=np.int16))
 
     def _new(self, date: str) -> int:
-        """Return the place of a date that was not there yet; of one that is none, ``STRANGE``."""
+        """Return the place of a date that was not there yet; of none ``STRANGE``."""
         parts = _parts(date)
-        if parts is None:
-            self._dates[date] = STRANGE
-        else:
-            self._dates[date] = len(self._parts)
-            self._parts.append(parts)
+        self._dates[date] = _No.STRANGE if parts is None else len(self._parts)
+        self._parts += [] if parts is None else [parts]
         return self._dates[date]
 
     def _day_numbers(
@@ -284,7 +281,7 @@ class Stamps:
         return offsets, next(iter(named.values()), "")
 
     def _wrong(self, seconds: FloatArray) -> Wrong | None:
-        if (first := self._firsts.get(STRANGE)) is not None:
+        if (first := self._firsts.get(_No.STRANGE)) is not None:
             shown = f"is {first.said[:SHOWN]!r}, neither seconds nor a stamp that is known,"
             return first._replace(said=shown)
         missing = np.isnan(seconds)
