@@ -57,10 +57,12 @@ def _turned(block: Block, rules: Rules) -> Block:
 
 
 def _refuse_half_days(block: Block) -> None:
-    """Raise where hours are 1 to 12 alone and time falls by about half a day."""
+    """Raise where hours are 1 to 12 alone and time falls at one, or leaps a day at midnight."""
     wall = block.clock.start + block.time
     hours = wall % DAY // HOUR
-    falls = np.flatnonzero(np.rint(np.diff(wall) / (0.5 * DAY)) == -1.0)
+    halves = np.rint(np.diff(wall) / (0.5 * DAY))
+    leaps = (halves == 2.0) & (hours[:-1] == 11.0) & (hours[1:] == 12.0)
+    falls = np.flatnonzero((halves == -1.0) | leaps)
     if not len(falls) or hours.min() < 1.0 or hours.max() > 12.0:
         return
     row = int(falls[0]) + 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 import zoneinfo
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,7 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.intake import Loop
-from stiction_ros.intake.sheets.stamps import _month
+from stiction_ros.intake.repairs import FORMS as FORMS_READ
+from stiction_ros.intake.sheets.stamps import _month, is_stamp
 
 from .exports import op, pv, said, text, write
 from .exports import read as read_all
@@ -99,6 +101,13 @@ def test_twelve_hours_without_am_and_pm_are_refused(tmp_path: Path, form: Form) 
     assert "2024-05-13 06:00:00 is there twice" in problem
 
 
+def test_twelve_hours_that_go_over_midnight_alone_are_refused(tmp_path: Path) -> None:
+    begin = datetime.datetime(2024, 5, 13, 22, 30, tzinfo=datetime.UTC)
+    times = stamps(lambda moment: moment.strftime("%Y-%m-%d %I:%M:%S"), begin)
+    problem = str(read(wide(tmp_path, times)).problem)
+    assert "2024-05-13 11:59:00 is followed by 2024-05-14 12:00:00" in problem
+
+
 def test_twelve_hours_of_times_of_the_day_alone(tmp_path: Path) -> None:
     begin = datetime.datetime(2024, 5, 13, 6, 0, tzinfo=datetime.UTC)
     times = stamps(lambda moment: moment.strftime("%I:%M:%S"), begin, 300)
@@ -162,6 +171,22 @@ def test_a_doubled_hour_that_is_sorted_is_refused(tmp_path: Path, form: Form, st
         "the clock is set back by an hour at 2024-10-27 03:00:00, and the rows from 02:00"
         in str(loop.problem)
     )
+
+
+@FORMS
+def test_offsets_tell_the_passes_of_autumn_apart_as_the_error_says(
+    tmp_path: Path, form: Form
+) -> None:
+    times = stamps(lambda m: m.astimezone(BERLIN).isoformat(" "), AUTUMN)
+    loop = read(form(tmp_path, times))
+    check(loop)
+    assert "clock" not in said(loop)
+
+
+@pytest.mark.parametrize("stamp", re.findall(r"(?<=[sr,] )\d[\w/. :-]*?(?=,| or)", FORMS_READ))
+def test_every_form_that_the_error_names_is_read(stamp: str) -> None:
+    zones = ("", " Z", " +02:00", " CET", " Europe/Berlin")
+    assert all(is_stamp(stamp + zone) for zone in zones)
 
 
 @FORMS
