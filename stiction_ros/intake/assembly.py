@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
 from stiction_ros.intake.modes import manual_marked
@@ -67,7 +68,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     rules = Rules(options.strict)
     for note, block in {note: one for one in found.blocks for note in one.mended}.items():
         rules.tell(note, block, note)
-    timed = [with_times(block, rules) for block in found.blocks]
+    timed = put_right([with_times(block, rules) for block in found.blocks], rules)
     if not options.as_given:
         timed = [with_values(block, rules, shared=found.shared) for block in timed]
     if len(timed) > 1:

@@ -1,9 +1,9 @@
 """What is wrong with the rows of a loop: told, counted, and masked, held or cut by one rule.
 
-Rows without a time are left out. Rows that run backwards are turned, single ones out of order
-sorted; of rows with one stamp the last counts. What is no number, of bad quality, or far outside
-everything else (a sentinel such as −9999) is missing: up to :data:`HELD` samples in a row are
-held (OP, SP) or interpolated (PV), more are bad. Missing set-points are held however long.
+Rows without a time are left out, single rows out of order sorted; of rows with one stamp the last
+counts. What is no number, of bad quality, or far outside everything else (a sentinel such as −9999)
+is missing: up to :data:`HELD` samples in a row are held (OP, SP) or interpolated (PV), more are
+bad. Missing set-points are held however long.
 """
 
 from __future__ import annotations
@@ -50,7 +50,15 @@ DIFFERENT = 0.5
 RARE = 0.2
 """Share of a signal that may lie far outside."""
 
-HOUR = 3600.0
+FEW = 0.01
+"""Share of stamps that may be left out as not understood."""
+
+FORMS = (
+    "write times as 2024-10-17 21:55:00, 17.10.2024 21:55, 10/17/2024 9:55 PM, 17 Oct 2024 21:55 "
+    "or 20241017215500, with or without a zone such as Z, +02:00, CET or Europe/Berlin"
+)
+"""How to mend stamps that are not understood."""
+
 FIX = "correct it, fill it or cut the record there"
 
 
@@ -91,15 +99,25 @@ def plural(count: int, what: str) -> str:
 
 
 def with_times(block: Block, rules: Rules) -> Block:
-    """Return the rows that have a time."""
-    there = np.isfinite(block.time)
+    """Return the rows that have a time.
+
+    Raises:
+        InputError: none has one, or more than :data:`FEW` have one that is not understood.
+    """
+    there, strange = np.isfinite(block.time), int(np.count_nonzero(np.isinf(block.time)))
     lost = len(there) - int(np.count_nonzero(there))
-    if not lost and not block.stray:
+    if not lost:
         return block
-    said = block.stray or f"{plural(lost, 'row')} without a time"
-    if lost == len(there):
-        raise InputError(said, where=str(block.path), fix="choose the column with --time COLUMN")
-    rules.tell(f"{plural(lost, 'row')} without a time left out", block, said)
+    where = str(block.path)
+    said = f"{plural(strange, 'stamp')} of {len(there)} not understood, the first: {block.stray}"
+    if strange > FEW * len(there) or lost == len(there):
+        fix = f"{FORMS}; or choose the column with --time COLUMN"
+        raise InputError(said if strange else block.stray, where=where, fix=fix)
+    if strange:
+        rules.tell(f"{said}, left out", block, block.stray)
+    if lost > strange:
+        note = f"{plural(lost - strange, 'row')} without a time left out"
+        rules.tell(note, block, block.stray)
     return block.rows(there)
 
 
@@ -166,10 +184,7 @@ def _listed(column: Column, missing: FlagArray) -> str:
 
 
 def in_order(block: Block, rules: Rules) -> list[Block]:
-    """Return the rows with increasing stamps; several blocks when the clock began anew.
-
-    A clock without a zone that was set back by an hour is put right.
-    """
+    """Return the rows with increasing stamps; several blocks when the clock began anew."""
     time = block.time
     steps = np.diff(time)
     if (steps > 0).all():
@@ -183,21 +198,7 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
     fix = "sort the rows and remove those that are there twice"
     if rules.strict:
         raise InputError(said, where=str(block.path), fix=fix)
-    if np.count_nonzero(steps < 0) > 0.9 * np.count_nonzero(steps):
-        rules.told.append("rows stood from the last to the first and are turned")
-        return in_order(block.rows(np.arange(len(time))[::-1]), rules)
     back = np.flatnonzero(steps < 0)
-    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    if block.clock.dated and not block.clock.zoned and len(back) == 1:
-        fall = -float(steps[back[0]])
-        if abs(fall + usual - HOUR) <= 0.5 * usual or abs(fall - HOUR) <= 0.5 * usual:
-            moved = time.copy()
-            moved[back[0] + 1 :] += HOUR
-            rules.told.append(
-                f"the clock is set back by an hour at {block.place(int(back[0]) + 1)}: what "
-                "follows is moved on"
-            )
-            return in_order(dataclasses.replace(block, time=moved), rules)
     if len(back) and len(back) <= 0.001 * len(time) + 3:
         runs = np.split(np.arange(len(time)), back + 1)
         longest = [run for run in runs if len(run) >= max(10, 0.02 * len(time))]

@@ -36,10 +36,6 @@ _UNIT = re.compile(
 """A number and its unit in one cell."""
 
 _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-_STAMP = re.compile(
-    r"\d{1,4}[./-](\d{1,2}|[^\W\d_]{3,9}\.?)[./-]\d{2,4}([ T,].*)?|\d{8}T?\s?\d{4,6}.*|"
-    r"\d{1,2}:\d\d(:\d\d.*)?"
-)
 
 
 class Wrong(NamedTuple):
@@ -66,11 +62,6 @@ def is_number(cell: str) -> bool:
     """Return whether a cell is a number, with a point or a comma."""
     cell = cell.strip()
     return number(cell) is not None or _COMMA.fullmatch(cell) is not None
-
-
-def is_stamp(cell: str) -> bool:
-    """Return whether a cell looks like a date or a time of day."""
-    return _STAMP.fullmatch(cell.strip()) is not None
 
 
 @dataclasses.dataclass

@@ -8,8 +8,9 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number, is_stamp
+from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number
 from stiction_ros.intake.sheets.names import VALUE_NAMES, is_name, read_tag
+from stiction_ros.intake.sheets.stamps import is_stamp
 
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets import text
-from stiction_ros.intake.sheets.cells import Cells, is_number, is_stamp
+from stiction_ros.intake.sheets.cells import Cells, is_number
 from stiction_ros.intake.sheets.layout import (
     LOOKED_AT,
     SPACE,
@@ -26,6 +26,7 @@ from stiction_ros.intake.sheets.layout import (
     spaced,
 )
 from stiction_ros.intake.sheets.names import OR_ROW
+from stiction_ros.intake.sheets.stamps import is_stamp
 
 PIECE = 200_000
 """Cells that are held as text at one time."""

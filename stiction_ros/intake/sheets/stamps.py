@@ -5,35 +5,58 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import enum
+import functools
 import re
+import unicodedata
+import zoneinfo
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, number
+from stiction_ros.intake.sheets.cells import SHOWN, Cells, Numbers, Wrong, is_number
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.words import by_word
 
-DAY = 86400.0
+DAY = 86_400_000_000
+"""Microseconds of a day."""
+
+
+class _No(enum.IntEnum):
+    """In the place of a date: an empty cell, and one that is not understood."""
+
+    EMPTY = -1
+    STRANGE = -2
+
 
 _MONTHS: Mapping[str, int] = by_word("months")
-"""First letters of the months in several languages."""
-
-_DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[^\W\d_]{3,9}\.?)[./-](\d{2,4})")
-_CLOCK = re.compile(
-    r"(\d{1,2})[:.](\d\d)(?:[:.](\d\d)(?:[.,:](\d{1,9}))?)?\s*([ap])?\.?(?:m\.?)?", re.IGNORECASE
-)
-_ZONE = re.compile(r"(?:Z|[+-]\d\d:?\d\d)$")
-
+"""Names of the months in several languages, without accents."""
 
 _OFFSETS: Mapping[str, str] = by_word("zones")
 """Zones by their names, of which each is one alone."""
 
-_NAMED = re.compile(rf"\s*\b({'|'.join(_OFFSETS)})$")
+_HALVES: Mapping[str, str] = by_word("half_days")
+"""Words for the halves of a day, without points and spaces."""
+
+_SEP = r"(?:\.?[./-]|\.?,?\s+(?:del?\s+)?)"
+_DATE = re.compile(
+    r"((?:19|20)\d\d)(\d\d)(\d\d)(?=[T ]\d|\d{4}(?:\d\d)?(?!\d))|"
+    rf"(\d{{1,4}}|[^\W\d_]{{3,}})({_SEP})(\d{{1,2}}|[^\W\d_]{{3,}}){_SEP}(\d{{1,4}})(?![\d:])"
+)
+_HALF = "|".join(r"\.?\s?".join(word.replace(" ", "")) + r"\.?" for word in _HALVES)
+_CLOCK = re.compile(
+    r"[T,;:_-]?\s*(?:"
+    r"(\d{1,2})(?:[:.h]|(?<=\d\d)(?=\d\d))(\d{1,2})"
+    r"(?:(?:[:.]|(?<=\d{4})(?=\d\d))(\d{1,2})(?:[.,:](\d{1,9}))?)?"
+    rf"(?:\s*({_HALF})(?![^\W\d_]))?"
+    r"\s*((?:(?:UTC|GMT)?[+-]\d{1,2}(?::?\d\d)?)?\s*(?:[\[(]?[a-z][\w/+-]*[\])]?)?))?",
+    re.IGNORECASE,
+)
+_ISO = re.compile(r"\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?)?")
+_OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2}):?(\d\d)?(?![^\W\d_])", re.IGNORECASE)
 
 
 class DateOrder(enum.StrEnum):
@@ -47,12 +70,15 @@ class Times(NamedTuple):
     """A column of times.
 
     Attributes:
-        seconds: since the first that is one, shape (N,), NaN where there is none.
+        seconds: since the first that is one, shape (N,); NaN where the cell is empty, infinite
+            where it is not understood.
         start: the first one; seconds since 1970 in UTC for dates, else as given.
         dated: whether they are dates.
         zoned: whether they bear a zone.
-        wrong: first cell that is no time.
+        wrong: first cell that is not understood, else the first empty one.
         note: how they were read, empty for the usual way.
+        zone: whose local time they are, where that is not yet brought to UTC; else empty.
+        daily: whether they are times of the day alone.
     """
 
     seconds: FloatArray
@@ -60,12 +86,23 @@ class Times(NamedTuple):
     dated: bool
     zoned: bool
     wrong: Wrong | None
-    note: str
+    note: str = ""
+    zone: str = ""
+    daily: bool = False
+
+
+class _Parts(NamedTuple):
+    """A date; ``asked`` where day and month may be the other way round."""
+
+    year: int
+    day: int
+    month: int
+    asked: bool = False
 
 
 @dataclasses.dataclass
 class Stamps:
-    """A column of times as it grows; its first cell tells what the others are.
+    """A column of times as it grows; most cells of its first piece tell whether it is numbers.
 
     Attributes:
         decimal_comma: of numbers.
@@ -75,28 +112,27 @@ class Stamps:
     decimal_comma: bool = False
     order: DateOrder | None = None
     _numbers: Numbers | None = None
-    _iso: list[NDArray[np.int64]] = dataclasses.field(default_factory=list)
-    _dates: dict[str, int] = dataclasses.field(default_factory=dict)
+    _dates: dict[str, int] = dataclasses.field(default_factory=lambda: {"": 0, "1970-01-01": 1})
+    _parts: list[_Parts] = dataclasses.field(default_factory=lambda: 2 * [_Parts(1970, 1, 1)])
+    _zones: dict[str, int] = dataclasses.field(default_factory=lambda: {"": 0})
     _days: list[NDArray[np.int32]] = dataclasses.field(default_factory=list)
-    _clocks: list[FloatArray] = dataclasses.field(default_factory=list)
-    _kind: str = ""
+    _clocks: list[NDArray[np.int64]] = dataclasses.field(default_factory=list)
+    _of: list[NDArray[np.int16]] = dataclasses.field(default_factory=list)
+    _firsts: dict[int, Wrong] = dataclasses.field(default_factory=dict)
+    _told: bool = False
     _rows: int = 0
-    _zoned: bool = False
-    _wrong: Wrong | None = None
 
     def add(self, cells: Cells) -> None:
         """Add the next piece of the column."""
-        if not isinstance(cells, np.ndarray):
-            cells = _with_offsets(cells)
-        if not self._kind:
-            self._kind = self._told(cells)
-        if self._kind == "number":
+        if isinstance(cells, np.ndarray) and cells.dtype.kind == "M":
+            whole = cells.astype("datetime64[us]")
+            self._keep(np.where(np.isnat(whole), _No.EMPTY, 1), whole.astype(np.int64), 0)
+        elif isinstance(cells, np.ndarray) or self._numbers is not None or self._is_numbers(cells):
             if self._numbers is None:
                 self._numbers = Numbers(self.decimal_comma)
+                self._numbers.add([""] * self._rows)
             self._numbers.add(cells)
-        elif self._kind == "iso":
-            self._iso.append(self._iso_stamps(cells))
-        else:
+        elif not self._iso(cells):
             self._other(cells)
         self._rows += len(cells)
 
@@ -104,243 +140,258 @@ class Stamps:
         """Return the whole column.
 
         Raises:
-            InputError: dates of which days and months cannot be told apart.
+            InputError: dates of which days and months cannot be told apart, or a zone that is
+                not known.
         """
-        if self._kind == "number" and self._numbers is not None:
-            return self._finished(self._numbers.values(), self._numbers.wrong)
-        if self._kind == "iso":
-            return self._from_microseconds(np.concatenate(self._iso), "")
+        if self._numbers is not None:
+            read = self._numbers.values()
+            strange = ~np.isfinite(read) & ~self._numbers.blank()
+            if strange.any():
+                text = next(word for word in self._numbers.words if word)
+                self._firsts[_No.STRANGE] = Wrong(int(np.argmax(strange)), text)
+            values = np.where(strange, np.inf, read)
+            first = float(values[np.argmax(np.isfinite(values))]) if len(values) else 0.0
+            first = first if np.isfinite(first) else 0.0
+            return Times(values - first, first, False, False, self._wrong(values))
         days, clocks = np.concatenate(self._days), np.concatenate(self._clocks)
+        of = np.concatenate(self._of)
+        daily = not (days > 0).any()
+        if not daily:  # a time of the day alone is no stamp among dates
+            days[days == 0] = _No.STRANGE
+            lone = [self._firsts.pop(day) for day in (0, _No.STRANGE) if day in self._firsts]
+            self._firsts.update({_No.STRANGE: min(lone)} if lone else {})
         numbered, note = self._day_numbers(days, clocks, where)
-        seconds = np.where(days >= 0, DAY * numbered[days], np.nan) + clocks
-        if set(self._dates) == {""}:  # times of day alone: each fall is a midnight
-            return self._finished(_over_midnights(seconds), self._wrong)
-        microseconds = np.full(len(seconds), np.iinfo(np.int64).min)
-        there = np.isfinite(seconds)
-        microseconds[there] = np.rint(1e6 * seconds[there]).astype(np.int64)
-        return self._from_microseconds(microseconds, note)
+        there = days >= 0
+        offsets, zone = self._offsets(of[there], where)
+        stamps = DAY * numbered[days] + clocks - offsets[of]
+        first = int(stamps[np.argmax(there)]) if there.any() else 0
+        seconds = (stamps - first) / 1e6
+        seconds[days == _No.EMPTY], seconds[days == _No.STRANGE] = np.nan, np.inf
+        zoned = not zone and bool(of[there].any())
+        wrong = self._wrong(seconds)
+        return Times(seconds, first / 1e6, not daily, zoned, wrong, note, zone, daily)
 
-    def _told(self, cells: Cells) -> str:
-        if isinstance(cells, np.ndarray):
-            return "iso" if cells.dtype.kind == "M" else "number"
-        first = next((cell.strip() for cell in cells if cell.strip()), "")
-        if number(first) is not None or number(first.replace(",", ".")) is not None:
-            compact = re.fullmatch(r"(19|20)\d{6}(\d{4}|\d{6})", first)
-            return "other" if compact else "number"
-        return "iso" if _iso(first) is not None else "other"
+    def _is_numbers(self, cells: Sequence[str]) -> bool:
+        if self._told:
+            return False
+        filled = [cell.strip() for cell in cells if cell.strip()]
+        self._told = bool(filled)
+        if filled and _ISO.match(filled[0]):
+            return False
+        count = sum(is_number(cell) and not _DATE.match(cell) for cell in filled)
+        return 2 * count >= len(filled) > 0
 
-    def _iso_stamps(self, cells: Cells) -> NDArray[np.int64]:
-        """Return microseconds since 1970 in UTC, shape (n,), the least integer for none."""
-        if isinstance(cells, np.ndarray):
-            self._zoned = True
-            return np.asarray(cells.astype("datetime64[us]").astype(np.int64))
-        fast = self._iso_fast(cells)
-        if fast is not None:
-            return fast
-        found = np.empty(len(cells), dtype=np.int64)
-        for row, cell in enumerate(cells):
-            stamp = _iso(cell.strip())
-            if stamp is None:
-                self._note(row, cell.strip())
-                found[row] = np.iinfo(np.int64).min
-                continue
-            self._zoned |= stamp.tzinfo is not None
-            found[row] = _microseconds(stamp)
-        return found
-
-    def _iso_fast(self, cells: Sequence[str]) -> NDArray[np.int64] | None:
-        """Return the stamps when all have the same form and zone; None when they have not."""
-        zone = _ZONE.search(cells[0]) if cells else None
-        shift = 0
-        if zone is not None:
-            tail = zone[0]
+    def _iso(self, cells: Sequence[str]) -> bool:
+        """Add ISO stamps that have the same form and zone; False when they have not."""
+        found = _ISO.match(cells[0])
+        clock = found and _clock(f"0:00{(tail := cells[0][found.end() :])}")
+        if not clock or clock[0]:
+            return False
+        if tail:
             if not all(cell.endswith(tail) for cell in cells):
-                return None
-            stamp = _iso(cells[0])
-            offset = None if stamp is None else stamp.utcoffset()
-            shift = 0 if offset is None else offset // datetime.timedelta(microseconds=1)
+                return False
             cells = [cell[: -len(tail)] for cell in cells]
         text = "".join(cells)
-        if "Z" in text or "+" in text or any("-" in cell[10:] for cell in cells):
-            return None  # zones that are not the same in all
+        if "Z" in text or "+" in text or text.count("-") != 2 * len(cells):
+            return False
         try:
-            found = np.array(cells, dtype="datetime64[us]")
+            stamps = np.array(cells, dtype="datetime64[us]")
         except ValueError:
-            return None
-        if np.isnat(found).any():
-            return None
-        self._zoned |= zone is not None
-        return np.asarray(found.astype(np.int64) - shift)
+            return False
+        self._keep(1, stamps.astype(np.int64), self._zones.setdefault(clock[1], len(self._zones)))
+        return True
 
-    def _other(self, cells: Cells) -> None:
-        days = np.full(len(cells), -1, dtype=np.int32)
-        clocks = np.full(len(cells), np.nan)
-        known: dict[str, float | None] = {}
-        for row, cell in enumerate(cells):
-            date, clock = _split(str(cell).strip())
-            if clock not in known:
-                known[clock] = _clock(clock)
-            seconds = known[clock]
-            if seconds is None or (date and _parts(date) is None):
-                self._note(row, str(cell).strip())
+    def _other(self, cells: Sequence[str]) -> None:
+        days = np.full(len(cells), _No.EMPTY, dtype=np.int32)
+        clocks = np.zeros(len(cells), dtype=np.int64)
+        zones = np.zeros(len(cells), dtype=np.int16)
+        known: dict[str, tuple[int, str] | None] = {}
+        for row, given in enumerate(cells):
+            cell = given.strip()
+            if not cell:
                 continue
-            days[row] = self._dates.setdefault(date, len(self._dates))
-            clocks[row] = seconds
-        self._days.append(days)
+            date, rest = _cut(cell)
+            if rest not in known:
+                known[rest] = _clock(rest)
+            day, clock = self._dates.get(date), known[rest]
+            day = self._new(date) if day is None else day
+            if clock is not None:
+                clocks[row] = clock[0]
+                zones[row] = self._zones.setdefault(clock[1], len(self._zones))
+            days[row] = day = _No.STRANGE if clock is None else day
+            if day in (0, _No.STRANGE) and day not in self._firsts:
+                self._firsts[day] = Wrong(self._rows + row, cell)
+        self._keep(days, clocks, zones)
+
+    def _keep(self, days: Any, clocks: NDArray[np.int64], zones: Any) -> None:
+        self._days.append(np.array(np.broadcast_to(days, clocks.shape), dtype=np.int32))
         self._clocks.append(clocks)
+        self._of.append(np.array(np.broadcast_to(zones, clocks.shape), dtype=np.int16))
+
+    def _new(self, date: str) -> int:
+        """Return the place of a date that was not there yet; of none ``STRANGE``."""
+        parts = _parts(date)
+        self._dates[date] = _No.STRANGE if parts is None else len(self._parts)
+        self._parts += [] if parts is None else [parts]
+        return self._dates[date]
 
     def _day_numbers(
-        self, days: NDArray[np.int32], clocks: FloatArray, where: str
-    ) -> tuple[FloatArray, str]:
+        self, days: NDArray[np.int32], clocks: NDArray[np.int64], where: str
+    ) -> tuple[NDArray[np.int64], str]:
         """Return the day since 1970 of each date, and how they were read."""
-        parts = [_parts(date) or (1970, "", 1, 1) for date in self._dates]
-        if not parts:
-            return np.zeros(1), ""
-        if not any(mark == "?" for _, mark, _, _ in parts):
-            return np.array([_day(year, b, a) for year, _, a, b in parts]), ""
         orders = [self.order] if self.order else list(DateOrder)
-        found = {order: read for order in orders if (read := _read(parts, order)) is not None}
+        every = {order: [_day(parts, order) for parts in self._parts] for order in orders}
+        found = {o: np.array(read) for o, read in every.items() if None not in read}
+        asked = [
+            text for text, place in self._dates.items() if place > 1 and self._parts[place].asked
+        ]
         if not found:
+            texts = {place: text for text, place in self._dates.items()}
+            none = dict.fromkeys(texts[read.index(None)] for read in every.values())
             raise InputError(
-                f"dates such as {next(iter(self._dates))} are none", where=where,
+                f"{' and '.join(none)} are not dates in one order of days and months", where=where,
                 fix="export ISO stamps such as 2024-10-17 21:55:00",
             )  # fmt: skip
         if len(found) > 1:
             found = _steadier(found, days, clocks)
-        if len(found) > 1 and len({tuple(read) for read in found.values()}) > 1:
+        if len({tuple(read) for read in found.values()}) > 1:
             raise InputError(
-                f"{next(iter(self._dates))} may begin with the day or with the month",
+                f"{asked[0]} may begin with the day or with the month",
                 where=where,
                 fix=f"say which with --dates dmy or --dates mdy {OR_ROW}",
             )
         order, read = next(iter(found.items()))
         first = "day" if order is DateOrder.DAY else "month"
-        note = "" if self.order else f"dates are read with the {first} first"
-        return read, note
+        return read, "" if self.order or not asked else f"dates are read with the {first} first"
 
-    def _note(self, row: int, text: str) -> None:
-        if self._wrong is None:
-            said = f"is {text[:SHOWN]!r}, neither seconds nor an ISO stamp" if text else "is empty"
-            self._wrong = Wrong(self._rows + row, said)
+    def _offsets(self, of: NDArray[np.int16], where: str) -> tuple[NDArray[np.int64], str]:
+        """Return the µs that each zone is before UTC, and the one whose local time all are."""
+        used = [text for text, place in self._zones.items() if (of == place).any()]
+        read = {text: _zone(text, where) for text in used}
+        named = {text: zone for text, zone in read.items() if isinstance(zone, str)}
+        if len(used) > 1 and ("" in used or (named and len(set(read.values())) > 1)):
+            raise InputError(
+                f"stamps bear several zones: {' and '.join(text or 'none' for text in used[:2])}",
+                where=where,
+                fix="export all of them in one, such as UTC",
+            )
+        offsets = np.zeros(len(self._zones), dtype=np.int64)
+        for text, zone in read.items():
+            offsets[self._zones[text]] = 0 if isinstance(zone, str) else zone
+        return offsets, next(iter(named.values()), "")
 
-    def _from_microseconds(self, stamps: NDArray[np.int64], note: str) -> Times:
-        there = stamps != np.iinfo(np.int64).min
-        if not there.any():
-            return self._finished(np.full(len(stamps), np.nan), self._wrong)
-        first = int(stamps[np.argmax(there)])
-        seconds = np.where(there, (stamps - first) / 1e6, np.nan)
-        return Times(seconds, first / 1e6, True, self._zoned, self._wrong, note)
-
-    def _finished(self, values: FloatArray, wrong: Wrong | None) -> Times:
-        there = np.isfinite(values)
-        first = float(values[np.argmax(there)]) if there.any() else 0.0
-        return Times(values - first, first, False, False, wrong, "")
-
-
-def _with_offsets(cells: Sequence[str]) -> Sequence[str]:
-    """Return stamps with the offset of a zone that is named behind them."""
-    if not any(_NAMED.search(cell.strip()) for cell in (*cells[:1], *cells[-1:])):
-        return cells
-    return [_NAMED.sub(lambda found: _OFFSETS[found[1]], cell.strip()) for cell in cells]
+    def _wrong(self, seconds: FloatArray) -> Wrong | None:
+        if (first := self._firsts.get(_No.STRANGE)) is not None:
+            shown = f"is {first.said[:SHOWN]!r}, neither seconds nor a stamp that is known,"
+            return first._replace(said=shown)
+        missing = np.isnan(seconds)
+        return Wrong(int(np.argmax(missing)), "is empty") if missing.any() else None
 
 
-def _iso(cell: str) -> datetime.datetime | None:
-    if not cell[:4].isdigit() or (cell.isdigit() and len(cell) != 14):
-        return None
-    try:
-        return datetime.datetime.fromisoformat(cell.replace("/", "-"))
-    except ValueError:
-        return None
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell is a date or a time of the day."""
+    date, clock = _cut(cell.strip())
+    known = bool(date and _parts(date)) or (not date and ":" in clock)
+    return known and _clock(clock) is not None
 
 
-def _microseconds(stamp: datetime.datetime) -> int:
-    zoned = stamp if stamp.tzinfo else stamp.replace(tzinfo=datetime.UTC)
-    epoch = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
-    return (zoned - epoch) // datetime.timedelta(microseconds=1)
-
-
-def _split(cell: str) -> tuple[str, str]:
-    """Return date and clock of a cell; the clock may be missing, and so may the date."""
-    compact = re.fullmatch(r"(\d{4})(\d\d)(\d\d)[T ]?(\d\d)(\d\d)(\d\d)?(\.\d+)?", cell)
-    if compact:
-        y, m, d, hours, minutes, seconds, rest = compact.groups()
-        return f"{y}-{m}-{d}", f"{hours}:{minutes}:{seconds or '00'}{rest or ''}"
-    for mark in (" ", "T", ","):
-        date, found, clock = cell.partition(mark)
-        if found and _DATE.fullmatch(date):
-            return date, clock.strip(" ,")
-    return (cell, "0:00") if _DATE.fullmatch(cell) else ("", cell)
-
-
-def _clock(text: str) -> float | None:
-    """Return seconds since midnight; None for anything else."""
-    found = _CLOCK.fullmatch(text)
+def _cut(cell: str) -> tuple[str, str]:
+    """Return the date of a cell, empty for none, and what stands behind it."""
+    found = _DATE.match(cell)
     if found is None:
+        return "", cell
+    date = found[0] if found[1] is None else f"{found[1]}-{found[2]}-{found[3]}"
+    return date, cell[found.end() :]
+
+
+def _clock(text: str) -> tuple[int, str] | None:
+    """Return microseconds since midnight and the zone; None for anything else."""
+    found = _CLOCK.fullmatch(text)
+    if found is None or (found[1] is None and text):
         return None
-    hours, minutes, seconds = int(found[1]), int(found[2]), int(found[3] or 0)
+    hours, minutes, seconds = int(found[1] or 0), int(found[2] or 0), int(found[3] or 0)
     if found[5]:
         if not 1 <= hours <= 12:
             return None
-        hours = hours % 12 + (12 if found[5] in "pP" else 0)
+        afternoon = _HALVES[re.sub(r"[.\s]", "", found[5]).casefold()] == "pm"
+        hours = hours % 12 + (12 if afternoon else 0)
     if hours > 24 or minutes > 59 or seconds > 60:
         return None
-    return 3600.0 * hours + 60.0 * minutes + seconds + float(f"0.{found[4] or 0}")
+    micros = int((found[4] or "").ljust(6, "0")[:6])
+    return 1_000_000 * (3600 * hours + 60 * minutes + seconds) + micros, found[6] or ""
 
 
-def _parts(date: str) -> tuple[int, str, int, int] | None:
-    """Return year, ``?`` when day and month cannot be told apart by form, and the two.
+def _zone(text: str, where: str) -> int | str:
+    """Return how many microseconds a zone is before UTC, or its name where that changes.
 
-    The two are day and month where that is known, else as they stand.
+    Raises:
+        InputError: it is not known.
     """
-    if not date:
-        return 1970, "", 1, 1
+    name = text.strip("[]() ")
+    offset = _OFFSET.match(_OFFSETS.get(name.upper(), name or "+0"))
+    if offset is not None:
+        minutes = 60 * int(offset[2]) + int(offset[3] or 0)
+        return 60_000_000 * (-minutes if offset[1] == "-" else minutes)
+    try:
+        return zoneinfo.ZoneInfo(name).key
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        raise InputError(
+            f"zone {name} of the stamps is unknown, or the name of several",
+            where=where,
+            fix="write its offset, such as +02:00, or a name such as Europe/Berlin",
+        ) from None
+
+
+def _parts(date: str) -> _Parts | None:
+    """Return the parts of a date; None when it is none."""
     found = _DATE.fullmatch(date)
     if found is None:
         return None
-    a, mark, b, c = found.groups()
+    a, mark, b, c = found.group(4, 5, 6, 7)
+    if b.isdigit() and not a.isdigit():
+        a, b = b, a
     if len(a) > 2:
-        return (int(a), "", int(c), int(b)) if b.isdigit() else None
+        a, c = c, a
+    elif len(c) not in (2, 4):
+        return None
+    month = int(b) if b.isdigit() else _month(b)
+    if len(c) == 3 or len(a) > 2 or not a.isdigit():
+        return None
     year = int(c) + (0 if len(c) > 2 else 2000 if int(c) < 70 else 1900)
-    if not b.isdigit():
-        folded = b.casefold()
-        month = _MONTHS.get(folded[:4]) or _MONTHS.get(folded[:3])
-        return None if month is None else (year, "", int(a), month)
-    return year, "" if mark == "." else "?", int(a), int(b)
+    asked = b.isdigit() and len(found[4]) < 3 and not mark.startswith(".")
+    parts = _Parts(year, int(a), month, asked)
+    return parts if any(_day(parts, order) is not None for order in DateOrder) else None
 
 
-def _day(year: int, month: int, day: int) -> float:
+@functools.cache
+def _month(word: str) -> int:
+    """Return the one month of which the name begins with a word; 0 for none."""
+    plain = unicodedata.normalize("NFKD", word.casefold())
+    plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    found = {month for name, month in _MONTHS.items() if name.startswith(plain)}
+    return found.pop() if len(found) == 1 else 0
+
+
+def _day(parts: _Parts, order: DateOrder) -> int | None:
+    """Return the day since 1970 of a date in one order; None when it is none."""
+    day, month = parts.day, parts.month
+    if parts.asked and order is DateOrder.MONTH:
+        day, month = month, day
     try:
-        return float((datetime.date(year, month, day) - datetime.date(1970, 1, 1)).days)
+        return (datetime.date(parts.year, month, day) - datetime.date(1970, 1, 1)).days
     except ValueError:
-        return np.nan
-
-
-def _over_midnights(seconds: FloatArray) -> FloatArray:
-    there = np.isfinite(seconds)
-    falls = np.diff(seconds[there], prepend=seconds[there][:1]) < -0.5 * DAY
-    unwrapped = seconds.copy()
-    unwrapped[there] += DAY * np.cumsum(falls)
-    return unwrapped
-
-
-def _read(parts: list[tuple[int, str, int, int]], order: DateOrder) -> FloatArray | None:
-    """Return the dates in one order, shape (D,); None when one of them is no date."""
-    days = [
-        _day(year, a, b) if mark == "?" and order is DateOrder.MONTH else _day(year, b, a)
-        for year, mark, a, b in parts
-    ]
-    return None if np.isnan(days).any() else np.array(days)
+        return None
 
 
 def _steadier(
-    found: dict[DateOrder, FloatArray], days: NDArray[np.int32], clocks: FloatArray
-) -> dict[DateOrder, FloatArray]:
+    found: dict[DateOrder, NDArray[np.int64]], days: NDArray[np.int32], clocks: NDArray[np.int64]
+) -> dict[DateOrder, NDArray[np.int64]]:
     """Return the one order in which time goes on evenly; all when that does not tell."""
     there = days >= 0
     longest = {}
     for order, read in found.items():
         steps = np.abs(np.diff(DAY * read[days[there]] + clocks[there]))
-        longest[order] = float(steps.max()) if len(steps) else 0.0
+        longest[order] = int(steps.max()) if len(steps) else 0
     best = min(longest, key=lambda order: longest[order])
     worst = max(longest.values())
-    return {best: found[best]} if 3.0 * longest[best] < worst else found
+    return {best: found[best]} if 3 * longest[best] < worst else found

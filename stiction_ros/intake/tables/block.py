@@ -36,11 +36,15 @@ class Clock(NamedTuple):
         start: the first time, seconds since 1970 in UTC when it is dated.
         dated: whether it is a date.
         zoned: whether its zone is known.
+        zone: whose local time it is, where that is not yet brought to UTC; else empty.
+        daily: whether it counts from midnight each day.
     """
 
     start: float
     dated: bool
     zoned: bool
+    zone: str = ""
+    daily: bool = False
 
 
 @dataclasses.dataclass

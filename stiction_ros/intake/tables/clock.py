@@ -10,10 +10,9 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
-from stiction_ros.intake.sheets.cells import is_stamp
 from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
 from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.sheets.stamps import Times
+from stiction_ros.intake.sheets.stamps import Times, is_stamp
 from stiction_ros.intake.tables.block import Clock
 
 EPOCHS = {
@@ -94,8 +93,8 @@ def in_seconds(
     Raises:
         InputError: numbers of which the unit cannot be told.
     """
-    clock = Clock(times.start, times.dated, times.zoned)
-    if times.dated:
+    clock = Clock(times.start, times.dated, times.zoned, times.zone, times.daily)
+    if times.dated or times.daily:
         return times.seconds, clock, ""
     name, said = sheet.layout.given[index], sheet.layout.units[index]
     unit = options.time_unit or (TimeUnit.SECONDS if options.as_given else known_time_unit(said))
@@ -131,4 +130,4 @@ def _scaled(times: Times, unit: TimeUnit, note: str) -> tuple[FloatArray, Clock,
         seconds = np.round(seconds, 3)  # a day's fraction is good for a tenth of a millisecond
     start *= factor
     dated = 3e8 <= start <= 4e9
-    return seconds, Clock(start, dated, dated), note
+    return seconds, Clock(start, dated, dated and unit is not TimeUnit.DAYS), note

@@ -13,7 +13,7 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.sheets.cells import Cells, Numbers, Words, is_number, is_stamp
+from stiction_ros.intake.sheets.cells import Cells, Numbers, Words, is_number
 from stiction_ros.intake.sheets.names import (
     OR_ROW,
     TAG_NAMES,
@@ -26,6 +26,7 @@ from stiction_ros.intake.sheets.names import (
     without_quality,
 )
 from stiction_ros.intake.sheets.sheet import Sheet, stem
+from stiction_ros.intake.sheets.stamps import is_stamp
 from stiction_ros.intake.tables.block import Key
 from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, time_column
 from stiction_ros.intake.tables.qualities import all_of_quality

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
+
+_MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
 
 
 def blocks_of(
@@ -143,7 +146,7 @@ def _stamp_cells(columns: Sequence[Cells], time: TimeColumn) -> Cells:
     if time.beside is None:
         return date
     clock = columns[time.beside]
-    return [f"{str(d)[:10]} {c}".strip() for d, c in zip(date, clock, strict=True)]
+    return [f"{_MIDNIGHT.sub('', str(d))} {c}".strip() for d, c in zip(date, clock, strict=True)]
 
 
 def _times(

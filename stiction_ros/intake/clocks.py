@@ -1,0 +1,233 @@
+"""The clocks of a loop's blocks put right: midnights, 12 hours, summer time.
+
+This is done in each block before blocks are joined, as afterwards the two passes over the hour
+that summer time ends with are one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+from stiction_ros.intake.repairs import Rules
+from stiction_ros.intake.summer_time import Change, ahead, changes, shown
+from stiction_ros.intake.tables.block import Block, FlagArray
+from stiction_ros.texts import DAY, HOUR
+
+FIX = "export the stamps in UTC or with their offset, such as 2024-10-27 02:00:00+01:00"
+
+
+def put_right(blocks: Sequence[Block], rules: Rules) -> list[Block]:
+    """Return blocks of one loop with times that go on evenly, in UTC where their zone is known.
+
+    Raises:
+        InputError: a clock of 12 hours without AM and PM, or rows of an hour that is passed twice
+            that do not tell which pass they belong to.
+    """
+    found = [_turned(block, rules) for block in blocks]
+    for place, block in enumerate(found):
+        if not block.clock.zoned and (block.clock.dated or block.clock.daily):
+            _refuse_half_days(block)
+        if block.clock.daily:
+            falls = np.diff(block.time, prepend=block.time[:1]) < -0.5 * DAY
+            found[place] = dataclasses.replace(block, time=block.time + DAY * np.cumsum(falls))
+    local = {k: b.clock.zone for k, b in enumerate(found) if b.clock.dated and not b.clock.zoned}
+    for zone in dict.fromkeys(local.values()):
+        places = [place for place, other in local.items() if other == zone]
+        even = _in_one_time([found[place] for place in places], zone, rules)
+        for place, block in zip(places, even, strict=True):
+            found[place] = block
+    return found
+
+
+def _turned(block: Block, rules: Rules) -> Block:
+    steps = np.diff(block.time)
+    if not steps.any() or np.count_nonzero(steps < 0) <= 0.9 * np.count_nonzero(steps):
+        return block
+    said = f"time does not increase at {block.place(1)}"
+    rules.tell("rows stood from the last to the first and are turned", block, said, "sort the rows")
+    return block.rows(np.arange(len(block.time))[::-1])
+
+
+def _refuse_half_days(block: Block) -> None:
+    """Raise where hours are 1 to 12 alone and time falls at one, or leaps a day at midnight."""
+    wall = block.clock.start + block.time
+    hours = wall % DAY // HOUR
+    halves = np.rint(np.diff(wall) / (0.5 * DAY))
+    leaps = (halves == 2.0) & (hours[:-1] == 11.0) & (hours[1:] == 12.0)
+    falls = np.flatnonzero((halves == -1.0) | leaps)
+    if not len(falls) or hours.min() < 1.0 or hours.max() > 12.0:
+        return
+    row = int(falls[0]) + 1
+    again = row + np.flatnonzero(np.isin(wall[row:], wall[:row]))[:1]
+    first, then, *twice = (shown(wall[k])[11 * block.clock.daily :] for k in (row - 1, row, *again))
+    raise InputError(
+        f"the clock has 12 hours, without AM and PM: {first} is followed by {then} in "
+        f"{block.place(row)}{''.join(f', {stamp} is there twice' for stamp in twice)}",
+        where=str(block.path),
+        fix="export stamps with 24 hours, or with AM and PM",
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Rows:
+    """Rows in their order.
+
+    Attributes:
+        wall: local time, s since 1970, shape (N,).
+        rank: their order in the file, shape (N,).
+    """
+
+    wall: FloatArray
+    rank: NDArray[np.int64]
+
+    @functools.cached_property
+    def usual(self) -> float:
+        """The usual step, s."""
+        steps = np.diff(self.wall)
+        return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+
+    def seams(self, change: Change) -> NDArray[np.intp]:
+        """Return the rows before which a clock is set by a change, as far as times tell.
+
+        Both ends of a fall lie within what is passed twice, those of a leap do not lie within
+        what is left out, and it is nearer to the whole change than to nothing.
+        """
+        steps, (low, high) = np.diff(self.wall), change[:2]
+        first, then = self.wall[:-1], self.wall[1:]
+        if change.back:
+            found = (first > low) & (first <= high) & (then >= low) & (then < high) & (steps <= 0)
+        else:
+            found = (first <= low) & (then >= high)
+        found &= np.rint((self.usual - steps) / change.moves) == 1.0
+        return np.flatnonzero(found) + 1
+
+    def is_doubled(self, change: Change) -> bool:
+        """Tell whether both passes stand between each other: twice as many rows as elsewhere."""
+        wall = np.sort(self.wall)
+        inside = (wall >= change.low) & (wall < change.high)
+        steps = np.diff(wall)[~inside[1:]] if not inside.all() else np.diff(wall)
+        if not (steps > 0).any() or np.count_nonzero(inside) < 3:
+            return False
+        both, usual = wall[2:] - wall[:-2], float(np.median(steps[steps > 0]))
+        whole, none = inside[2:] & inside[:-2], ~inside[2:] & ~inside[:-2]
+        twice = bool(np.rint(np.median(both[whole]) / usual) <= 1.0)
+        return twice and not (none.any() and np.rint(np.median(both[none]) / usual) <= 1.0)
+
+
+def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block]:
+    """Return dated blocks with what follows each change of their clock moved.
+
+    Args:
+        blocks: of one local time.
+        zone: whose it is; empty where that is not known, and a change counts that rows show.
+        rules: what was done is noted there.
+    """
+    rows = [
+        _Rows(b.clock.start + b.time, b.lines if b.lines[0] <= b.lines[-1] else -b.lines)
+        for b in blocks
+    ]
+    known = changes(zone, np.concatenate([one.wall // DAY for one in rows]))
+    if not zone:
+        known += [change for one in rows for change in _others(one, known)]
+    files = _by_file(blocks, rows, known)
+    shifts = [np.zeros(len(one.wall)) for one in rows]
+    for change in known:
+        seen = any(len(one.seams(change)) for one in (*rows, *files.values()))
+        if not zone and change.back and not seen:
+            for block, one in zip(blocks, rows, strict=True):
+                if one.is_doubled(change):
+                    raise _untold(block, change)
+        left_out = any(((r.wall > change.low) & (r.wall < change.high)).any() for r in rows)
+        if not zone and (not seen or (left_out and not change.back)):
+            continue
+        count = 0
+        for block, one, shift in zip(blocks, rows, shifts, strict=True):
+            moved = _after(block, one, files.get(block.path), change)
+            shift[moved] += change.moves
+            count += int(np.count_nonzero(moved))
+        way = "on, both passes are kept" if change.back else "back"
+        note = f"{change.said}: {count} rows that follow are moved {way}"
+        if not zone:
+            rules.tell(note, blocks[0], change.said, FIX)
+        elif change.back and seen:
+            rules.told.append(note)
+    early = 0.0
+    if zone:
+        early = known[0].before if known else ahead(zone, float(rows[0].wall[0]))
+    return [
+        dataclasses.replace(
+            block,
+            time=block.time + shift,
+            clock=block.clock._replace(start=block.clock.start - early, zone="", zoned=bool(zone)),
+        )
+        for block, shift in zip(blocks, shifts, strict=True)
+    ]
+
+
+def _others(one: _Rows, known: Sequence[Change]) -> list[Change]:
+    """Return the one fall by an hour, within half a step, that no calendar has."""
+    back = np.flatnonzero(np.diff(one.wall) < 0.0)
+    if len(back) != 1 or any(len(one.seams(change)) for change in known):
+        return []
+    first, then = one.wall[back[0]], one.wall[back[0] + 1]
+    off = min(abs(first + usual - then - HOUR) for usual in (0.0, one.usual))
+    return [Change(float(then), float(then) + HOUR, back=True)] if off <= 0.5 * one.usual else []
+
+
+def _by_file(
+    blocks: Sequence[Block], rows: Sequence[_Rows], known: Sequence[Change]
+) -> dict[Path, _Rows]:
+    """Return all rows of each file with several blocks, where they stand in their order in time."""
+    found = {}
+    for path in {block.path for block in blocks}:
+        own = [one for one, block in zip(rows, blocks, strict=True) if block.path == path]
+        rank = np.concatenate([one.rank for one in own])
+        order = np.argsort(rank, kind="stable")
+        every = _Rows(np.concatenate([one.wall for one in own])[order], rank[order])
+        seams = [every.seams(change) for change in known if change.back]
+        if not np.setdiff1d(
+            np.flatnonzero(np.diff(every.wall) < 0.0) + 1, np.concatenate([[], *seams])
+        ).size:
+            found[path] = every
+    return found
+
+
+def _after(block: Block, one: _Rows, file: _Rows | None, change: Change) -> FlagArray:
+    """Return the rows of a block that follow a change.
+
+    Raises:
+        InputError: rows of an hour that is passed twice do not tell which pass they belong to.
+    """
+    wall, (low, high) = one.wall, change[:2]
+    if not change.back:
+        return wall >= high
+    for told in (one, file):
+        if told is not None and len(seams := told.seams(change)) == 1:
+            late = one.rank >= told.rank[seams[0]]
+            return np.asarray((wall > high) | (wall >= low) & late)
+    inside = (wall >= low) & (wall < high)
+    if inside.any():
+        steps, late = np.diff(wall), bool((wall >= high).any())
+        # One pass is there. Were it the other one, there would be a hole longer than all others.
+        hole = np.min(steps[inside[1:] | inside[:-1]], initial=np.inf) + high - low
+        if late == (wall < low).any() or hole <= np.max(steps, initial=high - low):
+            raise _untold(block, change)
+        return wall >= (low if late else high)
+    return wall >= high
+
+
+def _untold(block: Block, change: Change) -> InputError:
+    return InputError(
+        f"{change.said}, and the rows from {shown(change.low)[11:]} on do not tell which of the "
+        "two passes they belong to",
+        where=str(block.path),
+        fix=FIX,
+    )
