@@ -136,7 +136,7 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
     ]
     known = changes(zone, np.concatenate([one.wall // DAY for one in rows]))
     if not zone:
-        known += [change for one in rows for change in _others(one, known)]
+        known += dict.fromkeys(change for one in rows for change in _others(one, known))
     files = _by_file(blocks, rows, known)
     shifts = [np.zeros(len(one.wall)) for one in rows]
     for change in known:
