@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.cli.shared.searches import MANY
-from stiction_ros.cli.shared.seeds import add_jobs, run_each, seed_range
 from stiction_ros.identification.evidence.engine import answered
 from stiction_ros.identification.evidence.rates import liveliest, looks
 from stiction_ros.identification.evidence.search import ALL, Parts
@@ -33,6 +32,7 @@ from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 from stiction_studies.examples.paper import example1, example2
 from stiction_studies.field import field_loop
+from stiction_studies.seeds import add_jobs, run_each, seed_range
 
 LOST = 15.0
 JUDGED = ("waves", "tuning")  # parts that change what is judged

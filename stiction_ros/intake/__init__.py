@@ -3,7 +3,6 @@
 from stiction_ros.intake.intake import loops, one_loop
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
 from stiction_ros.intake.loop import Loop
-from stiction_ros.intake.record_file import open_parts, open_record, read_csv, read_csv_parts
 
 __all__ = [
     "CsvColumns",
@@ -11,8 +10,4 @@ __all__ = [
     "Loop",
     "loops",
     "one_loop",
-    "open_parts",
-    "open_record",
-    "read_csv",
-    "read_csv_parts",
 ]

@@ -1,4 +1,4 @@
-"""Writes a record as a CSV file that :func:`read_csv` reads back, digit by digit."""
+"""Writes a record as a CSV file that is read back, digit by digit."""
 
 from __future__ import annotations
 

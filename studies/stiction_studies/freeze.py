@@ -22,8 +22,8 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from stiction_ros.cli.shared.seeds import add_jobs, run_each
 from stiction_ros.errors import InputError
+from stiction_studies.seeds import add_jobs, run_each
 
 Answer = dict[str, Any]
 

@@ -11,7 +11,7 @@ pytest.importorskip("sensor_msgs", reason="the definitions of sensor_msgs are no
 
 from stiction_ros.cli.main import main
 from stiction_ros.cli.report import holds_live_run
-from stiction_ros.intake.record_file import open_record
+from stiction_studies.as_given import open_record
 
 BAGS = Path(__file__).parents[2] / "bags"
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from stiction_ros.cli.shared import seeds
-from stiction_ros.cli.shared.seeds import run_each
+from stiction_studies import seeds
+from stiction_studies.seeds import run_each
 
 COUNT = 60
 
 TWO_RANGES = """
-from stiction_ros.cli.shared.seeds import run_each, seed_range
+from stiction_studies.seeds import run_each, seed_range
 if __name__ == "__main__":
     print(run_each(seed_range, ["1:2", "3"], 2, "two"))
 """

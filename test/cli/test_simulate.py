@@ -10,7 +10,6 @@ import pytest
 from stiction_ros.cli.main import main
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.intake.record_file import open_record
 from stiction_ros.loop import (
     LoopModel,
     PiController,
@@ -19,6 +18,7 @@ from stiction_ros.loop import (
     simulate,
     simulate_closed_loop,
 )
+from stiction_studies.as_given import open_record
 
 FLOW = find_config("flow.loop.yaml")
 MOVES = find_config("flow.set_points.yaml")

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.record_file import open_record, read_csv
 from stiction_ros.intake.repairs import SENTINELS
 from stiction_ros.records.record import Record
+from stiction_studies.as_given import open_record, read_csv
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import re
 from collections import Counter
@@ -152,9 +151,3 @@ def _is_units(row: Sequence[str]) -> bool:
     if not told or all(is_number(cell) for cell in told):
         return False
     return all(UNITS.fullmatch(cell) for cell in told)
-
-
-def split_line(lines: Sequence[str], delimiter: str) -> list[list[str]]:
-    """Return the cells of lines, blank ones left out."""
-    rows = csv.reader(lines, delimiter=delimiter)
-    return [row for row in rows if any(cell.strip() for cell in row)]

@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over, write_json
-from stiction_ros.cli.shared.seeds import run_seeds, seed_range
 from stiction_ros.errors import InputError, storing
 from stiction_studies.commands import choices
+from stiction_studies.seeds import run_seeds, seed_range
 
 if TYPE_CHECKING:
     from stiction_studies.examples.control_study import StudyOptions, Trial

@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop.set_points import holds
 from stiction_studies.commands import choices
+from stiction_studies.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
     from stiction_studies.examples.control_cases import ControlOutcome

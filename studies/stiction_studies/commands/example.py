@@ -14,11 +14,11 @@ from rich.console import Console
 from stiction_ros.cli.shared.as_json import hand_over, write_json
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_search_options, identify_by, search_options
-from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError, storing
 from stiction_ros.records.csv_writer import write_csv
 from stiction_studies.commands import choices
 from stiction_studies.commands.example_tables import print_outcome, print_study
+from stiction_studies.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
     from collections.abc import Callable

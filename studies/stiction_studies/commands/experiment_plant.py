@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiction_ros.cli.shared.seeds import add_jobs, run_each
 from stiction_ros.errors import InputError
+from stiction_studies.seeds import add_jobs, run_each
 
 if TYPE_CHECKING:
     from stiction_studies.field.exports.plant import PlantLoop

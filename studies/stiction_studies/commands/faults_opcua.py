@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.node_processes import require_ros, ros_environment
-from stiction_ros.cli.shared.seeds import run_each
 from stiction_ros.errors import InputError
 from stiction_studies.commands.fault_cases import keep, shown_seconds
+from stiction_studies.seeds import run_each
 
 if TYPE_CHECKING:
     from stiction_studies.faults.bridge.case import BridgeOutcome

@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.progress import bar
-from stiction_ros.cli.shared.seeds import run_seeds, seed_range
 from stiction_ros.errors import InputError, storing
 from stiction_studies.commands import choices
+from stiction_studies.seeds import run_seeds, seed_range
 
 
 def add(commands: Any) -> None:

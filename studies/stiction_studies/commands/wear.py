@@ -12,8 +12,8 @@ from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.scenarios import find
-from stiction_ros.cli.shared.seeds import add_jobs, run_seeds, seed_range
 from stiction_ros.errors import InputError
+from stiction_studies.seeds import add_jobs, run_seeds, seed_range
 
 if TYPE_CHECKING:
     from stiction_ros.online.session import Scenario

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.cli.main import main
-from stiction_ros.intake.record_file import read_csv
+from stiction_studies.as_given import read_csv
 from stiction_studies.examples import example1
 
 

@@ -11,8 +11,8 @@ from bag_making import SECOND, Bag, joint_state
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.intake import IntakeOptions, loops
-from stiction_ros.intake.record_file import open_record
 from stiction_ros.records.run.log import read_run
+from stiction_studies.as_given import open_record
 
 
 def fill(bag: Bag, space: str, samples: int, mode: str) -> None:

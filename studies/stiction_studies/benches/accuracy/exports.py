@@ -15,12 +15,12 @@ import numpy as np
 from rich.console import Console
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.seeds import run_seeds
 from stiction_ros.errors import InputError
 from stiction_ros.intake import IntakeOptions, Loop, loops
 from stiction_ros.records.quality import Quality
 from stiction_studies.benches.accuracy.share import Share, shares_table
 from stiction_studies.field.exports.random_export import Export, write_random_export
+from stiction_studies.seeds import run_seeds
 
 FIRST, LAST = 10_000, 10_199
 """Seeds when none are given; those below 1000 are for tuning."""
@@ -91,34 +91,41 @@ def difference(export: Export, loop: Loop) -> str | None:
         export: and its truth.
         loop: as read.
     """
-    key = {round(float(op), 5): row for row, op in enumerate(export.op)}
     seen: list[int] = []
     for part in loop.parts:
         good = np.flatnonzero(part.quality == Quality.GOOD)
         if abs(part.sample_time / export.scan - 1.0) > 1e-3:
             return f"sample time {part.sample_time:.6g} s for {export.scan:.6g} s"
-        rows = [_row_of(float(part.op[k, 0]), export, key) for k in good.tolist()]
-        for k, row in zip(good.tolist(), rows, strict=True):
+        rows: list[int] = []
+        for k in good.tolist():
+            after = rows[-1] if rows else (seen[-1] if seen else -1)
+            row = _row_of(float(part.op[k, 0]), float(part.pv[k, 0]), export, after)
             if row is None:
-                return f"OP {part.op[k, 0]:.6g} stands in no row"
-            if abs(part.pv[k, 0] - export.pv[row]) > DIGITS * abs(export.pv[row]):
-                return f"OP of row {row} beside another PV"
+                return f"OP {part.op[k, 0]:.6g} and PV {part.pv[k, 0]:.6g} stand in no row"
             if export.bad[row]:
                 return f"row {row} of bad quality is good"
-        known = [row for row in rows if row is not None]
-        steps = np.diff(export.place[known]) - np.diff(good)
-        if len(steps) and np.any(steps != 0):
+            rows.append(row)
+        if np.any(np.diff(export.place[rows]) != np.diff(good)):
             return "samples are moved in time"
-        seen += known
+        seen += rows
     lost = len(export.op) - int(export.bad.sum()) - len(set(seen))
     return f"{lost} rows lost" if lost else None
 
 
-def _row_of(value: float, export: Export, key: dict[float, int]) -> int | None:
-    row = key.get(round(value, 5))
-    if row is None:
-        row = int(np.argmin(np.abs(export.op - value)))
-    return row if abs(export.op[row] - value) <= 20.0 * DIGITS * abs(value) else None
+def _row_of(op: float, pv: float, export: Export, after: int) -> int | None:
+    """Return the first row behind another that has both values; None where there is none.
+
+    Args:
+        op: in %, which a conversion of the unit rounds ten times as coarsely.
+        pv: as written.
+        export: and its truth.
+        after: the row before.
+    """
+    near = np.abs(export.op - op) <= 10.0 * DIGITS * 100.0
+    near &= np.abs(export.pv - pv) <= DIGITS * np.abs(export.pv)
+    rows = np.flatnonzero(near)
+    rows = rows[rows > after]
+    return int(rows[0]) if len(rows) else None
 
 
 def run(options: argparse.Namespace, machine: str) -> int:

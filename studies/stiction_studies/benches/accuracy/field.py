@@ -14,7 +14,6 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.seeds import run_seeds
 from stiction_ros.errors import InputError
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
@@ -28,6 +27,7 @@ from stiction_studies.benches.accuracy.answer import (
 )
 from stiction_studies.benches.accuracy.share import Share, shares_table
 from stiction_studies.commands import choices
+from stiction_studies.seeds import run_seeds
 
 if TYPE_CHECKING:
     from stiction_studies.field import FieldLoop
@@ -272,7 +272,7 @@ def table_row(name: str, rows: Sequence[Judged]) -> dict[str, Any]:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that this benchmark shares with ``stability``."""
-    from stiction_ros.cli.shared.seeds import seed_range
+    from stiction_studies.seeds import seed_range
 
     group = parser.add_argument_group("field and stability; --seeds also for gain, --jobs for all")
     group.add_argument(

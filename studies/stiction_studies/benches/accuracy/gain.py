@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import write_json
-from stiction_ros.cli.shared.seeds import run_seeds
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign, EmbeddingRun
@@ -24,6 +23,7 @@ from stiction_ros.records.parts import longest_part
 from stiction_studies.benches.accuracy.answer import FOUND
 from stiction_studies.benches.accuracy.field import FIRST, LAST
 from stiction_studies.field.counterfactual.again import Again, Control, Sampled, TakeOver
+from stiction_studies.seeds import run_seeds
 
 NEAR = 0.25
 """Share of the truth within which a promise is kept."""

@@ -16,13 +16,14 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.seeds import run_each
 from stiction_ros.errors import InputError
-from stiction_ros.intake.record_file import CsvColumns, open_parts
+from stiction_ros.intake.record_file import CsvColumns
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
+from stiction_studies.as_given import open_parts
 from stiction_studies.benches.accuracy.answer import FOUND, METHOD, Answer, Interval, answer_of
 from stiction_studies.benches.accuracy.share import Share, shares_table
+from stiction_studies.seeds import run_each
 
 FIRST, LAST = 10_000, 10_199
 """Seeds of the field's loops when neither seeds nor a folder are given."""

@@ -15,12 +15,12 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.cli.shared.seeds import run_each
 from stiction_ros.errors import InputError, storing
 from stiction_ros.texts import json_text
 from stiction_studies.benches.accuracy.gap import matrix_table, rate_table
 from stiction_studies.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_studies.commands import choices
+from stiction_studies.seeds import run_each
 
 if TYPE_CHECKING:
     from stiction_studies.blind.scores.world_scores import WorldScore

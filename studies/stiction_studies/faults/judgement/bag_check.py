@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.record_file import open_parts
 from stiction_ros.records.bag.messages import read_messages, stamp_ns
+from stiction_studies.as_given import open_parts
 from stiction_studies.faults.observation import BagFound, Sampled
 
 COMPARED = ("pv", "op_applied")
