@@ -7,9 +7,8 @@ import pytest
 from stiction_studies import freeze
 
 QUICK = (
-    *("field_50000", "field_50003", "bag_signals_only", "example1_measurement_exact"),
-    *("example1_measurement_grid", "example2_linear_exact", "blind_single_50002"),
-    "world_single_500001",
+    *("field_50000", "bag_signals_only", "example1_measurement_exact"),
+    *("example1_measurement_grid", "blind_single_50002"),
 )
 
 
