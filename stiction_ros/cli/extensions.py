@@ -8,6 +8,7 @@ the names of commands, or of parts of a command as they are typed (``demo opcua`
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib
 from collections.abc import Mapping
 from importlib import metadata
@@ -26,6 +27,7 @@ OF_STUDIES = (
 Table = Mapping[str, tuple[str, str]]
 
 
+@functools.cache
 def brought() -> Table:
     """Return module and help of all that other distributions bring, by name."""
     found: dict[str, tuple[str, str]] = {}

@@ -14,8 +14,9 @@ from typing import Any, BinaryIO, cast
 import zstandard
 
 from stiction_ros.errors import InputError
+from stiction_ros.records.storage.packed import ZSTD, unpacked
 
-GZIP, ZSTD, ZIP, OLD_EXCEL = b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+GZIP, ZIP, OLD_EXCEL = b"\x1f\x8b", b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 PARQUET, MARKUP = b"PAR1", (b"<htm", b"<HTM", b"<?xm", b"<!DO", b"<!do", b"<tab", b"<TAB")
 
 HEAD = 4096
@@ -111,26 +112,15 @@ class _Zstd(io.RawIOBase):
 
     def __init__(self, path: Path) -> None:
         self.file = path.open("rb")
-        self.frame = zstandard.ZstdDecompressor().decompressobj()
-        self.ready, self.begun = b"", False
+        self.blocks, self.ready = unpacked(self.file), b""
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: Any) -> int:
+        while not self.ready and (block := next(self.blocks, None)) is not None:
+            self.ready = block
         view = memoryview(buffer)
-        while not self.ready:
-            packed = b""
-            if self.frame.eof:
-                packed = self.frame.unused_data
-                self.frame, self.begun = zstandard.ZstdDecompressor().decompressobj(), False
-            packed = packed or self.file.read(1 << 16)
-            if not packed:
-                if self.begun:
-                    raise EOFError
-                return 0
-            self.begun = True
-            self.ready = self.frame.decompress(packed)
         count = min(len(view), len(self.ready))
         view[:count] = self.ready[:count]
         self.ready = self.ready[count:]

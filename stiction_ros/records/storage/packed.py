@@ -17,7 +17,8 @@ SUFFIXES = (".zstd", ".zst")
 """Ends of the names of files that are packed with Zstandard; rosbag2 writes the first."""
 
 SQLITE = b"SQLite format 3\0"
-_ZSTD = b"\x28\xb5\x2f\xfd"
+ZSTD = b"\x28\xb5\x2f\xfd"
+"""First bytes of a file of either kind."""
 
 
 def conversion(bag: Path) -> str:
@@ -38,14 +39,14 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         OSError: it cannot be read, or the storage refuses.
     """
     with path.open("rb") as file:
-        packed = file.read(len(_ZSTD)) == _ZSTD
+        packed = file.read(len(ZSTD)) == ZSTD
         file.seek(0)
         if not packed:
             yield file
             return
         with tempfile.TemporaryFile() as plain:
             try:
-                _unpack(file, plain)
+                plain.writelines(unpacked(file))
             except (zstandard.ZstdError, EOFError):
                 raise InputError(
                     "is packed with Zstandard and cut off or damaged",
@@ -56,14 +57,19 @@ def opened(path: Path) -> Iterator[BinaryIO]:
             yield plain
 
 
-def _unpack(source: BinaryIO, target: BinaryIO) -> None:
-    """Unpack one frame or several; EOFError where the last one is cut off."""
+def unpacked(source: BinaryIO) -> Iterator[bytes]:
+    """Yield what one frame of Zstandard or several hold, a block at a time.
+
+    Raises:
+        EOFError: the last frame is cut off.
+        zstandard.ZstdError: it is damaged.
+    """
     frame = zstandard.ZstdDecompressor().decompressobj()
     while block := source.read(zstandard.DECOMPRESSION_RECOMMENDED_INPUT_SIZE):
         while block:
             if frame.eof:
                 frame = zstandard.ZstdDecompressor().decompressobj()
-            target.write(frame.decompress(block))
+            yield frame.decompress(block)
             block = frame.unused_data
     if not frame.eof:
         raise EOFError
