@@ -61,14 +61,14 @@ def _table(entries: Sequence[Entry]) -> Table:
             cause_words(entry.cause),
             percent(entry.band_share) if entry.found else "",
             op_figure(entry.f_s, entry.op_unit) if entry.found else "",
-            percent(entry.confidence),
+            percent(entry.probability),
             in_words(entry, "service") if entry.gain else "",
             entry.reason,
         )
         for entry in entries
     ]
     heads = (
-        *("rank", "loop", "verdict", "cycles by", "band of OP", "f_S", "confidence"),
+        *("rank", "loop", "verdict", "cycles by", "band of OP", "f_S", "probability"),
         *(HEADS["service"], "reason"),
     )
     kept = [place for place in range(len(heads)) if any(row[place] for row in rows)]

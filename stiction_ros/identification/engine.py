@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from stiction_ros.effects import HeStiction
+from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.exact.further_fit import begun, settled, with_further_estimates
 from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
@@ -88,7 +89,8 @@ def identify_exact(
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(final, valves, table, told, one_step)
-    answer = explained(record, conclude(record, data, findings, 0.0))
+    told = conclude(record, data, findings, 0.0)
+    answer = explained(record, told, close_loop(record, told))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
 

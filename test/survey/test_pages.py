@@ -33,10 +33,10 @@ COLUMNS = {"now": GAIN["now"], **{option["what"]: option for option in GAIN["opt
 
 def _survey() -> Survey:
     rows = [
-        entry("FIC-101.A", gain=COLUMNS, rank=1, group=1, cost_per_hour=12.5, confidence=0.6),
+        entry("FIC-101.A", gain=COLUMNS, rank=1, group=1, cost_per_hour=12.5, probability=0.6),
         entry("A_VERY_LONG_TAG_OF_A_REFINERY:2411PDIC10321_0606_0007", rank=2, group=1),
-        entry("LIC7", "undecided", "disturbance", confidence=0.3, rank=3),
-        entry("<b>TIC</b>", "healthy", "none", oscillation=None, confidence=0.95, rank=4),
+        entry("LIC7", "undecided", "disturbance", probability=0.3, rank=3),
+        entry("<b>TIC</b>", "healthy", "none", oscillation=None, probability=0.95, rank=4),
         Entry("XIC", ("x.csv",), Status.FAILED, "its stamps are <wrong>; say --dates day", rank=5),
     ]
     rows[0] = dataclasses.replace(rows[0], report="loops/FIC-101.A.html")
@@ -123,7 +123,7 @@ def test_the_list_sorts_filters_and_searches(list_file: Path) -> None:
       const names = () => [...document.querySelectorAll("table.list tbody tr")]
         .filter(row => !row.hidden).map(row => row.querySelector("td.name").innerText);
       const head = [...document.querySelectorAll("th button")]
-        .find(one => one.innerText.startsWith("confidence"));
+        .find(one => one.innerText.startsWith("probability"));
       head.click(); const up = names(); head.click(); const down = names();
       const put = (id, value) => { const input = document.getElementById(id);
         input.value = value; input.dispatchEvent(new Event("input")); };

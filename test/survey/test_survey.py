@@ -23,7 +23,7 @@ KEYS = {
     *("name", "files", "status", "reason", "samples", "sample_time", "auto_share"),
     *("saturated_share", "oscillation", "verdict", "cause", "f_s", "f_s_interval", "f_d"),
     *("f_d_interval", "band_share", "travel_per_hour", "reversals_per_hour", "gain", "rank"),
-    *("confidence", "group", "report"),
+    *("probability", "group", "report"),
 }
 
 

@@ -12,31 +12,13 @@ import numpy as np
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.result.cause import Cause
 from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability
+from stiction_ros.identification.result.verdict_kind import VerdictKind
 
-
-class VerdictKind(enum.StrEnum):
-    """What the record says about one valve.
-
-    Examples:
-        >>> from stiction_ros import VerdictKind
-        >>> VerdictKind("sticky") is VerdictKind.STICKY
-        True
-        >>> [kind.value for kind in VerdictKind if kind.has_friction]
-        ['sticky', 'backlash']
-    """
-
-    STICKY = "sticky"
-    BACKLASH = "backlash"
-    HEALTHY = "healthy"
-    UNDECIDED = "undecided"
-
-    @property
-    def has_friction(self) -> bool:
-        """Whether friction is shown: with a jump (sticky), or without one (backlash)."""
-        return self in (VerdictKind.STICKY, VerdictKind.BACKLASH)
+__all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
 
 
 class FitStatus(enum.StrEnum):
@@ -75,6 +57,8 @@ class ValveEstimate:
         further: the law's parameters behind the first two, by their keys in YAML; empty where
             it has no others or the valve no friction.
         further_intervals: values of each that the record does not reject.
+        probability: of friction that matters, 0 to 1; None where a method does not tell.
+        figures: what the probability is computed from.
         band_interval: values of f_S + f_D that the record does not reject, %; None where a method
             does not look at the sum: see :attr:`sum_interval`.
     """
@@ -97,6 +81,13 @@ class ValveEstimate:
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     further_intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     band_interval: tuple[float, float] | None = None
+    probability: float | None = None
+    figures: Figures | None = None
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether friction is found, or more likely than not."""
+        return self.verdict.has_friction or (self.probability or 0.0) > 0.5
 
     @property
     def sum_interval(self) -> tuple[float, float]:
@@ -127,6 +118,7 @@ class ValveEstimate:
         return {
             "name": self.name,
             "verdict": self.verdict.value,
+            "probability": self.probability,
             "band_share": self.band_share,
             "stability": None if self.stability is None else self.stability.to_json(),
             "law": self.law,

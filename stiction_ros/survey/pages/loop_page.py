@@ -68,7 +68,7 @@ def loop_page(
         card("between", interval(entry.f_s_interval) or "–"),
         card(f"sliding friction f_D, {op_unit}", figure(entry.f_d) or "–"),
         card("of what OP moves is lost in the band", percent(entry.band_share) or "–"),
-        card("confidence", percent(entry.confidence) or "–"),
+        card("probability", percent(entry.probability) or "–"),
         card("why it cycles", cause_words(entry.cause or "none")),
     ]
     if cycle is not None and cycle.period is not None:

@@ -36,6 +36,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
             "a long run with the real nodes: missed samples, growth of memory",
         ),
         ("paper", "commands.paper", "every figure and table of the paper, printed beside ours"),
+        ("calibrate", "commands.calibrate", "fit the probability of friction to simulated loops"),
         ("bench", "benches.command", "measure speed, side by side"),
         ("demo opcua", "commands.demo_opcua", "the tank behind a control system"),
         ("demo --compare", "commands.compare", "Example 2 under five controllers, without ROS"),

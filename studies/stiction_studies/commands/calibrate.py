@@ -1,0 +1,112 @@
+"""``stiction calibrate``: the probability of friction, fitted to loops whose truth is known."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.errors import InputError, storing
+from stiction_studies.benches.accuracy.judged import logged_rows, start_log
+from stiction_studies.calibration.fitting import Judged, best_penalty, counts, fitted, reliability
+from stiction_studies.calibration.loops import WORLDS
+from stiction_studies.seeds import add_jobs, run_each, seed_range
+
+SEEDS = (0, 399)
+"""Of each world, when none are given."""
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "calibrate",
+        help="fit the probability of friction to simulated loops",
+        description="Identify simulated loops, fit the coefficients of the probability to their "
+        "figures, and hold each world against coefficients that are fitted to the others.",
+    )
+    parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS), metavar="NAME")
+    parser.add_argument("--seeds", type=seed_range, default=SEEDS, metavar="A:B", help="(0:399)")
+    parser.add_argument("--log", type=Path, metavar="F", help="keep figures there, and go on there")
+    parser.add_argument("--out", type=Path, metavar="F.yaml", help="write the coefficients there")
+    add_jobs(parser)
+    parser.set_defaults(run=run)
+
+
+def judged(log: Path | None, task: tuple[str, int]) -> Judged | None:
+    """Return the figures of one loop; None where its truth or the record is not clear."""
+    from stiction_ros.identification import identify
+    from stiction_ros.records.parts import longest_part
+
+    world, seed = task
+    loop = WORLDS[world](seed)
+    row = None
+    if loop.friction is not None:
+        try:
+            (valve,) = identify(longest_part([loop.record])).valves
+        except InputError:
+            return None
+        if valve.figures is not None:
+            row = Judged(world, seed, loop.friction, valve.figures)
+    if log is not None and row is not None:
+        with storing(log), log.open("a", encoding="utf-8") as out:
+            out.write(json.dumps({"full": True} | dataclasses.asdict(row)) + "\n")
+    return row
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    known: list[Judged] = []
+    if options.log is not None:
+        known = logged_rows(options.log, True, _row_of) if options.log.exists() else []
+        if not known:
+            start_log(options.log)
+    there = {(row.world, row.seed) for row in known}
+    first, last = options.seeds
+    tasks = [(world, seed) for seed in range(first, last + 1) for world in options.worlds]
+    due = [task for task in tasks if task not in there]
+    work = functools.partial(judged, options.log)
+    found = [row for row in run_each(work, due, options.jobs or 1, "calibrate") if row is not None]
+    rows = [row for row in (*known, *found) if (row.world, row.seed) in set(tasks)]
+    penalty = best_penalty(rows)
+    show(rows, penalty)
+    if options.out is not None:
+        told = {
+            "fitted_by": f"stiction calibrate --seeds {first}:{last} --worlds "
+            + " ".join(options.worlds),
+            "loops": len(rows),
+            "penalty": penalty,
+        } | fitted(rows, penalty).to_mapping()
+        with storing(options.out):
+            options.out.write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
+    return 0
+
+
+def show(rows: list[Judged], penalty: float) -> None:
+    """Print how each world is told by coefficients fitted to the others."""
+    console = Console()
+    worlds = sorted({row.world for row in rows})
+    for world in worlds:
+        own = [row for row in rows if row.world == world]
+        rest = [row for row in rows if row.world != world]
+        told = fitted(rest, penalty).probabilities(own)
+        table = Table(f"{world}, told by the others", "")
+        for name, value in counts(told, own).items():
+            table.add_row(name, f"{value:.3f}")
+        console.print(table)
+        bins = Table("probability", "loops", "with friction")
+        for one in reliability(told, own):
+            bins.add_row(f"{one.told:.2f}", str(one.loops), f"{one.true:.2f}")
+        console.print(bins)
+
+
+def _row_of(values: Any) -> Judged:
+    from stiction_ros.identification.judgement.figures import Figures
+
+    return Judged(**{**values, "figures": Figures(**values["figures"])})
