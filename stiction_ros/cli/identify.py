@@ -88,6 +88,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
     )
+    parser.add_argument(
+        "--why", action="store_true", help="print the figures behind each probability"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument("--out", metavar="DIR", help="write report.html and figures there")
     parser.set_defaults(run=run)
@@ -130,6 +133,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json != "-":
         print(f"{loop.name}: {loop.summary}")
         _print(document, found)
+        if options.why:
+            _print_figures(found)
     else:
         tell(loop)
     if options.out is not None:
@@ -156,7 +161,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
     console = Console()
     table = Table(title=f"{document['record']}: {found.samples} samples", title_justify="left")
     further = _further(found)
-    for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval"):
+    for name in ("valve", "verdict", "P", "f_S %", "interval", "f_D %", "interval"):
         table.add_column(name)
     for head in further.values():
         table.add_column(head)
@@ -167,6 +172,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
         table.add_row(
             valve.name,
             str(valve.verdict),
+            "" if valve.probability is None else f"{valve.probability:.2f}",
             f"{valve.static_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.static_interval),
             f"{valve.dynamic_friction:.3g}",
@@ -194,6 +200,29 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
         console.print(f"{valve.name}: {' '.join(filter(None, said))}")
     for note in found.notes:
         console.print(f"note: {note}")
+
+
+def _print_figures(found: Identification) -> None:
+    """Print the figures of each valve, and what each adds to the log odds of friction."""
+    from stiction_ros.identification.judgement.figures import definitions
+    from stiction_ros.identification.judgement.probability import contributions
+
+    console = Console()
+    for valve in found.valves:
+        if valve.figures is None:
+            console.print(f"{valve.name}: this method computes no probability of friction")
+            continue
+        table = Table(
+            title=f"{valve.name}: P(friction) {valve.probability:.3f}", title_justify="left"
+        )
+        for name in ("figure", "value", "unit", "adds", "definition"):
+            table.add_column(name)
+        odds = contributions(valve.figures)
+        for name, told in definitions().items():
+            value = getattr(valve.figures, name)
+            row = name, f"{value:.3g}", told["unit"], f"{odds[name]:+.2f}", told["definition"]
+            table.add_row(*row)
+        console.print(table)
 
 
 def _further(found: Identification) -> dict[str, str]:

@@ -42,7 +42,9 @@ def test_what_is_found_stands_above_what_is_not(rows: list[Entry]) -> None:
 
 
 @given(st.floats(0.01, 0.98), st.floats(0.001, 0.01))
-def test_the_likelier_and_what_a_service_brings_more_stands_higher(share: float, more: float) -> None:
+def test_the_likelier_and_what_a_service_brings_more_stands_higher(
+    share: float, more: float
+) -> None:
     one, other = entry("A", probability=share), entry("B", probability=share + more)
     assert [row.name for row in ranked([one, other], {})] == ["B", "A"]
     one, other = (

@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.judgement.figures import definitions
 from stiction_ros.identification.judgement.probability import contributions
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
@@ -32,19 +33,6 @@ CLEAR = 4.0
 
 CENTRED = 1e-3
 """Share of OP's range below which its mean is what a computer leaves of 0."""
-
-AGAINST = {
-    "gain": "two neighbouring rates of sampling do not both show it",
-    "largest_gain": "the record shows little of it",
-    "robust_gain": "single shocks make most of the difference",
-    "ruled_out": "another rate of sampling speaks against it",
-    "repeats": "PV also repeats itself a turn later, as beside another loop that cycles",
-    "loop_without": "simulated with an ideal valve the loop moves as well",
-    "loop_gone": "the simulated loop moves nearly as much without it",
-    "wave": "a wave from outside explains much of the movement",
-    "held": "the process found beside it is one that the controller would not hold",
-}
-"""What is said of a figure that speaks against friction."""
 
 
 def experiment_for(record: Record, found: Identification, valve: int) -> str:
@@ -78,9 +66,9 @@ def _reason(estimate: ValveEstimate, span: float) -> str:
     if not estimate.is_likely:
         return open_up_to
     odds = contributions(estimate.figures)
-    against = min(AGAINST, key=lambda name: odds[name])
+    against = definitions()[min(odds, key=lambda name: odds[name])]["against"]
     percent = f"{100.0 * estimate.probability:.0f} %"
-    return f"Friction, here {size}, is likely ({percent}) but not sure: {AGAINST[against]}."
+    return f"Friction, here {size}, is likely ({percent}) but not sure: {against}."
 
 
 def _travel_test(record: Record, found: Identification, valve: int) -> str:

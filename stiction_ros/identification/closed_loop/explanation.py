@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 
 from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,

@@ -63,7 +63,6 @@ BESIDE = 10.0
 INEXACT = 0.03
 """Share of a wave's own gain that it must gain besides: no wave is one to the letter, and what it
 misses moves in time with it, as a friction may."""
-TIED = 2.0  # of −2 log likelihood: two gains that differ by less are the same
 UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on beyond it
 
 
@@ -151,14 +150,12 @@ class Agreement:
             likelihood.
         alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
             have a say.
-        tied: the other one, where which of both has more evidence only tells where a fit has ended.
         held: whether both speak of processes that the controller holds.
     """
 
     look: Look
     gain: float
     alike: bool
-    tied: Look | None = None
     held: bool = True
 
     @classmethod
@@ -247,7 +244,7 @@ def liveliest(record: Record) -> Record:
         begin = liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
         end = begin + PART
     part = record.part(begin, end)
-    step, first = refresh(part)
+    _step, first = refresh(part)
     return record if (begin, first, end) == (0, 0, len(record)) else part.part(first, end - begin)
 
 
@@ -277,9 +274,8 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
         gains = [look.beyond_price(valve) for look in two]
         alike = low <= ALIKE * high and say[k] and say[k + 1]
         more = gains.index(max(gains))
-        tied = two[1 - more] if max(gains) - min(gains) < TIED else None
         held = speak[k] and speak[k + 1]
-        pairs.append(Agreement(two[more], min(gains), alike, tied, held))
+        pairs.append(Agreement(two[more], min(gains), alike, held))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
 
 

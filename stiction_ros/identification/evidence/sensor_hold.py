@@ -39,7 +39,7 @@ def held_rows(pv: FloatArray) -> NDArray[np.bool_]:
         return np.ones(len(pv), dtype=bool)
     step = float(moves[~still].min())
     ends = np.append(np.flatnonzero(~still), len(moves))  # moves that end a run of repeats
-    jumps = np.append(moves[ends[:-1]] > ROUNDED * step * (1.0 + 1e-6), True)
+    jumps = np.append(moves[ends[:-1]] > ROUNDED * step * (1.0 + 1e-6), False)
     run = np.searchsorted(ends, np.arange(len(moves)))
     return np.concatenate([[False], still & jumps[run]])
 

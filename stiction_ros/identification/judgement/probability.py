@@ -1,48 +1,80 @@
 r"""The probability of friction, and the verdict as two cuts through it.
 
-.. math:: \log \frac{P}{1 - P} = c_0 + \sum_i c_i x_i
+The log odds are a sum of small decision trees over the figures (gradient boosting; each figure
+whose meaning has a sign acts in that direction alone):
 
-with the features x of :meth:`.figures.Figures.features`. The coefficients stand in
-``friction_probability.yaml``; ``stiction calibrate`` of stiction-studies fits them to simulated
-loops whose valves are known.
+.. math:: \log \frac{P}{1 - P} = c_0 + \sum_t f_t(x)
+
+The trees stand in ``friction_probability.json``. ``stiction calibrate`` of stiction-studies fits
+them to simulated loops whose valves are known.
 """
 
 from __future__ import annotations
 
 import functools
+import json
+import math
 from importlib.resources import files
+from typing import NamedTuple
 
-import numpy as np
-import yaml
-
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.judgement.figures import Figures, definitions
+from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.result.verdict_kind import VerdictKind
 
-FILE = "friction_probability.yaml"
+FILE = "friction_probability.json"
 SURE = 0.95
-"""Probability from which on a verdict is given: one wrong verdict in twenty at the cut."""
+"""Probability from which on a verdict is given: at the cut one of twenty is wrong."""
+
+
+class Node(NamedTuple):
+    """One node of a tree.
+
+    Attributes:
+        value: mean log odds of the loops that come here.
+        figure: that is asked for; empty at a leaf.
+        at: loops with at most this go to ``low``, the others to ``high``.
+        low, high: places of the next nodes in the tree.
+    """
+
+    value: float
+    figure: str = ""
+    at: float = 0.0
+    low: int = 0
+    high: int = 0
+
+
+class Model(NamedTuple):
+    """Log odds of all loops, and the trees."""
+
+    constant: float
+    trees: tuple[tuple[Node, ...], ...]
 
 
 @functools.cache
-def coefficients() -> FloatArray:
-    """Return c_0 and the coefficient of each figure, in their order, shape (1 + F,)."""
-    text = files("stiction_ros.identification.judgement").joinpath(FILE).read_text("utf-8")
-    fitted = yaml.safe_load(text)
-    return np.array([fitted["constant"], *(fitted["figures"][name] for name in definitions())])
+def fitted_model() -> Model:
+    """Return what was fitted."""
+    text = files(__package__).joinpath(FILE).read_text("utf-8")
+    told = json.loads(text)
+    return Model(told["constant"], tuple(tuple(Node(*n) for n in tree) for tree in told["trees"]))
 
 
-def friction_probability(figures: Figures) -> float:
+def contributions(figures: Figures, model: Model | None = None) -> dict[str, float]:
+    """Return what each figure adds to the log odds, by name; they sum up to them, less c_0."""
+    values = figures.to_json()
+    added = dict.fromkeys(values, 0.0)
+    for tree in (model or fitted_model()).trees:
+        node = tree[0]
+        while node.figure:
+            following = tree[node.low if values[node.figure] <= node.at else node.high]
+            added[node.figure] += following.value - node.value
+            node = following
+    return added
+
+
+def friction_probability(figures: Figures, model: Model | None = None) -> float:
     """Return the probability that a valve has friction that matters, 0 to 1."""
-    constant, *slopes = coefficients()
-    odds = constant + float(np.array(slopes) @ figures.features())
-    return float(1.0 / (1.0 + np.exp(-np.clip(odds, -30.0, 30.0))))
-
-
-def contributions(figures: Figures) -> dict[str, float]:
-    """Return what each figure adds to the log odds, by name."""
-    parts = coefficients()[1:] * figures.features()
-    return dict(zip(definitions(), parts.tolist(), strict=True))
+    model = model or fitted_model()
+    start = model.constant + sum(tree[0].value for tree in model.trees)
+    return 1.0 / (1.0 + math.exp(-start - sum(contributions(figures, model).values())))
 
 
 def verdict_of(probability: float, figures: Figures, deadband: bool) -> VerdictKind:

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
+from stiction_ros.identification.judgement.figures import definitions
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
 from stiction_ros.report.drawing import (
@@ -33,33 +34,6 @@ from stiction_ros.report.shapes import (
     free_run,
 )
 from stiction_ros.texts import finite
-
-_MEANING = {
-    "delta_bic": "BIC by which friction beats the best model without it",
-    "variance_ratio": "innovation variance without friction over that with it",
-    "free_run_ratio": "free-run error without friction over that with it",
-    "half_1": "−2 log likelihood gained in the first half",
-    "half_2": "−2 log likelihood gained in the second half",
-    "share": "f_S over the span of OP",
-    "moves": "samples at which the stem moved",
-    "rival_order": "order of the best model without friction",
-    "loop_ratio": "OP's movement in the closed loop with friction over the recorded one",
-    "loop_ratio_free": "the same without friction",
-    "loop_alike": "share of the simulated loops that move as recorded",
-    "moved_with": "movement of the repeated record with friction over the recorded one",
-    "moved_without": "the same without friction",
-    "loop_gone": "share of the movement of OP or PV − SP that goes away without friction",
-    "controller_fit": "share of OP's moves that the recovered controller explains",
-    "outside_line": "BIC gained by a wave that enters behind the valve",
-    "line_rivalry": "BIC gained by a wave alone over that by friction",
-    "echo": "how strongly what is left without friction repeats itself; above 25 a wave does it",
-    "rate": "samples that are one row where friction was judged",
-    "alike": "1 where two neighbouring rates see the same band",
-    "patterns": "switching patterns enumerated round the best",
-    "patterns_closed": "1 where all patterns at their edge are rejected",
-    "stem_error": "mean squared error of the estimated stem, %²",
-    "deadband_loss": "−2 log likelihood that a pure deadband (f_S = f_D) loses",
-}
 
 
 def report_record(
@@ -130,14 +104,16 @@ def record_page(record: Record, identification: Identification, drawings: Sequen
 
 def evidence_table(valves: Sequence[ValveEstimate]) -> str:
     """Return the figures behind the verdicts."""
-    keys = list(dict.fromkeys(key for valve in valves for key in valve.evidence))
-    if not keys:
+    told = [valve for valve in valves if valve.figures is not None]
+    if not told:
         return ""
     rows: list[list[Cell]] = [
-        [_MEANING.get(key, key), *[number(valve.evidence.get(key)) for valve in valves]]
-        for key in keys
+        [f"{key.replace('_', ' ')}, {meaning['unit']}: {meaning['definition']}"]
+        + [number(getattr(valve.figures, key)) for valve in told]
+        for key, meaning in definitions().items()
     ]
-    return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in valves]], rows)
+    rows.append(["probability of friction", *[number(valve.probability) for valve in told]])
+    return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in told]], rows)
 
 
 def draw_record(

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_ros.identification.judgement.probability import SURE
+from stiction_ros.identification.judgement.probability import (
+    SURE,
+    Model,
+    Node,
+    friction_probability,
+)
 
-PENALTIES = (0.3, 1.0, 3.0, 10.0)  # of the squared slopes of standardised features
-NEWTON = 60  # steps, at most
+TREES, LEAVES, RATE = 150, 6, 0.08
+"""Of the boosting. In eight-fold trials on seeds 0:399 of both worlds 100 trees of 6 leaves did as
+well, and logistic regression on the same figures found half as many at the same error."""
+FEWEST = 12  # loops in a leaf
+SHRUNK = 1.0  # penalty of the squared values of leaves
+FOLDS = 8
+ONLY_CUTS = "ruled_out"  # of the figures: it decides between healthy and undecided alone
 BINS = 10  # of probability, in which it is held against what is true
 
 
@@ -26,112 +37,108 @@ class Judged:
     figures: Figures
 
 
-@dataclasses.dataclass(frozen=True)
-class Fitted:
-    """Log odds linear in the features: c_0 and the slopes, in the order of the figures."""
-
-    constant: float
-    slopes: FloatArray
-
-    def probabilities(self, rows: Sequence[Judged]) -> FloatArray:
-        """Return the probability of friction of each loop, shape (R,)."""
-        odds = self.constant + np.array([row.figures.features() for row in rows]) @ self.slopes
-        return np.asarray(1.0 / (1.0 + np.exp(-np.clip(odds, -30.0, 30.0))))
-
-    def to_mapping(self) -> dict[str, object]:
-        """Return constant and slopes by the names of the figures."""
-        slopes = (round(float(value), 5) for value in self.slopes)
-        return {
-            "constant": round(self.constant, 5),
-            "figures": dict(zip(definitions(), slopes, strict=True)),
-        }
-
-
-def fitted(rows: Sequence[Judged], penalty: float, without: str | None = None) -> Fitted:
-    """Return the most likely coefficients.
+def fitted(rows: Sequence[Judged], without: str | None = None) -> Model:
+    """Return the trees fitted to known loops, each world as heavy as the others.
 
     Args:
-        rows: known loops; each world weighs as much as the others.
-        penalty: of the squared slopes of standardised features.
+        rows: known loops.
         without: name of a figure that is left out.
     """
-    features = np.array([row.figures.features() for row in rows])
-    truth = np.array([row.friction for row in rows], dtype=float)
+    from sklearn.ensemble import HistGradientBoostingClassifier  # slow to import
+
+    names = [name for name in definitions() if name not in (without, ONLY_CUTS)]
+    features = np.array([[row.figures.to_json()[name] for name in names] for row in rows])
+    truth = np.array([row.friction for row in rows])
     worlds = [row.world for row in rows]
     weights = np.array([len(rows) / len(set(worlds)) / worlds.count(one) for one in worlds])
-    mean, spread = features.mean(axis=0), features.std(axis=0)
-    used = spread > 1e-9
-    if without is not None:
-        used[list(definitions()).index(without)] = False
-    scaled = (features[:, used] - mean[used]) / spread[used]
-    design = np.column_stack([np.ones(len(rows)), scaled])
-    prior = penalty * np.eye(design.shape[1])
-    prior[0, 0] = 1e-6
-    found = np.zeros(design.shape[1])
-    for _ in range(NEWTON):
-        chance = 1.0 / (1.0 + np.exp(-np.clip(design @ found, -30.0, 30.0)))
-        slope = design.T @ (weights * (truth - chance)) - prior @ found
-        curved = (design * (weights * chance * (1.0 - chance))[:, None]).T @ design + prior
-        step = np.linalg.solve(curved, slope)
-        found += step
-        if np.abs(step).max() < 1e-9:
-            break
-    slopes = np.zeros(len(mean))
-    slopes[used] = found[1:] / spread[used]
-    return Fitted(float(found[0] - slopes @ mean), slopes)
+    boosting = HistGradientBoostingClassifier(
+        max_iter=TREES,
+        max_leaf_nodes=LEAVES,
+        learning_rate=RATE,
+        min_samples_leaf=FEWEST,
+        l2_regularization=SHRUNK,
+        monotonic_cst=[definitions()[name]["sign"] for name in names],
+        early_stopping=False,
+        random_state=0,
+    ).fit(features, truth, weights)
+    trees = tuple(_nodes(tree.nodes, names) for (tree,) in boosting._predictors)
+    return Model(float(boosting._baseline_prediction[0, 0]), trees)
 
 
-def loss(probabilities: FloatArray, rows: Sequence[Judged]) -> float:
+def _nodes(nodes: Any, names: Sequence[str]) -> tuple[Node, ...]:
+    """Return a tree; the value of an inner node is the mean of the leaves below it."""
+    told: dict[int, Node] = {}
+
+    def add(place: int) -> float:
+        node = nodes[place]
+        if node["is_leaf"]:
+            told[place] = Node(round(float(node["value"]), 5))
+        else:
+            low, high = int(node["left"]), int(node["right"])
+            values = add(low), add(high)
+            counts = float(nodes[low]["count"]), float(nodes[high]["count"])
+            mean = round(float(np.average(values, weights=counts)), 5)
+            at = float(f"{float(node['num_threshold']):.6g}")
+            told[place] = Node(mean, names[int(node["feature_idx"])], at, low, high)
+        return told[place].value
+
+    add(0)
+    return tuple(told[place] for place in range(len(nodes)))
+
+
+def probabilities(model: Model, rows: Sequence[Judged]) -> FloatArray:
+    """Return the probability of friction of each loop, shape (R,)."""
+    return np.array([friction_probability(row.figures, model) for row in rows])
+
+
+def by_folds(rows: Sequence[Judged], without: str | None = None) -> FloatArray:
+    """Return the probability of each loop by trees fitted without its fold, shape (R,)."""
+    told = np.empty(len(rows))
+    fold = np.random.default_rng(1).integers(0, FOLDS, len(rows))
+    for k in range(FOLDS):
+        rest = [row for row, own in zip(rows, fold, strict=True) if own != k]
+        model = fitted(rest, without)
+        told[fold == k] = probabilities(model, [rows[i] for i in np.flatnonzero(fold == k)])
+    return told
+
+
+def loss(told: FloatArray, rows: Sequence[Judged]) -> float:
     """Return the mean of −log likelihood, nats a loop."""
     truth = np.array([row.friction for row in rows])
-    told = np.where(truth, probabilities, 1.0 - probabilities)
-    return float(-np.log(np.maximum(told, 1e-12)).mean())
-
-
-def best_penalty(rows: Sequence[Judged]) -> float:
-    """Return the penalty under which each world is told best by the others."""
-    worlds = sorted({row.world for row in rows})
-
-    def told_by_others(penalty: float) -> float:
-        total = 0.0
-        for world in worlds:
-            own = [row for row in rows if row.world == world]
-            rest = [row for row in rows if row.world != world]
-            total += loss(fitted(rest, penalty).probabilities(own), own)
-        return total
-
-    return min(PENALTIES, key=told_by_others)
+    right = np.where(truth, told, 1.0 - told)
+    return float(-np.log(np.maximum(right, 1e-12)).mean())
 
 
 @dataclasses.dataclass(frozen=True)
 class Bin:
-    """Loops whose probability lies in one tenth: how many, its mean, and the share with friction."""
+    """Loops whose probability lies in one tenth: their number, its mean, their true share."""
 
     loops: int
     told: float
     true: float
 
 
-def reliability(probabilities: FloatArray, rows: Sequence[Judged]) -> list[Bin]:
-    """Return the reliability in :data:`BINS` bins of probability, empty ones left out."""
+def reliability(told: FloatArray, rows: Sequence[Judged]) -> list[Bin]:
+    """Return how what was told is true, in :data:`BINS` bins; empty ones are left out."""
     truth = np.array([row.friction for row in rows], dtype=float)
-    place = np.minimum((probabilities * BINS).astype(int), BINS - 1)
+    place = np.minimum((told * BINS).astype(int), BINS - 1)
     return [
-        Bin(int(inside.sum()), float(probabilities[inside].mean()), float(truth[inside].mean()))
+        Bin(int(inside.sum()), float(told[inside].mean()), float(truth[inside].mean()))
         for k in range(BINS)
         if (inside := place == k).any()
     ]
 
 
-def counts(probabilities: FloatArray, rows: Sequence[Judged]) -> dict[str, float]:
+def counts(told: FloatArray, rows: Sequence[Judged]) -> dict[str, float]:
     """Return the shares that verdicts are held to."""
     truth = np.array([row.friction for row in rows])
-    found, cleared = probabilities >= SURE, probabilities <= 1.0 - SURE
+    ruled_out = np.array([row.figures.ruled_out for row in rows]) > 0.0
+    found, cleared = told >= SURE, (told <= 1.0 - SURE) & ruled_out
     return {
         "loops": len(rows),
         "friction found": float(found[truth].mean()),
         "friction called healthy": float(cleared[truth].mean()),
         "others called sticky": float(found[~truth].mean()),
         "others called healthy": float(cleared[~truth].mean()),
-        "loss": loss(probabilities, rows),
+        "loss": loss(told, rows),
     }

@@ -9,13 +9,21 @@ import json
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.errors import InputError, storing
+from stiction_ros.identification.judgement.figures import Figures, definitions
 from stiction_studies.benches.accuracy.judged import logged_rows, start_log
-from stiction_studies.calibration.fitting import Judged, best_penalty, counts, fitted, reliability
+from stiction_studies.calibration.fitting import (
+    Judged,
+    by_folds,
+    counts,
+    fitted,
+    loss,
+    probabilities,
+    reliability,
+)
 from stiction_studies.calibration.loops import WORLDS
 from stiction_studies.seeds import add_jobs, run_each, seed_range
 
@@ -28,13 +36,14 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "calibrate",
         help="fit the probability of friction to simulated loops",
-        description="Identify simulated loops, fit the coefficients of the probability to their "
-        "figures, and hold each world against coefficients that are fitted to the others.",
+        description="Identify simulated loops, fit the probability to their figures, and hold "
+        "each loop against what is fitted to others.",
     )
     parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS), metavar="NAME")
     parser.add_argument("--seeds", type=seed_range, default=SEEDS, metavar="A:B", help="(0:399)")
     parser.add_argument("--log", type=Path, metavar="F", help="keep figures there, and go on there")
-    parser.add_argument("--out", type=Path, metavar="F.yaml", help="write the coefficients there")
+    parser.add_argument("--out", type=Path, metavar="F.json", help="write the trees there")
+    parser.add_argument("--ablate", action="store_true", help="also leave out each figure in turn")
     add_jobs(parser)
     parser.set_defaults(run=run)
 
@@ -74,39 +83,43 @@ def run(options: argparse.Namespace) -> int:
     work = functools.partial(judged, options.log)
     found = [row for row in run_each(work, due, options.jobs or 1, "calibrate") if row is not None]
     rows = [row for row in (*known, *found) if (row.world, row.seed) in set(tasks)]
-    penalty = best_penalty(rows)
-    show(rows, penalty)
+    show(rows, options.ablate)
     if options.out is not None:
-        told = {
-            "fitted_by": f"stiction calibrate --seeds {first}:{last} --worlds "
-            + " ".join(options.worlds),
-            "loops": len(rows),
-            "penalty": penalty,
-        } | fitted(rows, penalty).to_mapping()
+        command = f"stiction calibrate --seeds {first}:{last} --worlds {' '.join(options.worlds)}"
+        model = fitted(rows)
+        told = {"fitted_by": command, "loops": len(rows)} | model._asdict()
         with storing(options.out):
-            options.out.write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
+            options.out.write_text(json.dumps(told, separators=(",", ":")) + "\n", "utf-8")
     return 0
 
 
-def show(rows: list[Judged], penalty: float) -> None:
-    """Print how each world is told by coefficients fitted to the others."""
+def show(rows: list[Judged], ablate: bool) -> None:
+    """Print how loops are told by trees fitted to others: of all worlds, and of other worlds."""
     console = Console()
-    worlds = sorted({row.world for row in rows})
-    for world in worlds:
-        own = [row for row in rows if row.world == world]
+    folds = by_folds(rows)
+    for world in sorted({row.world for row in rows}):
+        own = [i for i, row in enumerate(rows) if row.world == world]
         rest = [row for row in rows if row.world != world]
-        told = fitted(rest, penalty).probabilities(own)
-        table = Table(f"{world}, told by the others", "")
-        for name, value in counts(told, own).items():
-            table.add_row(name, f"{value:.3f}")
+        parts = {"other loops": folds[own]}
+        if rest:
+            parts["other worlds"] = probabilities(fitted(rest), [rows[i] for i in own])
+        for name, told in parts.items():
+            table = Table(f"{world}, told by {name}", "")
+            for key, value in counts(told, [rows[i] for i in own]).items():
+                table.add_row(key, f"{value:.3f}")
+            console.print(table)
+    bins = Table("probability", "loops", "with friction")
+    for one in reliability(folds, rows):
+        bins.add_row(f"{one.told:.2f}", str(one.loops), f"{one.true:.2f}")
+    console.print(bins)
+    if ablate:
+        table = Table("without", "loss, nats a loop", "more")
+        whole = loss(folds, rows)
+        for name in definitions():
+            told = loss(by_folds(rows, name), rows)
+            table.add_row(name, f"{told:.4f}", f"{told - whole:+.4f}")
         console.print(table)
-        bins = Table("probability", "loops", "with friction")
-        for one in reliability(told, own):
-            bins.add_row(f"{one.told:.2f}", str(one.loops), f"{one.true:.2f}")
-        console.print(bins)
 
 
 def _row_of(values: Any) -> Judged:
-    from stiction_ros.identification.judgement.figures import Figures
-
     return Judged(**{**values, "figures": Figures(**values["figures"])})

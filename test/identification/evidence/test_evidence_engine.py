@@ -12,7 +12,8 @@ def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:
     found = identify(pi_loop(3.0, 1.0), IdentificationOptions(method="evidence"))
     valve, output = found.valves[0], found.outputs[0]
     assert found.method == "evidence"
-    assert valve.figures is not None and valve.probability is not None
+    assert valve.figures is not None
+    assert valve.probability is not None
     assert valve.evidence == valve.figures.to_json()
     assert found.to_json()["rate"] == {"sample_time": 1.0, "used": found.row_samples}
     assert valve.stability is not None
