@@ -89,8 +89,8 @@ def identify_exact(
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     findings = Findings(final, valves, table, told, one_step)
-    told = conclude(record, data, findings, 0.0)
-    answer = explained(record, told, close_loop(record, told))
+    plain = conclude(record, data, findings, 0.0)
+    answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
 

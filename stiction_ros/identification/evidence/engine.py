@@ -15,6 +15,7 @@ from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
+from stiction_ros.identification.evidence.measured_figures import figures_of
 from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
@@ -30,7 +31,6 @@ from stiction_ros.identification.identification_options import IdentificationOpt
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import half_gains, is_deadband
 from stiction_ros.identification.judgement.figures import Figures
-from stiction_ros.identification.judgement.measured import figures_of
 from stiction_ros.identification.judgement.probability import friction_probability, verdict_of
 from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.problem.models import (

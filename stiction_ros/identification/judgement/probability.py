@@ -18,7 +18,7 @@ from importlib.resources import files
 from typing import NamedTuple
 
 from stiction_ros.identification.judgement.figures import Figures
-from stiction_ros.identification.result.verdict_kind import VerdictKind
+from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 
 FILE = "friction_probability.json"
 SURE = 0.95

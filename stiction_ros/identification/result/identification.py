@@ -13,10 +13,10 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.judgement.figures import Figures
+from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 from stiction_ros.identification.result.cause import Cause
 from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability
-from stiction_ros.identification.result.verdict_kind import VerdictKind
 
 __all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
 

@@ -108,8 +108,10 @@ def evidence_table(valves: Sequence[ValveEstimate]) -> str:
     if not told:
         return ""
     rows: list[list[Cell]] = [
-        [f"{key.replace('_', ' ')}, {meaning['unit']}: {meaning['definition']}"]
-        + [number(getattr(valve.figures, key)) for valve in told]
+        [
+            f"{key.replace('_', ' ')}, {meaning['unit']}: {meaning['definition']}",
+            *[number(getattr(valve.figures, key)) for valve in told],
+        ]
         for key, meaning in definitions().items()
     ]
     rows.append(["probability of friction", *[number(valve.probability) for valve in told]])

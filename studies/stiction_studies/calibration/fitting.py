@@ -44,7 +44,7 @@ def fitted(rows: Sequence[Judged], without: str | None = None) -> Model:
         rows: known loops.
         without: name of a figure that is left out.
     """
-    from sklearn.ensemble import HistGradientBoostingClassifier  # slow to import
+    from sklearn.ensemble import HistGradientBoostingClassifier  # type: ignore[import-untyped]
 
     names = [name for name in definitions() if name not in (without, ONLY_CUTS)]
     features = np.array([[row.figures.to_json()[name] for name in names] for row in rows])
@@ -96,9 +96,11 @@ def by_folds(rows: Sequence[Judged], without: str | None = None) -> FloatArray:
     told = np.empty(len(rows))
     fold = np.random.default_rng(1).integers(0, FOLDS, len(rows))
     for k in range(FOLDS):
-        rest = [row for row, own in zip(rows, fold, strict=True) if own != k]
+        rest = [row for row, its in zip(rows, fold, strict=True) if its != k]
         model = fitted(rest, without)
-        told[fold == k] = probabilities(model, [rows[i] for i in np.flatnonzero(fold == k)])
+        told[fold == k] = probabilities(
+            model, [rows[i] for i in np.flatnonzero(fold == k).tolist()]
+        )
     return told
 
 

@@ -14,7 +14,6 @@ from rich.table import Table
 
 from stiction_ros.errors import InputError, storing
 from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_studies.benches.accuracy.judged import logged_rows, start_log
 from stiction_studies.calibration.fitting import (
     Judged,
     by_folds,
@@ -25,6 +24,7 @@ from stiction_studies.calibration.fitting import (
     reliability,
 )
 from stiction_studies.calibration.loops import WORLDS
+from stiction_studies.judged_log import logged_rows, start_log
 from stiction_studies.seeds import add_jobs, run_each, seed_range
 
 SEEDS = (0, 399)
@@ -116,8 +116,8 @@ def show(rows: list[Judged], ablate: bool) -> None:
         table = Table("without", "loss, nats a loop", "more")
         whole = loss(folds, rows)
         for name in definitions():
-            told = loss(by_folds(rows, name), rows)
-            table.add_row(name, f"{told:.4f}", f"{told - whole:+.4f}")
+            other = loss(by_folds(rows, name), rows)
+            table.add_row(name, f"{other:.4f}", f"{other - whole:+.4f}")
         console.print(table)
 
 
