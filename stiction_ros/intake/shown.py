@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.repairs import outside
-from stiction_ros.intake.tables.block import Block, Column, Key
+from stiction_ros.intake.tables.block import Block, Key
 from stiction_ros.records.record import Record
 
 
@@ -36,16 +36,11 @@ def columns_of(blocks: Sequence[Block]) -> dict[str, str]:
 
 
 def spreads_of(blocks: Sequence[Block]) -> dict[str, Spread]:
-    """Return what numbers each signal of a loop has, without those far outside all others.
-
-    Args:
-        blocks: as read; signals that hold no number are left out.
-    """
+    """Return what numbers each signal of a loop has, without those far outside all others."""
     found: dict[Key, list[FloatArray]] = {}
     for block in blocks:
-        for key, column in block.columns.items():
-            if key.signal != "mode":
-                found.setdefault(key, []).append(column.values)
+        for key, column in block.measured.items():
+            found.setdefault(key, []).append(column.values)
     return _spreads({named(key): np.concatenate(pieces) for key, pieces in found.items()})
 
 
@@ -64,28 +59,16 @@ def spreads_of_records(parts: Sequence[Record]) -> dict[str, Spread]:
 
 
 def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ...]:
-    """Return words of the mode with count and what each is taken for, the most frequent first.
-
-    Args:
-        blocks: as read.
-        taken: word to what it is taken for; words that are not there are not told apart.
-    """
+    """Return words of the mode, most frequent first, with count and what each is ``taken`` for."""
     counts: Counter[str] = Counter()
     for block in blocks:
-        for key, column in block.columns.items():
-            if key.signal == "mode":
-                counts.update(_words(column))
+        for column in block.of("mode").values():
+            codes = column.values[np.isfinite(column.values)].astype(np.intp)
+            counts.update(column.known[code] for code in codes.tolist())
     return tuple(
         f"{count} {word or 'empty'}{f' ({taken[word]})' if word in taken else ''}"
         for word, count in counts.most_common()
     )
-
-
-def _words(column: Column) -> dict[str, int]:
-    codes = column.values[np.isfinite(column.values)].astype(np.intp)
-    shown, counts = np.unique(codes, return_counts=True)
-    pairs = zip(shown.tolist(), counts.tolist(), strict=True)
-    return dict(Counter({column.known[code].strip(): count for code, count in pairs}))
 
 
 def _spreads(signals: Mapping[str, FloatArray]) -> dict[str, Spread]:

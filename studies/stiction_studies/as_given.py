@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.intake import is_bag, one_loop
-from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit, TimeUnit
+from stiction_ros.intake.sheets.sheet import Sheet
+from stiction_ros.intake.sheets.typed import open_sheets
+from stiction_ros.records.csv_names import tagged_columns
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_parts
@@ -58,8 +61,27 @@ def read_csv_parts(
     Raises:
         InputError: as :func:`read_csv` but for gaps.
     """
-    options = IntakeOptions(columns=columns, strict=True, as_given=True)
+    with foreign(path):
+        named = _named(open_sheets(Path(path))[0], columns)
+    options = IntakeOptions(
+        columns=named, strict=True, op_unit=OpUnit.OTHER, time_unit=TimeUnit.SECONDS
+    )
     return one_loop(Path(path), options).parts
+
+
+def _named(sheet: Sheet, columns: CsvColumns) -> CsvColumns:
+    """Return the columns with every signal that is there named, so that nothing is asked."""
+    written = tagged_columns(sheet.layout.given)
+    plain = {"op": "V1", "pv": "PV1", "sp": "PV1", "stem": "V1"}
+    found: dict[str, Mapping[str, str]] = {}
+    for signal, tag in plain.items():
+        whole = "op" if signal in ("op", "stem") else "pv"
+        given = getattr(columns, signal)
+        if given is None and getattr(columns, whole) is None:
+            needed = signal == whole or sheet.find(signal.upper()) is not None
+            given = written.get(signal) or ({tag: signal.upper()} if needed else None)
+        found[signal] = given or {}
+    return CsvColumns(**found, time=columns.time)
 
 
 def open_record(
