@@ -41,9 +41,7 @@ class Found:
     """What was read of one loop.
 
     Attributes:
-        name: of the loop.
         record: name of its records.
-        blocks: its signals.
         named: whether a user said which column is what.
         shared: whether other loops stand in the same rows.
     """
@@ -99,10 +97,7 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
 
 
 def unread(found: Found, problem: str | None, modes: Mapping[str, str] = {}) -> Loop:
-    """Return a loop without records for a ``problem``, with what stands in its columns.
-
-    Its ``modes`` are words to what they are taken for, where that is known.
-    """
+    """Return a loop without records, with what stands in its columns, and the ``modes`` known."""
     return Loop(
         found.name,
         found.files,

@@ -52,8 +52,7 @@ def _turned(block: Block, rules: Rules) -> Block:
 def _with_days(block: Block, _: Rules) -> Block:
     """Return times of the day alone with midnights counted.
 
-    Raises:
-        InputError: hours are 1 to 12 alone, and time falls at one or leaps a day at midnight.
+    Hours are refused that are 1 to 12 alone where time falls at one, or leaps a day at midnight.
     """
     if block.clock.zoned or not (block.clock.dated or block.clock.daily):
         return block
@@ -79,12 +78,7 @@ def _with_days(block: Block, _: Rules) -> Block:
 
 @dataclasses.dataclass(frozen=True)
 class _Rows:
-    """Rows in their order in the file.
-
-    Attributes:
-        wall: local time, s since 1970, shape (N,).
-        rank: what they are ordered by, shape (N,).
-    """
+    """Local times of rows, s since 1970, by their rank in the file, shape (N,) each."""
 
     wall: FloatArray
     rank: NDArray[np.int64]
@@ -200,10 +194,8 @@ def _falls_by(rows: _Rows, known: Sequence[Change]) -> bool:
 def _after(block: Block, told: Sequence[_Rows | None], change: Change) -> FlagArray:
     """Return the rows of a block that follow a change.
 
-    The rows ``told``, its own and those of its whole file, may tell which pass they belong to.
-
-    Raises:
-        InputError: rows of an hour that is passed twice do not tell which pass they belong to.
+    The rows ``told``, its own and those of its whole file, may tell which pass they belong to;
+    where they do not they are refused.
     """
     wall, (low, high) = block.clock.start + block.time, change[:2]
     if not change.back:

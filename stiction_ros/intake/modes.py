@@ -108,9 +108,7 @@ def _bare(word: str) -> str:
 
 def _alike(word: str, wanted: set[str]) -> bool:
     value = number(word)
-    return word.casefold() in wanted or (
-        value is not None and any(number(other) == value for other in wanted)
-    )
+    return word.casefold() in wanted or (value is not None and value in map(number, wanted))
 
 
 def _moves(block: Block, modes: _Modes) -> dict[str, float]:

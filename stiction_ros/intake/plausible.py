@@ -14,7 +14,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block, Column
-from stiction_ros.intake.words import WORDS as SAID
+from stiction_ros.intake.words import WORDS
 
 PERCENT = (-10.0, 110.0)
 """What an OP in % stays within."""
@@ -39,7 +39,10 @@ while the move grows. Of the field's loops 1 in 160 is called swapped as it is, 
 that are.
 """
 
-SEVERAL = frozenset(SAID["several"])
+SAID = {unit: WORDS["op_ranges"][unit][2] for unit in TO_PERCENT}
+"""Units of an OP as notes name them."""
+
+SEVERAL = frozenset(WORDS["several"])
 """Units of OP of which several ranges are usual."""
 
 OWN = "its own unit"
@@ -86,7 +89,7 @@ def in_percent(
     factor, offset = TO_PERCENT[unit]
     notes = [_fits(block, unit, given=given is not None, named=named)]
     if unit is not OpUnit.PERCENT:
-        notes.insert(0, f"OP of {_said(unit)} brought to %")
+        notes.insert(0, f"OP of {SAID[unit]} brought to %")
         columns = {
             key: dataclasses.replace(column, values=factor * column.values + offset)
             for key, column in block.of("op", "stem").items()
@@ -122,20 +125,14 @@ def _without_unit(block: Block, ops: Sequence[Column], *, named: bool) -> tuple[
     return "%" if usual else OWN, ""
 
 
-def _said(unit: OpUnit) -> str:
-    """Return the unit of an OP as notes name it."""
-    return str(SAID["op_ranges"][unit][2])
-
-
 def _fits(block: Block, unit: OpUnit, *, given: bool, named: bool) -> str:
     """Return a note where OP often lies below its unit, as one without its mean does.
 
-    Raises:
-        InputError: the median, or many samples, lie outside of the unit.
+    Where the median, or many samples, lie outside of the unit it is refused.
     """
     factor, offset = TO_PERCENT[unit]
     note = ""
-    said = f"though {'OP is said to be in' if given else 'the export says'} {_said(unit)}"
+    said = f"though {'OP is said to be in' if given else 'the export says'} {SAID[unit]}"
     for column in block.of("op").values():
         values = column.values[np.isfinite(column.values)]
         if not len(values):

@@ -56,13 +56,7 @@ FIX = "correct it, fill it or cut the record there"
 
 @dataclasses.dataclass(frozen=True)
 class Rules:
-    """How strict to be.
-
-    Attributes:
-        strict: whether anything wrong is an error.
-        told: sentences on what was done, in their order.
-        modes: word of a mode to what it is taken for.
-    """
+    """Whether anything wrong is an error, what was done, and what words of a mode are taken for."""
 
     strict: bool
     told: list[str] = dataclasses.field(default_factory=list)
@@ -146,10 +140,8 @@ def checked(block: Block, rules: Rules) -> Block:
 
 
 def _listed(column: Column, missing: FlagArray) -> str:
-    """Return what stands in the place of missing values, without counts where they are not known.
-
-    Words are counted over all rows of the file, of which those without a time are left out.
-    """
+    """Return what stands in the place of missing values, with counts where these are known."""
+    # Words are counted over all rows of the file, of which those without a time are left out.
     words = Counter({word: count for word, count in column.words.items() if word and count})
     empty = int(np.count_nonzero(missing & column.blank))
     counted = words.total() + empty <= np.count_nonzero(missing)
@@ -204,8 +196,8 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
     begins = np.insert(last[:-1], 0, True)
     first, group = np.flatnonzero(begins), np.cumsum(begins) - 1
     moved = np.ptp(np.sign(np.diff(block.lines))) > 0
-    values = [column.values for column in block.of("op", "pv").values()]
-    spread = None if moved else spread_evenly(block.time, first, values)
+    signals = [column.values for column in block.of("op", "pv").values()]
+    spread = None if moved else spread_evenly(block.time, first, signals)
     if spread is not None:
         rules.told.append(spread[1])
         return dataclasses.replace(block, time=spread[0])

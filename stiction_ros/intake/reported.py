@@ -181,12 +181,7 @@ def _regular(
             values = np.where(np.isfinite(values), between, np.nan)
         columns[key] = dataclasses.replace(column, values=values, blank=np.zeros(count, dtype=bool))
     rows = np.maximum(np.searchsorted(block.time, until, side="right") - 1, 0)
-    return Block(
-        path=block.path,
-        row_word="sample",
-        clock=block.clock,
-        time=time,
-        lines=np.arange(count),
-        columns=columns,
-        mask=_mask(block, rows, mask),
+    mask, lines = _mask(block, rows, mask), np.arange(count)
+    return dataclasses.replace(
+        block, row_word="sample", time=time, lines=lines, columns=columns, mask=mask
     )

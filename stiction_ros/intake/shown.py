@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,25 +37,19 @@ def columns_of(blocks: Sequence[Block]) -> dict[str, str]:
 
 def spreads_of(blocks: Sequence[Block]) -> dict[str, Spread]:
     """Return what numbers each signal of a loop has, without those far outside all others."""
-    found: dict[Key, list[FloatArray]] = {}
-    for block in blocks:
-        for key, column in block.measured.items():
-            found.setdefault(key, []).append(column.values)
-    return _spreads({named(key): np.concatenate(pieces) for key, pieces in found.items()})
+    measured = (item for block in blocks for item in block.measured.items())
+    return _spreads((named(key), column.values) for key, column in measured)
 
 
 def spreads_of_records(parts: Sequence[Record]) -> dict[str, Spread]:
     """Return the same of records, whose OP is in %."""
-    found: dict[str, list[FloatArray]] = {}
+    found: list[tuple[str, FloatArray]] = []
     for part in parts:
-        for signal, tags, values in (
-            ("OP", part.valves, part.op),
-            ("PV", part.outputs, part.pv),
-            ("SP", part.outputs, part.sp),
-        ):
-            for tag, column in zip(tags, () if values is None else values.T, strict=False):
-                found.setdefault(f"{signal} {tag}", []).append(column)
-    return _spreads({name: np.concatenate(pieces) for name, pieces in found.items()})
+        found += zip((f"OP {tag}" for tag in part.valves), part.op.T, strict=True)
+        found += zip((f"PV {tag}" for tag in part.outputs), part.pv.T, strict=True)
+        if part.sp is not None:
+            found += zip((f"SP {tag}" for tag in part.outputs), part.sp.T, strict=True)
+    return _spreads(found)
 
 
 def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ...]:
@@ -71,9 +65,12 @@ def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ..
     )
 
 
-def _spreads(signals: Mapping[str, FloatArray]) -> dict[str, Spread]:
+def _spreads(signals: Iterable[tuple[str, FloatArray]]) -> dict[str, Spread]:
+    pieces: dict[str, list[FloatArray]] = {}
+    for name, values in signals:
+        pieces.setdefault(name, []).append(values)
     found = {}
-    for name, values in signals.items():
+    for name, values in ((name, np.concatenate(some)) for name, some in pieces.items()):
         usual = values[np.isfinite(values) & ~outside(values)]
         if len(usual):
             found[name] = Spread(float(usual.min()), float(np.median(usual)), float(usual.max()))

@@ -19,12 +19,9 @@ YEARS = SPREADSHEET[1] - SPREADSHEET[0]
 
 
 class Change(NamedTuple):
-    """A clock is set forward or back.
+    """A clock leaps from ``low`` to ``high``, or falls back and what lies between comes twice.
 
-    Attributes:
-        low, high: local times between which it leaps or falls, s since 1970.
-        back: whether it falls, so that what lies between is passed twice.
-        before: s that local time was ahead of UTC until then.
+    Both are local, in s since 1970; ``before`` are the s that it was ahead of UTC until then.
     """
 
     low: float

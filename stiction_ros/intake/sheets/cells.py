@@ -39,12 +39,7 @@ _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
 
 class Wrong(NamedTuple):
-    """The first cell of a column that is no number.
-
-    Attributes:
-        row: of it, counted from the first of the data.
-        said: ``is empty``, ``is 'bad', not a number`` …
-    """
+    """The first cell of a column that is no number: its row, and such as ``is empty``."""
 
     row: int
     said: str
@@ -157,11 +152,7 @@ def _all_numbers(cells: Cells) -> FloatArray | None:
 
 @dataclasses.dataclass
 class Words:
-    """A column of few different words as it grows.
-
-    Attributes:
-        known: word to its code.
-    """
+    """A column of few different words as it grows; each ``known`` one has a code."""
 
     known: dict[str, int] = dataclasses.field(default_factory=dict)
     _pieces: list[NDArray[np.int32]] = dataclasses.field(default_factory=list)

@@ -73,11 +73,7 @@ def spaced(line: str) -> list[str]:
 
 
 def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
-    """Return where header, units and data are.
-
-    Args:
-        rows: the first rows that are not blank, :data:`LOOKED_AT` at most.
-    """
+    """Return where header, units and data are by the first rows that are not blank."""
     first = _first_data(rows)
     above = list(rows[:first])
     told = bool(above and re.fullmatch(r"sep=.?", above[0][0].strip()))
@@ -124,19 +120,13 @@ def _first_data(rows: Sequence[Sequence[str]]) -> int:
 
 def _header_place(above: Sequence[Sequence[str]], width: int) -> int:
     """Return which row holds the names: the one with most of them known, else the fullest."""
-
-    def rank(place: int) -> tuple[int, int, int]:
-        row = above[place]
-        full = sum(bool(cell.strip()) for cell in row)
+    ranks = []
+    for place, row in enumerate(above):
         known = sum(is_name(_BRACKETS.sub("", cell)) for cell in row)
-        return (known, min(full, width), -place)
-
-    return max(range(len(above)), key=rank)
+        ranks.append((known, min(sum(bool(cell.strip()) for cell in row), width), -place))
+    return -max(ranks)[2]
 
 
 def _is_units(row: Sequence[str]) -> bool:
-    cells = [cell.strip().strip("[]()") for cell in row]
-    told = [cell for cell in cells if cell]
-    if not told or all(is_number(cell) for cell in told):
-        return False
-    return all(UNITS.fullmatch(cell) for cell in told)
+    told = [cell for cell in (cell.strip().strip("[]()") for cell in row) if cell]
+    return all(map(UNITS.fullmatch, told)) and not all(map(is_number, told))

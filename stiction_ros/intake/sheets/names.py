@@ -6,10 +6,11 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from stiction_ros.intake.words import WORDS, by_word, columns_named
+from stiction_ros.intake.words import WORDS, by_word
 
-TIME_NAMES, TAG_NAMES = columns_named("time"), columns_named("tag")
-VALUE_NAMES, UNIT_NAMES = columns_named("value"), columns_named("unit")
+TIME_NAMES, TAG_NAMES, VALUE_NAMES, UNIT_NAMES = (
+    tuple(WORDS["columns"][what]) for what in ("time", "tag", "value", "unit")
+)
 
 _QUALITIES = by_word("qualities")
 _KINDS = {word.replace(" ", ""): kind for word, kind in _QUALITIES.items()}
@@ -32,13 +33,7 @@ _TAG = re.compile(rf"(?i)(.+?)\s*(?:[._:/\\ -]|::)\s*({_WORDS})")
 
 
 class Tag(NamedTuple):
-    """What a name says.
-
-    Attributes:
-        loop: name of the loop; empty for a bare ``PV``.
-        signal: ``pv``, ``sp``, ``op``, ``stem`` or ``mode``.
-        quality: whether it is the quality of that signal.
-    """
+    """What a name says: a signal or its quality, of a loop; that is empty for a bare ``PV``."""
 
     loop: str
     signal: str

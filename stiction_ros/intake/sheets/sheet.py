@@ -70,11 +70,7 @@ class Sheet(abc.ABC):
         """
 
     def find(self, name: str) -> int | None:
-        """Return the index of the column ``name``, its exact case first; None if absent.
-
-        Raises:
-            InputError: it is there more than once.
-        """
+        """Return the index of the one column ``name``, exact case first; None if absent."""
         name = " ".join(name.split())
         for names in (self.layout.given, self.layout.header):
             exact = [k for k, other in enumerate(names) if other == name]
@@ -132,7 +128,9 @@ class RowSheet(Sheet):
                 f"has {len(data[0])} cells under {len(self.layout.header)} names",
                 fix="name every column; decimal commas need semicolons or tabs between the cells",
             )
-        self.decimal_comma = delimiter != "," or _commas(data)
+        quoted = [cell.strip() for row in data for cell in row]
+        commas = any(map(_COMMA.fullmatch, quoted)) and not any(map(_POINT.fullmatch, quoted))
+        self.decimal_comma = delimiter != "," or commas
         self._names = [_plain(cell) for cell in top[self.layout.place]]
         self._again: list[tuple[int, list[str]]] = []
 
@@ -205,18 +203,8 @@ def _plain(cell: str) -> str:
     return " ".join(cell.replace("\ufeff", "").split())
 
 
-def _commas(rows: Sequence[Sequence[str]]) -> bool:
-    """Return whether quoted numbers have decimal commas: some have commas and none a point."""
-    cells = [cell.strip() for row in rows for cell in row]
-    return any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
-
-
 def text_sheet(path: Path) -> Sheet:
-    """Open a text file; comma, semicolon, tab, bar or white space between the cells.
-
-    Raises:
-        InputError: as :func:`stiction_ros.intake.sheets.text.open_text` and :class:`RowSheet`.
-    """
+    """Open a text file; comma, semicolon, tab, bar or white space between the cells."""
     with text.open_text(path) as opened:
         lines = [line for line in itertools.islice(opened, LOOKED_AT) if line.strip()]
     delimiter = delimiter_of(lines)

@@ -106,9 +106,7 @@ class _Date(NamedTuple):
 class Stamps:
     """A column of times as it grows; most cells of its first piece tell whether it is numbers.
 
-    Attributes:
-        decimal_comma: of numbers.
-        order: of days and months, None to find out.
+    The ``order`` of days and months may be said; None finds out.
     """
 
     decimal_comma: bool = False

@@ -44,11 +44,7 @@ def open_sheets(path: Path) -> Sequence[Sheet]:
 
 
 class ParquetSheet(Sheet):
-    """A Parquet file; numbers and stamps come as they are.
-
-    Raises:
-        InputError: pyarrow is missing, or the file is damaged.
-    """
+    """A Parquet file; numbers and stamps come as they are."""
 
     row_word = "row"
 

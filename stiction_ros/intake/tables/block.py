@@ -21,12 +21,7 @@ FlagArray = NDArray[np.bool_]
 
 
 class Key(NamedTuple):
-    """One signal of a loop.
-
-    Attributes:
-        signal: ``op``, ``pv``, ``sp``, ``stem`` or ``mode``.
-        tag: of its valve or output.
-    """
+    """One signal of a loop, ``op``, ``pv``, ``sp``, ``stem`` or ``mode``, of a valve or output."""
 
     signal: str
     tag: str
@@ -159,12 +154,5 @@ def joined(blocks: Sequence[Block]) -> tuple[Block, dict[str, int]]:
             differing[column.name] += int(np.count_nonzero(~same))
             into.values[rows], into.blank[rows] = given, False
             columns[key] = dataclasses.replace(into, known=known, words=into.words + column.words)
-    whole = Block(
-        path=blocks[0].path,
-        row_word="sample",
-        clock=blocks[0].clock._replace(start=start),
-        time=axis,
-        lines=np.arange(len(axis)),
-        columns=columns,
-    )
-    return whole, dict(+differing)
+    clock, lines = blocks[0].clock._replace(start=start), np.arange(len(axis))
+    return Block(blocks[0].path, "sample", clock, axis, lines, columns), dict(+differing)

@@ -36,12 +36,7 @@ _MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
 
 
 class TimeColumn(NamedTuple):
-    """Where the times stand.
-
-    Attributes:
-        place: of the column.
-        beside: column of the time of day, when ``place`` has the date alone.
-    """
+    """Where the times stand; ``beside`` is the time of day, when ``place`` has the date alone."""
 
     place: int
     beside: int | None = None

@@ -41,10 +41,7 @@ def one_value(
     """Return the columns of a table with one value a row; None for another table.
 
     It is told by the names of its columns or, where none of them is OP or PV, by what stands
-    there: texts that name signals, stamps, numbers.
-
-    Raises:
-        InputError: several columns may hold the values.
+    there: texts that name signals, stamps, numbers; refused where several may hold the values.
     """
     named = options.columns.time
     unit = _first(sheet, UNIT_NAMES)
@@ -61,19 +58,18 @@ def one_value(
     beside = {unit, *quality_places(header, top)}
     texts = [k for k, kind in enumerate(kinds) if kind == "text" and repeats(top[k])]
     texts = [k for k in texts if k not in beside]
-    stamps = [k for k in range(len(top)) if is_clock(header[k], top[k]) and not _still(top[k])]
+    stamps = [k for k, cells in enumerate(top) if is_clock(header[k], cells)]
+    stamps = [k for k in stamps if len(top[k]) < 2 or len(set(top[k])) > 1]
     of_tags = [k for k in texts if any(t.loop for t in map(read, set(top[k])) if t)]
     if not stamps or (not of_tags and (len(texts) != 1 or read(sheet.name))):
         return None
     listed = any(header[k].casefold() in TIME_NAMES for k in stamps)
     clock = time_column(sheet, named) if named or listed else TimeColumn(stamps[0])
     place = (of_tags or texts)[0]
-    values = [k for k, kind in enumerate(kinds) if kind == "number" and k != clock.place]
-    values = [k for k in values if k not in beside]
-    if len(values) > 1:
-        values = [k for k in values if not _is_count(top[k], top[place])] or values
-    if len(values) > 1:
-        values = [k for k in values if _is_value(header[k])] or values
+    other = beside | {clock.place}
+    values = [k for k, kind in enumerate(kinds) if kind == "number" and k not in other]
+    values = [k for k in values if not _is_count(top[k], top[place])] or values
+    values = [k for k in values if _is_value(header[k])] or values
     if len(values) == 1:
         return OneValue(place, clock, values[0], unit)
     if not of_tags or not values:
@@ -84,10 +80,6 @@ def one_value(
         fix=f"say which with --long TAG,TIME,VALUE, such as --long "
         f"{shlex.quote(','.join(given[k] for k in (place, clock.place, values[0])))}",
     )
-
-
-def _still(cells: Cells) -> bool:
-    return len(cells) > 1 and len(set(cells)) == 1
 
 
 def _is_count(cells: Cells, names: Cells) -> bool:

@@ -132,11 +132,7 @@ class _Clocks(NamedTuple):
 def _clocks(
     sheet: Sheet, signals: Iterable[int], options: IntakeOptions, top: Sequence[Cells]
 ) -> _Clocks:
-    """Return the column of times, those that stand beside each signal, and notes.
-
-    Raises:
-        InputError: there is none, and no sample time is given.
-    """
+    """Return the column of times, those that stand beside each signal, and notes."""
     named, given = options.columns.time, sheet.layout.given
     clocks = [k for k, cells in enumerate(top) if is_clock(sheet.layout.header[k], cells)]
     own = _own_times(clocks, sorted(signals), top)

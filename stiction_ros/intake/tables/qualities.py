@@ -70,10 +70,7 @@ def qualities_of(
 def quality_places(
     header: Sequence[str], top: Sequence[Cells], taken: Collection[int | None] = ()
 ) -> list[int]:
-    """Return the columns that tell of qualities by their name or by the words in them.
-
-    Those with the name of one hold words, or whole numbers and shares of few kinds, as codes are.
-    """
+    """Return the columns that tell of qualities by their words, or by name and few values."""
     found = []
     for index, (name, cells) in enumerate(zip(header, top, strict=True)):
         few = kind_of(cells) in ("text", "") or repeats(cells)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
+
+Reader = tuple[int, Numbers] | tuple[int, Words]
 
 
 def blocks_of(
@@ -52,8 +54,7 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
     for quality in itertools.chain(plan.whole_quality, *plan.quality.values()):
         words[quality] = Words()
     clocks = dict.fromkeys((plan.time, *plan.own.values()))
-    columns = itertools.chain(numbers.items(), words.items())
-    lines, times = _read(sheet, list(columns), clocks, options, least=2)
+    lines, times = _read(sheet, [*numbers.items(), *words.items()], clocks, options, least=2)
     mask, whole_bad, told = _whole_quality(sheet, plan, words)
     notes = [*plan.notes, *(time.note for time in times.values()), *told]
     found: dict[str, list[Block]] = {}
@@ -90,8 +91,8 @@ def _long(
     """Read a table with one value a row: one block a tag."""
     names, units, values, text = Words(), Words(), Numbers(sheet.decimal_comma), _OnlyWords()
     quality = {index: Words() for index in plan.whole_quality}
-    readers: list[tuple[int, Numbers | Words]] = [(long.tag, names), (long.value, values)]
-    readers += [(long.value, text), *quality.items()]
+    readers: list[Reader] = [(long.tag, names), (long.value, values), (long.value, text)]
+    readers += quality.items()
     if long.unit is not None:
         readers.append((long.unit, units))
     lines, times = _read(sheet, readers, [plan.time], options, least=1)
@@ -139,17 +140,13 @@ class _OnlyWords(Words):
 
 def _read(
     sheet: Sheet,
-    readers: Iterable[tuple[int, Numbers | Words]],
+    readers: Sequence[Reader],
     clocks: Iterable[TimeColumn],
     options: IntakeOptions,
     *,
     least: int,
 ) -> tuple[NDArray[np.int64], Mapping[TimeColumn, Times]]:
-    """Read columns; return the lines of their rows, shape (N,), and the times of each clock.
-
-    Raises:
-        InputError: fewer rows than ``least``, or times that cannot be read.
-    """
+    """Read columns; return the lines of their rows, shape (N,), and the times of each clock."""
     stamps = {clock: Stamps(sheet.decimal_comma, options.dates) for clock in clocks}
     lines: list[NDArray[np.int64]] = []
     for columns, place in sheet.pieces():

@@ -50,11 +50,7 @@ class TagRow:
 
 
 def read_rows(path: Path) -> list[TagRow]:
-    """Read the rows of a tag list.
-
-    Raises:
-        InputError: it cannot be read, has other columns, or a cell that says nothing known.
-    """
+    """Read the rows of a tag list; what says nothing known in it is an :class:`InputError`."""
     sheet = open_sheets(path)[0]
     header = [name.casefold() for name in sheet.layout.header]
     loop = not {"loop", "name"}.isdisjoint(header)

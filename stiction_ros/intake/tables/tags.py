@@ -17,10 +17,7 @@ from stiction_ros.intake.tables.tag_rows import TagRow, read_rows
 class FileWay:
     """How one file is read: what a tag list says of it before what is said of all.
 
-    Attributes:
-        options: for this file.
-        tags: that make up its loops; None finds them by their names.
-        units: of OP of its loops, said of this file; they count before the options.
+    Without ``tags`` its loops are found by their names; ``units`` are those of their OP.
     """
 
     options: IntakeOptions
