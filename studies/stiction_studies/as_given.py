@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.intake import is_bag, one_loop
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit, TimeUnit
-from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.records.csv_names import tagged_columns
 from stiction_ros.records.parts import only_part
@@ -34,11 +33,7 @@ def read_csv(
 
     Args:
         path: the file.
-        op: see :class:`CsvColumns`, as the others.
-        pv: …
-        sp: …
-        stem: …
-        time: …
+        op, pv, sp, stem, time: see :class:`CsvColumns`.
 
     Raises:
         InputError: no such file or column; a cell that is empty, not a number or not
@@ -62,26 +57,23 @@ def read_csv_parts(
         InputError: as :func:`read_csv` but for gaps.
     """
     with foreign(path):
-        named = _named(open_sheets(Path(path))[0], columns)
-    options = IntakeOptions(
-        columns=named, strict=True, op_unit=OpUnit.OTHER, time_unit=TimeUnit.SECONDS
-    )
+        columns = _named(open_sheets(Path(path))[0].layout.given, columns)
+    unit, seconds = OpUnit.OTHER, TimeUnit.SECONDS
+    options = IntakeOptions(columns=columns, strict=True, op_unit=unit, time_unit=seconds)
     return one_loop(Path(path), options).parts
 
 
-def _named(sheet: Sheet, columns: CsvColumns) -> CsvColumns:
+def _named(header: Sequence[str], columns: CsvColumns) -> CsvColumns:
     """Return the columns with every signal that is there named, so that nothing is asked."""
-    written = tagged_columns(sheet.layout.given)
-    plain = {"op": "V1", "pv": "PV1", "sp": "PV1", "stem": "V1"}
-    found: dict[str, Mapping[str, str]] = {}
-    for signal, tag in plain.items():
-        whole = "op" if signal in ("op", "stem") else "pv"
-        given = getattr(columns, signal)
-        if given is None and getattr(columns, whole) is None:
-            needed = signal == whole or sheet.find(signal.upper()) is not None
-            given = written.get(signal) or ({tag: signal.upper()} if needed else None)
-        found[signal] = given or {}
-    return CsvColumns(**found, time=columns.time)
+    usual = {"op": {"V1": "OP"}, "pv": {"PV1": "PV"}, "sp": {"PV1": "SP"}, "stem": {"V1": "STEM"}}
+    found = dict(tagged_columns(header)) or {
+        key: named for key, named in usual.items() if key in ("op", "pv") or key.upper() in header
+    }
+    for key, after in (("op", "stem"), ("pv", "sp")):
+        if getattr(columns, key) is not None:
+            found[key], found[after] = getattr(columns, key), {}
+    given = {key: getattr(columns, key) for key in ("sp", "stem") if getattr(columns, key)}
+    return CsvColumns(**{**found, **given}, time=columns.time)
 
 
 def open_record(
@@ -90,15 +82,10 @@ def open_record(
     *,
     namespace: str | None = None,
 ) -> Record:
-    """Read a record without gaps from a CSV file or a bag.
-
-    Args:
-        path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
-        columns: which column is what, for CSV files only.
-        namespace: of the loop's topics, for bags that hold several loops.
+    """Read a record without gaps from a CSV file or a bag, as :func:`open_parts` does.
 
     Raises:
-        InputError: as :func:`open_parts`; gaps, several runs, bad samples.
+        InputError: as there; gaps, several runs, bad samples.
     """
     return only_part(open_parts(path, columns, namespace=namespace), str(path))
 
@@ -111,10 +98,7 @@ def open_parts(
 ) -> tuple[Record, ...]:
     """Read the records of a CSV file or a bag, one for each stretch without a gap.
 
-    Args:
-        path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
-        columns: which column is what, for CSV files only.
-        namespace: of the loop's topics, for bags that hold several loops.
+    A file may have ``columns`` that are named, a bag a loop's ``namespace``.
 
     Raises:
         InputError: as :func:`read_csv_parts` and :func:`read_bag_parts`; columns given for a
@@ -122,16 +106,10 @@ def open_parts(
     """
     if is_bag(path) or Path(path).is_dir():
         if columns != CsvColumns():
-            raise InputError(
-                "is a bag, which has no columns",
-                where=str(path),
-                fix="leave --op, --pv, --sp, --stem and --time out",
-            )
+            said = "is a bag, which has no columns"
+            raise InputError(said, where=str(path), fix="leave --op, --pv … out")
         return read_bag_parts(path, namespace=namespace)
     if namespace is not None:
-        raise InputError(
-            "is a CSV file, which has no namespaces",
-            where=str(path),
-            fix="leave --namespace out",
-        )
+        said = "is a CSV file, which has no namespaces"
+        raise InputError(said, where=str(path), fix="leave --namespace out")
     return read_csv_parts(path, columns)

@@ -24,7 +24,7 @@ def read(tmp_path: Path, text: str, **options: object) -> Record:
 
 
 def test_default_columns(tmp_path: Path) -> None:
-    record = read(tmp_path, "t,OP,PV,SP,STEM,MODE\n0,1,2,3,4,x\n2,5,6,7,8,\n")
+    record = read(tmp_path, "t,OP,PV,SP,STEM,MODE\n0,1,2,3,4,Auto\n2,5,6,7,8,\n")
     assert (record.sample_time, record.valves, record.outputs) == (2.0, ("V1",), ("PV1",))
     assert record.op.tolist() == [[1.0], [5.0]]
     assert record.pv.tolist() == [[2.0], [6.0]]

@@ -15,8 +15,9 @@ from stiction_ros.intake.sheets.cells import Cells
 from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
 from stiction_ros.intake.sheets.sheet import Sheet
 from stiction_ros.intake.sheets.stamps import Clock, Times, is_stamp
+from stiction_ros.records.parts import DATES
 
-DATED = (3e8, 4e9)
+DATED = (DATES, 4e9)
 """Seconds since 1970 that are taken for dates: 1979 to 2096."""
 
 SPREADSHEET = (25569.0, 73050.0)
@@ -30,7 +31,6 @@ DAY_LONG = 14400.0
 
 SHORT = 0.05
 """Step, as a number, below which times as large as a spreadsheet's days may be such days."""
-
 
 _MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
 
