@@ -18,7 +18,9 @@ from stiction_ros.identification.closed_loop.oscillation import (
     LEAST_LINE,
     REGULAR,
     Oscillation,
+    amplitude,
     oscillation,
+    pieces,
 )
 from stiction_ros.records.valve_work import ValveWork
 
@@ -74,11 +76,11 @@ class Yardstick:
             stem: shape (n,), %.
         """
         hours = len(error) * self.sample_time / 3600.0
-        line = period = None
-        if self.cycles:
-            swing = oscillation(error, self.stretches)
-            line = 0.0 if swing is None else swing.amplitude
-            period = None if swing is None else swing.period * self.sample_time
+        line = 0.0 if self.cycles else None
+        period = None
+        if self.cycles and (swing := oscillation(error, self.stretches)) is not None:
+            line = amplitude(error, pieces(self.stretches, swing.period), swing.period)
+            period = swing.period * self.sample_time
         work = ValveWork.of(stem).per_hour(hours)
         iae = float(np.abs(error).mean())
         return Measures(line, iae, work.travel, work.moves, work.reversals, period)
