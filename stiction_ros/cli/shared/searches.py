@@ -36,6 +36,14 @@ def laws() -> tuple[str, ...]:
     return tuple(kind.law for kind in kinds if kind.law and not kind.not_identified)
 
 
+def add_law(parser: Any) -> None:
+    """Add the option of the friction law that is identified to a parser."""
+    known = " | ".join(laws())
+    parser.add_argument(
+        "--law", default="he", metavar="LAW", help=f"friction law: {known} (default: he)"
+    )
+
+
 def add_search_options(parser: Any) -> None:
     """Add the options of single searches to a parser."""
     parser.add_argument(
