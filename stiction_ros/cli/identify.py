@@ -69,9 +69,11 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--law",
-        default="he",
+        default="auto",
         metavar="LAW",
-        help=f"friction law: {' | '.join(searches.laws())} (default: he)",
+        help=f"friction law: {' | '.join(searches.laws())}, or auto: each valve's own, he where "
+        "the record does not tell another from it; methods other than evidence take he "
+        "(default: auto)",
     )
     parser.add_argument(
         "--kind",

@@ -74,24 +74,105 @@ def playing(half: FloatArray, values: FloatArray, start: FloatArray) -> FloatArr
 
 
 @compiled
+def following_step(
+    memory: FloatArray, values: FloatArray, static: FloatArray, dynamic: FloatArray
+) -> None:
+    """Move valves (f_S, f_D) that go on while OP goes on, by a sample.
+
+    Args:
+        memory: stem, last OP and direction of motion of each valve, shape (3 or more, G).
+        values: OP, shape (G,).
+        static, dynamic: f_S and f_D, shape (G,).
+    """
+    for g in range(len(values)):
+        if not memory[2, g] * (values[g] - memory[1, g]) > 0.0:
+            error = values[g] - memory[0, g]
+            memory[2, g] = np.sign(error) if np.abs(error) > static[g] else 0.0
+        if memory[2, g] != 0.0:
+            memory[0, g] = values[g] - memory[2, g] * dynamic[g]
+        memory[1, g] = values[g]
+
+
+@compiled
 def xch_stems(
     static: FloatArray, dynamic: FloatArray, values: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Return stems of valves (f_S, f_D) that go on moving while OP goes on."""
-    count, size = len(values), len(static)
+    out = np.empty((len(values), len(static)))
+    memory = np.zeros((3, len(static)))
+    memory[0], memory[1] = start, start
+    for k in range(len(values)):
+        following_step(memory, np.full(len(static), values[k]), static, dynamic)
+        out[k] = memory[0]
+    return out
+
+
+@compiled
+def kano_stems(
+    band: FloatArray, jump: FloatArray, values: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Return stems of valves (S, J) by Kano's rules."""
+    count, size = len(values), len(band)
     out = np.empty((count, size))
-    stem, direction = start.copy(), np.zeros(size)
-    for k in range(count):
-        value = values[k]
-        for g in range(size):
-            last = values[k - 1] if k > 0 else start[g]
-            if not direction[g] * (value - last) > 0.0:
-                error = value - stem[g]
-                slips = np.abs(error) > static[g]
-                direction[g] = np.sign(error) if slips else 0.0
-            if direction[g] != 0.0:
-                stem[g] = value - direction[g] * dynamic[g]
-            out[k, g] = stem[g]
+    for g in range(size):
+        offset = (band[g] - jump[g]) / 2.0
+        stem, last, last_move, stopped_at = start[g], start[g], 0.0, start[g] + offset
+        stopped, direction = True, 1.0
+        for k in range(count):
+            move = values[k] - last
+            if not stopped and move * last_move <= 0.0:
+                stopped_at, stopped = last, True
+            onwards = direction * (values[k] - stopped_at)
+            if stopped and -onwards > band[g]:
+                direction, stopped = -direction, False
+            elif stopped and onwards > jump[g]:
+                stopped = False
+            if not stopped:
+                stem = values[k] - direction * offset
+            last, last_move = values[k], move
+            out[k, g] = stem
+    return out
+
+
+@compiled
+def slope_step(
+    memory: FloatArray, values: FloatArray, dynamic: FloatArray, ends: FloatArray
+) -> None:
+    """Move valves by Choudhury's rules, by a sample.
+
+    Args:
+        memory: χ, u, v, x_ss and the thresholds upwards and downwards, below 0 while the valve
+            moves, shape (6, G).
+        values: OP, shape (G,).
+        dynamic: f_D, shape (G,).
+        ends: S and J, shape (2, G).
+    """
+    for g in range(len(values)):
+        slope, before = np.sign(values[g] - memory[1, g]), memory[2, g]
+        threshold = memory[4, g] if slope > 0.0 else memory[5, g]
+        if slope != before:
+            if memory[4, g] < 0.0:
+                memory[3, g] = memory[1, g]
+                memory[4, g] = ends[1 if slope == 0.0 and before > 0.0 else 0, g]
+                memory[5, g] = ends[1 if slope == 0.0 and before < 0.0 else 0, g]
+        elif slope != 0.0 and np.abs(values[g] - memory[3, g]) > threshold:
+            memory[0, g] = values[g] - slope * dynamic[g]
+            memory[4, g], memory[5, g] = -1.0, -1.0
+        memory[1, g], memory[2, g] = values[g], slope
+
+
+@compiled
+def choudhury_stems(
+    band: FloatArray, jump: FloatArray, values: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Return stems of valves (S, J) by Choudhury's rules."""
+    out = np.empty((len(values), len(band)))
+    memory, ends = np.zeros((6, len(band))), np.stack((band, jump))
+    memory[0], memory[1], memory[3] = start, start, start
+    memory[4], memory[5] = (band + jump) / 2.0, (band + jump) / 2.0
+    for k in range(len(values)):
+        slope_step(memory, np.full(len(band), values[k]), (band - jump) / 2.0, ends)
+        out[k] = memory[0]
     return out
 
 
