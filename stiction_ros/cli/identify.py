@@ -23,6 +23,7 @@ from stiction_ros.cli.shared.intake_options import (
 )
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import (
+    add_law,
     add_search_options,
     identify_by,
     input_orders,
@@ -67,14 +68,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
     )
-    parser.add_argument(
-        "--law",
-        default="auto",
-        metavar="LAW",
-        help=f"friction law: {' | '.join(searches.laws())}, or auto: each valve's own, he where "
-        "the record does not tell another from it; methods other than evidence take he "
-        "(default: auto)",
-    )
+    add_law(parser)
     parser.add_argument(
         "--kind",
         choices=searches.LOOP_KINDS,

@@ -74,36 +74,24 @@ def playing(half: FloatArray, values: FloatArray, start: FloatArray) -> FloatArr
 
 
 @compiled
-def following_step(
-    memory: FloatArray, values: FloatArray, static: FloatArray, dynamic: FloatArray
-) -> None:
-    """Move valves (f_S, f_D) that go on while OP goes on, by a sample.
-
-    Args:
-        memory: stem, last OP and direction of motion of each valve, shape (3 or more, G).
-        values: OP, shape (G,).
-        static, dynamic: f_S and f_D, shape (G,).
-    """
-    for g in range(len(values)):
-        if not memory[2, g] * (values[g] - memory[1, g]) > 0.0:
-            error = values[g] - memory[0, g]
-            memory[2, g] = np.sign(error) if np.abs(error) > static[g] else 0.0
-        if memory[2, g] != 0.0:
-            memory[0, g] = values[g] - memory[2, g] * dynamic[g]
-        memory[1, g] = values[g]
-
-
-@compiled
 def xch_stems(
     static: FloatArray, dynamic: FloatArray, values: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Return stems of valves (f_S, f_D) that go on moving while OP goes on."""
-    out = np.empty((len(values), len(static)))
-    memory = np.zeros((3, len(static)))
-    memory[0], memory[1] = start, start
-    for k in range(len(values)):
-        following_step(memory, np.full(len(static), values[k]), static, dynamic)
-        out[k] = memory[0]
+    count, size = len(values), len(static)
+    out = np.empty((count, size))
+    stem, direction = start.copy(), np.zeros(size)
+    for k in range(count):
+        value = values[k]
+        for g in range(size):
+            last = values[k - 1] if k > 0 else start[g]
+            if not direction[g] * (value - last) > 0.0:
+                error = value - stem[g]
+                slips = np.abs(error) > static[g]
+                direction[g] = np.sign(error) if slips else 0.0
+            if direction[g] != 0.0:
+                stem[g] = value - direction[g] * dynamic[g]
+            out[k, g] = stem[g]
     return out
 
 
@@ -112,13 +100,12 @@ def kano_stems(
     band: FloatArray, jump: FloatArray, values: FloatArray, start: FloatArray
 ) -> FloatArray:
     """Return stems of valves (S, J) by Kano's rules."""
-    count, size = len(values), len(band)
-    out = np.empty((count, size))
-    for g in range(size):
+    out = np.empty((len(values), len(band)))
+    for g in range(len(band)):
         offset = (band[g] - jump[g]) / 2.0
         stem, last, last_move, stopped_at = start[g], start[g], 0.0, start[g] + offset
         stopped, direction = True, 1.0
-        for k in range(count):
+        for k in range(len(values)):
             move = values[k] - last
             if not stopped and move * last_move <= 0.0:
                 stopped_at, stopped = last, True
@@ -138,13 +125,10 @@ def kano_stems(
 def slope_step(
     memory: FloatArray, values: FloatArray, dynamic: FloatArray, ends: FloatArray
 ) -> None:
-    """Move valves by Choudhury's rules, by a sample.
+    """Move valves by Choudhury's rules, by a sample, OP and f_D of shape (G,).
 
     Args:
-        memory: χ, u, v, x_ss and the thresholds upwards and downwards, below 0 while the valve
-            moves, shape (6, G).
-        values: OP, shape (G,).
-        dynamic: f_D, shape (G,).
+        memory: χ, u, v, x_ss and both thresholds, below 0 while a valve moves, shape (6, G).
         ends: S and J, shape (2, G).
     """
     for g in range(len(values)):

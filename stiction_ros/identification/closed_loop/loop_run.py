@@ -16,7 +16,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.effects.grid_kernels import following_step, slope_step
+from stiction_ros.effects.grid_kernels import slope_step
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
@@ -24,8 +24,7 @@ BEYOND = 1e6
 """Times the size of a start from which on a run is taken as gone."""
 
 FOLLOWS, SLOPES = 1, 2
-"""Rules by which a stem moves that goes on while OP does: Kano's or XCH, and Choudhury's; else He's
-law (4) does, its slips stretched by the law's factor where there is one."""
+"""Rules of stems that go on while OP does, Kano's and Choudhury's; 0 is He's, which has a factor."""
 
 LANES = 8
 """Runs that go side by side: as many as a vector of the processor or two hold."""
@@ -201,20 +200,27 @@ def run_loops(
                         error[j, 1, lane] = before
                         error[j, 0, lane] = e
                 rule, factor = runs.laws[j, 0], runs.laws[j, 1]
-                if rule == FOLLOWS:
-                    following_step(memory[j], command[j], friction[j, 0], friction[j, 1])
-                elif rule == SLOPES:
+                if rule == SLOPES:
                     slope_step(memory[j], command[j], friction[j, 1], ends[j])
                 for lane in range(LANES):
                     op[k, j, lane] = command[j, lane]
                     apart = command[j, lane] - stem[k - 1, j, lane]
                     still = abs(apart) <= friction[j, 0, lane]
                     slip = -friction[j, 1, lane] if apart > 0.0 else friction[j, 1, lane]
+                    if rule == FOLLOWS:
+                        goes_on = memory[j, 2, lane] * (command[j, lane] - memory[j, 1, lane]) > 0.0
+                        if not goes_on:
+                            memory[j, 2, lane] = 0.0 if still else np.sign(apart)
+                        still, slip = (
+                            still and not goes_on,
+                            -memory[j, 2, lane] * friction[j, 1, lane],
+                        )
+                        memory[j, 1, lane] = command[j, lane]
                     slipped = command[j, lane] + slip
                     if factor != 1.0 and friction[j, 0, lane] > 0.0:
                         slipped = stem[k - 1, j, lane] + factor * (apart + slip)
                     stem[k, j, lane] = stem[k - 1, j, lane] if still else slipped
-                    if rule != 0.0 and friction[j, 0, lane] > 0.0:
+                    if rule == SLOPES and friction[j, 0, lane] > 0.0:
                         stem[k, j, lane] = memory[j, 0, lane]
         for lane in range(min(LANES, number - first)):
             until = whole if gone[lane] == 0 else gone[lane] + 1

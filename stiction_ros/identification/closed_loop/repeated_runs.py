@@ -73,10 +73,7 @@ def controllers_of(pairs: Pairs) -> Controllers:
 
 
 def law_of(valve: ValveEstimate) -> tuple[float, float]:
-    """Return the rules that move the stem of a valve, and the factor of a slip, as the runs do.
-
-    A law that does not say what its switching patterns are is run as He's.
-    """
+    """Return what the runs are told of a valve's law; of one without switching patterns, He's."""
     law = find_law(valve.law)
     if isinstance(law.switching, MovingCells):
         return (FOLLOWS if law.switching.rules is FollowingRules else SLOPES), 1.0

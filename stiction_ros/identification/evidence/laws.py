@@ -1,19 +1,18 @@
 """Each valve's own friction law, where a record tells it from He's.
 
 He's law is searched first. Where two neighbouring rates believe in a friction, the other laws are
-fitted at the rate that shows more and at its neighbour, from the frictions that were met under He's
-and from a look at all of them. What is compared is −2 log of the marginal likelihood. Of two given
-laws the wrong one is ahead by more than 2 log(1 / α) with a probability of α at most, whatever the
-laws are, as the mean of a likelihood ratio is 1 under the law in its denominator; where K laws are
-tried, α is (1 − the level of the intervals) / K. Only laws of two figures are tried, f_S and f_D:
-none has a parameter more to pay for. A law that gives the very stem of one tried before is none.
+searched at the rate that shows more and at its neighbour. What is compared is −2 log of the
+marginal likelihood: of two laws the wrong one is ahead by more than 2 log(1 / α) with a probability
+of α at most, whatever the laws are, as the mean of a likelihood ratio is 1 under the law in its
+denominator. With K laws tried, α is (1 − the level of the intervals) / K. Only laws of two figures
+are tried, f_S and f_D: none has a parameter more to pay for.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -32,14 +31,13 @@ from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import AUTO, IdentificationOptions
 
 Law = type[FrictionLaw]
+Looks = tuple[Look, ...]
 RIVALS = ("kano", "choudhury")  # compiled laws of f_S and f_D alone, the simpler first
 NAMED = (*RIVALS, "xch")  # which gives Kano's stems
 SAME = 1e-9  # of the standard deviation of OP: stems that differ by less are the same
 
 
-def with_own_laws(
-    seen: tuple[Look, ...], options: IdentificationOptions
-) -> tuple[tuple[Look, ...], tuple[str, ...]]:
+def with_own_laws(seen: Looks, options: IdentificationOptions) -> tuple[Looks, tuple[str, ...]]:
     """Return what each rate shows under the law of each valve, and a clause on each that is chosen.
 
     Args:
@@ -52,32 +50,30 @@ def with_own_laws(
     return seen, tuple(told)
 
 
-def _with_own_law(
-    seen: tuple[Look, ...], valve: int, options: IdentificationOptions
-) -> tuple[tuple[Look, ...], str]:
+def _with_own_law(seen: Looks, valve: int, options: IdentificationOptions) -> tuple[Looks, str]:
     rates = _best_rates(seen, valve)
     if min(seen[k].beyond_price(valve) for k in rates) <= 0.0:
         return seen, ""
     first = seen[0].problem.laws[valve]
-    seeds = _heads([look.found for look in seen], valve)
+    seeds = _heads((look.found for look in seen), valve)
     price = 2.0 * math.log(len(RIVALS) / (1.0 - options.confidence))
     chosen, best = first, {k: seen[k].found for k in rates}
     for law in map(find_law, RIVALS):
-        found = {k: _under(seen[k], valve, law, seeds) for k in rates}
+        found = {k: _searched(seen[k], valve, law, seeds) for k in rates}
         if min(best[k].best.loss - found[k].best.loss for k in rates) > price:
             chosen, best = law, found
     if chosen is first:
         return seen, ""
     gain = min(seen[k].found.best.loss - best[k].best.loss for k in rates)
     clause = f"law {chosen.law} explains PV better than {first.law} by {gain / 2.0:.0f} nats"
-    others = [find_law(name) for name in NAMED if name != chosen.law]
-    alike = [law.law for law in others if _alike(seen, rates[0], valve, law, best)]
+    others, at = [name for name in NAMED if name != chosen.law], rates[0]
+    alike = [name for name in others if _alike(seen[at], valve, find_law(name), best[at].best)]
     if alike:
-        clause += f"; {' and '.join(map(str, alike))} cannot be told from it by this record"
-    return _under_own(seen, valve, chosen, best, options), clause
+        clause += f"; {' and '.join(alike)} cannot be told from it by this record"
+    return _under(seen, valve, chosen, best, options), clause
 
 
-def _best_rates(seen: tuple[Look, ...], valve: int) -> tuple[int, ...]:
+def _best_rates(seen: Looks, valve: int) -> tuple[int, ...]:
     """Return the rate that shows most of those that agree best, and its better neighbour."""
     look = agreement(seen, valve).look
     at = next(k for k, one in enumerate(seen) if one is look)
@@ -85,41 +81,31 @@ def _best_rates(seen: tuple[Look, ...], valve: int) -> tuple[int, ...]:
     return (at, *sorted(beside, key=lambda k: -seen[k].beyond_price(valve))[:1])
 
 
-def _heads(found: Sequence[Found], valve: int) -> list[Candidate]:
-    return [head for one in found for head in heads(one, valve, SEEDS, APART)]
-
-
-def _alike(
-    seen: tuple[Look, ...], rate: int, valve: int, law: Law, found: dict[int, Found]
-) -> bool:
-    """Tell whether a law gives the very stem that is best under another one."""
-    best = found[rate].best
-    friction, start = best.friction[valve][None, :], best.starts[valve]
-    stems = seen[rate].problem.under(valve, law).stems(valve, friction, start)
-    return bool(np.abs(stems[0] - best.stems[valve]).max() < SAME)
-
-
-def _under(look: Look, valve: int, law: Law, seeds: Sequence[Candidate]) -> Found:
+def _searched(look: Look, valve: int, law: Law, seeds: Sequence[Candidate]) -> Found:
     return search_law(look.problem.under(valve, law), look.found, valve, seeds)
 
 
-def _under_own(
-    seen: tuple[Look, ...],
-    valve: int,
-    law: Law,
-    found: dict[int, Found],
-    options: IdentificationOptions,
-) -> tuple[Look, ...]:
+def _heads(found: Iterable[Found], valve: int) -> list[Candidate]:
+    return [head for one in found for head in heads(one, valve, SEEDS, APART)]
+
+
+def _alike(look: Look, valve: int, law: Law, best: Candidate) -> bool:
+    """Tell whether a law gives the very stem of a valve that is best under another one."""
+    friction, start = best.friction[valve][None, :], best.starts[valve]
+    stems = look.problem.under(valve, law).stems(valve, friction, start)
+    return bool(np.abs(stems[0] - best.stems[valve]).max() < SAME)
+
+
+def _under(
+    seen: Looks, valve: int, law: Law, known: Mapping[int, Found], options: IdentificationOptions
+) -> Looks:
     """Return every rate under the law of a valve, what is best at one tried at the others."""
-    seeds = _heads(list(found.values()), valve)
-    own = [found.get(k) or _under(look, valve, law, seeds) for k, look in enumerate(seen)]
+    seeds = _heads(known.values(), valve)
+    own = [known.get(k) or _searched(look, valve, law, seeds) for k, look in enumerate(seen)]
     told = []
     for k, look in enumerate(seen):
         problem = look.problem.under(valve, law)
-        others = _heads([one for i, one in enumerate(own) if i != k], valve)
-        again = search_again(problem, own[k], others)
-        held = tuple(
-            accepted(problem, again, j, options.confidence) for j in range(len(look.accepted))
-        )
-        told.append(dataclasses.replace(look, problem=problem, found=again, accepted=held))
+        found = search_again(problem, own[k], _heads([*own[:k], *own[k + 1 :]], valve))
+        held = [accepted(problem, found, j, options.confidence) for j in range(len(problem.op))]
+        told.append(dataclasses.replace(look, problem=problem, found=found, accepted=tuple(held)))
     return tuple(told)

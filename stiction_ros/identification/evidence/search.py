@@ -182,13 +182,6 @@ class _Valve:
         start = np.full(len(grid), seed.starts[self.valve])
         self._take(np.column_stack([grid, start]), fits, 1, 0.0)
 
-    def take_up(self, seeds: Sequence[Candidate], fits: Sequence[OutputFit]) -> None:
-        """Try frictions from elsewhere that are apart, and what lies beside them."""
-        rubbing = [seed for seed in seeds if seed.friction[self.valve, 0] > 0.0]
-        for seed in candidates_apart(rubbing, self.valve, SEEDS, NEAR):
-            self.add(self.row_of(seed), fits, whole=False)
-            self.look_near(seed, fits)
-
     def _near(self, grid: FloatArray, head: Candidate, count: int, distance: float) -> None:
         friction, start = head.friction[self.valve], head.starts[self.valve]
         starts = np.clip(start + distance * OFF, -friction[0], friction[0])
@@ -238,23 +231,10 @@ def _key(row: FloatArray) -> tuple[float, ...]:
 
 
 def search_valve(
-    problem: Problem,
-    base: Candidate,
-    valve: int,
-    parts: Parts = ALL,
-    seeds: Sequence[Candidate] = (),
+    problem: Problem, base: Candidate, valve: int, parts: Parts = ALL
 ) -> list[Candidate]:
-    """Return all candidates met in a search over the friction of one valve, best first.
-
-    Args:
-        problem: the record.
-        base: whose other valves are kept.
-        valve: index.
-        parts: of the search that are used.
-        seeds: best first, of which frictions and beginnings are tried as well.
-    """
+    """Return all candidates met in a search over the friction of one valve, best first."""
     looked = _Valve(problem, base, valve)
-    looked.take_up(seeds, base.fits)
     drifting = [white(problem, i, base.stems, DRIFT) for i in range(len(base.fits))]
     if problem.rate == 1 and parts.growing:
         looked.grow(drifting)
@@ -301,7 +281,10 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
     met, best = list(found.met), found.best
     for valve in range(len(problem.op)):
         tried = _Valve(problem, best, valve, found.met)
-        tried.take_up(seeds, best.fits)
+        rubbing = [seed for seed in seeds if seed.friction[valve, 0] > 0.0]
+        for seed in candidates_apart(rubbing, valve, SEEDS, NEAR):
+            tried.add(tried.row_of(seed), best.fits, whole=False)
+            tried.look_near(seed, best.fits)
         tried.settle(anew=True)
         if min((one.loss for one in tried.met), default=np.inf) < best.loss - BETTER:
             tried.polish()
@@ -314,17 +297,10 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
 
 
 def search_law(problem: Problem, found: Found, valve: int, seeds: Sequence[Candidate]) -> Found:
-    """Return what is found under another law of one valve.
-
-    Args:
-        problem: the record, with that law.
-        found: under the law before.
-        valve: index.
-        seeds: of which frictions and beginnings are tried.
-    """
-    _, *tried = search_valve(problem, found.without[valve], valve, seeds=seeds)
-    free = [one for one in found.met if not one.friction[valve].any()]
-    told = _concluded(problem, [*free, *tried], found.ideal)
+    """Return what is found under another law of one valve than before, as ``problem`` has it."""
+    met = [one for one in found.met if not one.friction[valve].any()]
+    met += search_valve(problem, found.without[valve], valve)
+    told = search_again(problem, _concluded(problem, met, found.ideal), seeds)
     without = list(told.without)
     without[valve] = min(without[valve], found.without[valve], key=lambda one: one.loss)
     return dataclasses.replace(told, without=tuple(without))

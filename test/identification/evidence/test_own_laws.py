@@ -10,6 +10,7 @@ import simulated_loops as loops
 from evidence_loops import pi_loop
 
 from stiction_ros.identification import Identification, IdentificationOptions, identify
+from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.laws import with_own_laws
 from stiction_ros.identification.evidence.rates import looks
 from stiction_ros.identification.friction.grid import find_law
@@ -43,19 +44,15 @@ def test_a_note_says_by_how_much_and_which_laws_cannot_be_told_apart(
     assert note.endswith("; xch cannot be told from it by this record")
 
 
-def test_each_valve_has_its_own_law() -> None:
-    valve = find_law("kano").from_frictions(5.0, 2.0)
-    one, two = loops.example1(2, samples=600, valve=valve), pi_loop(3.0, 1.0, samples=600)
-    op, pv, sp = (np.hstack([getattr(one, s), getattr(two, s)]) for s in ("op", "pv", "sp"))
-    record = Record("two", 1.0, ("V1", "V2"), ("PV1", "PV2"), op, pv, sp=sp)
-    found = identify(record)
-    assert [valve.law for valve in found.valves] == ["kano", "he"]
-    for valve, static in zip(found.valves, (5.0, 3.0), strict=True):
-        assert valve.static_interval[0] <= static <= valve.static_interval[1]
-
-
-def test_the_loop_is_closed_again_by_the_law_that_was_found(moving: Identification) -> None:
-    assert moving.valves[0].evidence["moved_with"] == pytest.approx(1.0, abs=0.2)
+def test_each_valve_of_a_problem_has_its_own_law() -> None:
+    one, two = pi_loop(3.0, 1.0, samples=300), pi_loop(3.0, 1.0, samples=300, seed=1)
+    op, pv = np.hstack([one.op, two.op]), np.hstack([one.pv, two.pv])
+    he = Problem.of(Record("two", 1.0, ("V1", "V2"), ("PV1", "PV2"), op, pv))
+    kano, friction = he.under(1, find_law("kano")), np.array([[0.1, 0.02]])
+    assert [law.law for law in kano.laws] == ["he", "kano"]
+    for valve, same in ((0, True), (1, False)):
+        stems = [each.stems(valve, friction, 0.0) for each in (he, kano)]
+        assert np.array_equal(*stems) is same
 
 
 def test_he_is_kept_where_no_other_law_is_better_by_more_than_chance() -> None:
