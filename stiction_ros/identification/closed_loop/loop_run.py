@@ -24,7 +24,7 @@ BEYOND = 1e6
 """Times the size of a start from which on a run is taken as gone."""
 
 FOLLOWS, SLOPES = 1, 2
-"""Rules of stems that go on while OP does, Kano's and Choudhury's; 0 is He's, which has a factor."""
+"""Rules of stems that go on while OP does, Kano's and Choudhury's; 0 is He's, times a factor."""
 
 LANES = 8
 """Runs that go side by side: as many as a vector of the processor or two hold."""
