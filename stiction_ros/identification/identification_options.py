@@ -90,10 +90,7 @@ class IdentificationOptions:
 
     @property
     def first_law(self) -> str:
-        """The law that a search begins with: He's where each valve may have its own.
-
-        The exact method, the live estimator that calls it, and the paper's methods keep it.
-        """
+        """The first law searched, the only one of exact, the live estimator and the paper."""
         return "he" if self.law == AUTO else self.law
 
     def __post_init__(self) -> None:

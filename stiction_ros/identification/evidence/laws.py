@@ -56,10 +56,13 @@ def _with_own_law(seen: Looks, valve: int, options: IdentificationOptions) -> tu
         return seen, ""
     first = seen[0].problem.laws[valve]
     seeds = _heads((look.found for look in seen), valve)
+    rivals: dict[Law, dict[int, Found]] = {}
+    for law in map(find_law, reversed(RIVALS)):  # so that the simpler one lacks no seed
+        rivals[law] = {k: _searched(seen[k], valve, law, seeds) for k in rates}
+        seeds = [*_heads(rivals[law].values(), valve), *seeds]
     price = 2.0 * math.log(len(RIVALS) / (1.0 - options.confidence))
     chosen, best = first, {k: seen[k].found for k in rates}
-    for law in map(find_law, RIVALS):
-        found = {k: _searched(seen[k], valve, law, seeds) for k in rates}
+    for law, found in reversed(rivals.items()):
         if min(best[k].best.loss - found[k].best.loss for k in rates) > price:
             chosen, best = law, found
     if chosen is first:
