@@ -42,9 +42,8 @@ def add_law(parser: Any) -> None:
         "--law",
         default="auto",
         metavar="LAW",
-        help=f"friction law: {' | '.join(laws())}, or auto: for each valve the one that explains "
-        "its record best, he unless another is clearly better; only the default method compares "
-        "laws, the others take he (default: auto)",
+        help=f"friction law: {' | '.join(laws())}, or auto: for each valve he, or another that "
+        "explains PV clearly better; he with other methods than the default (default: auto)",
     )
 
 

@@ -92,8 +92,9 @@ def identify_by_evidence(
     report(0.7)
     found = answered(record, data, part, seen, options)
     report(1.0)
-    named = zip(found.valves, told, strict=True)
-    notes = [f"friction of {one.name}: {clause}" for one, clause in named if clause]
+    notes = [
+        f"friction of {v}: {said}" for v, said in zip(record.valves, told, strict=True) if said
+    ]
     found = dataclasses.replace(found, notes=(*found.notes, *notes))
     return dataclasses.replace(found, seconds=time.perf_counter() - begun)
 

@@ -4,8 +4,8 @@ He's law is searched first. Where two neighbouring rates believe in a friction, 
 searched at the rate that shows more and at its neighbour. What is compared is −2 log of the
 marginal likelihood: of two laws the wrong one is ahead by more than 2 log(1 / α) with a probability
 of α at most, whatever the laws are, as the mean of a likelihood ratio is 1 under the law in its
-denominator. With K laws tried, α is (1 − the level of the intervals) / K. Only laws of two figures
-are tried, f_S and f_D: none has a parameter more to pay for.
+denominator. With K laws tried, α is (1 − the level of the intervals) / K. As in the intervals, no
+law is rejected for a tenth of what its friction gains. The laws tried have two figures, as He's.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from stiction_ros.effects import FrictionLaw
-from stiction_ros.identification.evidence.accepted import accepted
+from stiction_ros.identification.evidence.accepted import MISFIT, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.rates import SEEDS, Look, agreement
 from stiction_ros.identification.evidence.search import (
@@ -63,7 +63,9 @@ def _with_own_law(seen: Looks, valve: int, options: IdentificationOptions) -> tu
     price = 2.0 * math.log(len(RIVALS) / (1.0 - options.confidence))
     chosen, best = first, {k: seen[k].found for k in rates}
     for law, found in reversed(rivals.items()):
-        if min(best[k].best.loss - found[k].best.loss for k in rates) > price:
+        gains = [best[k].without[valve].loss - best[k].best.loss for k in rates]
+        ahead = [best[k].best.loss - found[k].best.loss for k in rates]
+        if all(more > price + MISFIT * gain for more, gain in zip(ahead, gains, strict=True)):
             chosen, best = law, found
     if chosen is first:
         return seen, ""
