@@ -94,8 +94,8 @@ def run(options: argparse.Namespace) -> int:
         return show_loops(paths, intake)
     costs = _costs(options.cost)
     units = {name: unit for _, name, unit in _pairs(options.units)}
-    find_law(options.law)  # an unknown one stops the survey, and not every loop of it
     identification = IdentificationOptions(law=options.law)
+    find_law(identification.first_law)  # an unknown one stops the survey, and not every loop of it
     if options.delay is not None:
         identification = dataclasses.replace(identification, delay=options.delay)
     plan = Plan(

@@ -38,9 +38,12 @@ def laws() -> tuple[str, ...]:
 
 def add_law(parser: Any) -> None:
     """Add the option of the friction law that is identified to a parser."""
-    known = " | ".join(laws())
     parser.add_argument(
-        "--law", default="he", metavar="LAW", help=f"friction law: {known} (default: he)"
+        "--law",
+        default="auto",
+        metavar="LAW",
+        help=f"friction law: {' | '.join(laws())}, or auto: for each valve he, or another that "
+        "explains PV clearly better; he with other methods than the default (default: auto)",
     )
 
 
