@@ -23,6 +23,7 @@ from stiction_ros.cli.shared.intake_options import (
 )
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import (
+    add_law,
     add_search_options,
     identify_by,
     input_orders,
@@ -67,12 +68,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
     )
-    parser.add_argument(
-        "--law",
-        default="he",
-        metavar="LAW",
-        help=f"friction law: {' | '.join(searches.laws())} (default: he)",
-    )
+    add_law(parser)
     parser.add_argument(
         "--kind",
         choices=searches.LOOP_KINDS,

@@ -22,9 +22,10 @@ from stiction_ros.cli.shared.intake_options import (
     show_loops,
     tell_strangers,
 )
+from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.cli.survey_list import print_list
 from stiction_ros.cli.survey_progress import progress
-from stiction_ros.errors import InputError, storing
+from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.sheets.layout import delimiter_of
 from stiction_ros.intake.sheets.text import open_text
@@ -48,6 +49,7 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser, many=True)
     parser.add_argument("--delay", type=delay_range, metavar="LO:HI", help="samples (0:10)")
+    add_law(parser)
     parser.add_argument("--no-gain", action="store_true", help="simulate nothing")
     parser.add_argument(
         "--cost",
@@ -77,6 +79,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     # Judging takes compiled code, which other commands do not wait for.
+    from stiction_ros.identification.friction.grid import find_law
     from stiction_ros.identification.identification_options import IdentificationOptions
     from stiction_ros.intake.intake import loops, strange_files
     from stiction_ros.survey.survey import Plan, survey
@@ -91,7 +94,8 @@ def run(options: argparse.Namespace) -> int:
         return show_loops(paths, intake)
     costs = _costs(options.cost)
     units = {name: unit for _, name, unit in _pairs(options.units)}
-    identification = IdentificationOptions()
+    identification = IdentificationOptions(law=options.law)
+    find_law(identification.first_law)  # an unknown one stops the survey, and not every loop of it
     if options.delay is not None:
         identification = dataclasses.replace(identification, delay=options.delay)
     plan = Plan(
@@ -188,7 +192,7 @@ def _pairs(file: str | None) -> list[tuple[int, str, str]]:
     """
     if file is None:
         return []
-    with open_text(Path(file)) as source:
+    with foreign(file), open_text(Path(file)) as source:
         lines = source.read().splitlines()
     read = enumerate(csv.reader(lines, delimiter=delimiter_of(lines)), start=1)
     rows = [(number, row) for number, row in read if row and row[0].strip()]

@@ -96,6 +96,71 @@ def xch_stems(
 
 
 @compiled
+def kano_stems(
+    band: FloatArray, jump: FloatArray, values: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Return stems of valves (S, J) by Kano's rules."""
+    out = np.empty((len(values), len(band)))
+    for g in range(len(band)):
+        offset = (band[g] - jump[g]) / 2.0
+        stem, last, last_move, stopped_at = start[g], start[g], 0.0, start[g] + offset
+        stopped, direction = True, 1.0
+        for k in range(len(values)):
+            move = values[k] - last
+            if not stopped and move * last_move <= 0.0:
+                stopped_at, stopped = last, True
+            onwards = direction * (values[k] - stopped_at)
+            if stopped and -onwards > band[g]:
+                direction, stopped = -direction, False
+            elif stopped and onwards > jump[g]:
+                stopped = False
+            if not stopped:
+                stem = values[k] - direction * offset
+            last, last_move = values[k], move
+            out[k, g] = stem
+    return out
+
+
+@compiled
+def slope_step(
+    memory: FloatArray, values: FloatArray, dynamic: FloatArray, ends: FloatArray
+) -> None:
+    """Move valves by Choudhury's rules, by a sample, OP and f_D of shape (G,).
+
+    Args:
+        memory: χ, u, v, x_ss and both thresholds, below 0 while a valve moves, shape (6, G).
+        ends: S and J, shape (2, G).
+    """
+    for g in range(len(values)):
+        slope, before = np.sign(values[g] - memory[1, g]), memory[2, g]
+        threshold = memory[4, g] if slope > 0.0 else memory[5, g]
+        if slope != before:
+            if memory[4, g] < 0.0:
+                memory[3, g] = memory[1, g]
+                memory[4, g] = ends[1 if slope == 0.0 and before > 0.0 else 0, g]
+                memory[5, g] = ends[1 if slope == 0.0 and before < 0.0 else 0, g]
+        elif slope != 0.0 and np.abs(values[g] - memory[3, g]) > threshold:
+            memory[0, g] = values[g] - slope * dynamic[g]
+            memory[4, g], memory[5, g] = -1.0, -1.0
+        memory[1, g], memory[2, g] = values[g], slope
+
+
+@compiled
+def choudhury_stems(
+    band: FloatArray, jump: FloatArray, values: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Return stems of valves (S, J) by Choudhury's rules."""
+    out = np.empty((len(values), len(band)))
+    memory, ends = np.zeros((6, len(band))), np.stack((band, jump))
+    memory[0], memory[1], memory[3] = start, start, start
+    memory[4], memory[5] = (band + jump) / 2.0, (band + jump) / 2.0
+    for k in range(len(values)):
+        slope_step(memory, np.full(len(band), values[k]), (band - jump) / 2.0, ends)
+        out[k] = memory[0]
+    return out
+
+
+@compiled
 def he_stems(
     static: FloatArray, dynamic: FloatArray, u: FloatArray, start: FloatArray
 ) -> FloatArray:

@@ -258,7 +258,7 @@ def _valve(
     return ValveEstimate(
         name=record.valves[j],
         verdict=verdict,
-        law=options.law,
+        law=options.first_law,
         static_friction=f_s,
         static_interval=(min(static[0], f_s), max(static[1], f_s)),
         dynamic_friction=f_d,

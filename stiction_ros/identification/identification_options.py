@@ -12,6 +12,7 @@ from stiction_ros.errors import InputError
 
 LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
 METHOD_NAMES = ("exact", "evidence")
+AUTO = "auto"
 
 
 def limited(span: FloatArray, limit: float | tuple[float, ...] | None) -> FloatArray:
@@ -46,7 +47,8 @@ class IdentificationOptions:
         output_order: n_a; None lets BIC choose among 1, 2 and 3 under the noise model.
         input_order: n_b; None means equal to n_a.
         delay: inclusive range of t_d, samples, for every channel.
-        law: friction law.
+        law: friction law of all valves, or :data:`AUTO`: of each valve the one that explains PV
+            best, where the record tells it from He's.
         kind: what the loop controls, one of :data:`LOOP_KINDS`, or None; the process that is
             found is held against it, which is told as a note and changes no verdict.
         friction_limit: largest f_S searched, %, one for all valves or one for each; None is the
@@ -67,14 +69,14 @@ class IdentificationOptions:
         >>> from stiction_ros import IdentificationOptions
         >>> options = IdentificationOptions(output_order=1, delay=(0, 4))
         >>> options.law, options.confidence
-        ('he', 0.95)
+        ('auto', 0.95)
     """
 
     method: str = "evidence"
     output_order: int | None = None
     input_order: int | None = None
     delay: tuple[int, int] = (0, 10)
-    law: str = "he"
+    law: str = AUTO
     kind: str | None = None
     friction_limit: float | tuple[float, ...] | None = None
     noise_order: int = 6
@@ -85,6 +87,11 @@ class IdentificationOptions:
     negligible_share: float = 0.03
     one_step_best: bool = True
     check_columns: bool = True
+
+    @property
+    def first_law(self) -> str:
+        """The first law searched, the only one of exact, the live estimator and the paper."""
+        return "he" if self.law == AUTO else self.law
 
     def __post_init__(self) -> None:
         if self.method not in METHOD_NAMES:

@@ -82,9 +82,9 @@ class PaperOptions:
         """
         shared = {
             key: getattr(options, key)
-            for key in ("output_order", "input_order", "delay", "law", "friction_limit")
+            for key in ("output_order", "input_order", "delay", "friction_limit", "check_columns")
         }
-        return cls(method=method, **(shared | {"check_columns": options.check_columns} | chosen))
+        return cls(method=method, **(shared | {"law": options.first_law} | chosen))
 
 
 def _flat(orders: OutputOrders | InputOrders | None) -> tuple[int | None, ...]:

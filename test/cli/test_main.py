@@ -86,7 +86,7 @@ def test_identify_lists_the_friction_laws(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit):
         parser().parse_args(["identify", "--help"])
     told = " ".join(capsys.readouterr().out.split())
-    assert "friction law: choudhury | he | kano | semi_physical | xch (default: he)" in told
+    assert "friction law: choudhury | he | kano | semi_physical | xch, or auto" in told
 
 
 def test_identify_prints_the_contract_as_json(

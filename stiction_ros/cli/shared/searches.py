@@ -36,6 +36,17 @@ def laws() -> tuple[str, ...]:
     return tuple(kind.law for kind in kinds if kind.law and not kind.not_identified)
 
 
+def add_law(parser: Any) -> None:
+    """Add the option of the friction law that is identified to a parser."""
+    parser.add_argument(
+        "--law",
+        default="auto",
+        metavar="LAW",
+        help=f"friction law: {' | '.join(laws())}, or auto: for each valve he, or another that "
+        "explains PV clearly better; he with other methods than the default (default: auto)",
+    )
+
+
 def add_search_options(parser: Any) -> None:
     """Add the options of single searches to a parser."""
     parser.add_argument(

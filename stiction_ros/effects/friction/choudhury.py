@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.behaviour import FloatArray, Memory, starts
 from stiction_ros.effects.friction.moving_rules import SlopeRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
 from stiction_ros.effects.friction.switching import MovingCells, Switching
@@ -78,26 +78,8 @@ class ChoudhuryStiction(SlipJumpPair):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for all rows (S, J) of ``grid`` at once."""
+        from stiction_ros.effects.grid_kernels import choudhury_stems  # compiled: slow to import
+
         band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        offset = (band - jump) / 2.0
-        stem = np.broadcast_to(np.asarray(start, dtype=float), band.shape).copy()
-        last, last_slope, stuck_at = stem.copy(), np.zeros_like(stem), stem.copy()
-        up = (band + jump) / 2.0
-        down = up.copy()
-        out = np.empty((len(values), len(band)))
-        for k, value in enumerate(values.tolist()):
-            slope = np.sign(value - last)
-            turns = slope != last_slope
-            sticks = turns & (up == MOVING)
-            np.copyto(stuck_at, last, where=sticks)
-            rests = slope == 0.0
-            np.copyto(up, np.where(rests & (last_slope > 0.0), jump, band), where=sticks)
-            np.copyto(down, np.where(rests & (last_slope < 0.0), jump, band), where=sticks)
-            threshold = np.where(slope > 0.0, up, down)
-            moves = ~turns & ~rests & (np.abs(value - stuck_at) > threshold)
-            np.copyto(stem, value - slope * offset, where=moves)
-            up[moves] = down[moves] = MOVING
-            last = np.full_like(stem, value)
-            last_slope = slope
-            out[k] = stem
-        return out
+        rest = starts(start, len(band))
+        return choudhury_stems(band, jump, np.asarray(values, dtype=float), rest)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray, Memory
+from stiction_ros.effects.behaviour import FloatArray, Memory, starts
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
 from stiction_ros.effects.friction.stiction import JumpForm
@@ -79,24 +79,7 @@ class KanoStiction(SlipJumpPair):
         sample_time: float = 1.0,
     ) -> FloatArray:
         """Return stem positions, shape (N, G), for all rows (S, J) of ``grid`` at once."""
+        from stiction_ros.effects.grid_kernels import kano_stems  # compiled: slow to import
+
         band, jump = np.ascontiguousarray(grid[:, 0]), np.ascontiguousarray(grid[:, 1])
-        offset = (band - jump) / 2.0
-        stem = np.broadcast_to(np.asarray(start, dtype=float), band.shape).copy()
-        last, last_move = stem.copy(), np.zeros_like(stem)
-        stopped_at, direction = stem + offset, np.ones_like(stem)
-        stopped = np.ones(stem.shape, dtype=bool)
-        out = np.empty((len(values), len(band)))
-        for k, value in enumerate(values.tolist()):
-            move = value - last
-            stops = ~stopped & (move * last_move <= 0.0)
-            np.copyto(stopped_at, last, where=stops)
-            stopped |= stops
-            onwards = direction * (value - stopped_at)
-            turns = stopped & (-onwards > band)
-            np.copyto(direction, -direction, where=turns)
-            stopped &= ~turns & ~(onwards > jump)
-            np.copyto(stem, value - direction * offset, where=~stopped)
-            last = np.full_like(stem, value)
-            last_move = move
-            out[k] = stem
-        return out
+        return kano_stems(band, jump, np.asarray(values, dtype=float), starts(start, len(band)))

@@ -5,7 +5,7 @@ Per sample and run: every PV by equation (9), every OP by the velocity form of i
 .. math:: u_k = u_{k-1} + K \Delta e_k + K_i e_k + K_d (\Delta e_k - \Delta e_{k-1})
 
 with e behind its filter and as many samples late as the controller is, clipped to its limits,
-every stem by He's law (4). A valve without a controller keeps its OP.
+every stem by the law of its valve. A valve without a controller keeps its OP.
 """
 
 from __future__ import annotations
@@ -16,11 +16,15 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.grid_kernels import slope_step
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 BEYOND = 1e6
 """Times the size of a start from which on a run is taken as gone."""
+
+FOLLOWS, SLOPES = 1, 2
+"""Rules of stems that go on while OP does, Kano's and Choudhury's; 0 is He's, times a factor."""
 
 LANES = 8
 """Runs that go side by side: as many as a vector of the processor or two hold."""
@@ -68,6 +72,7 @@ class Runs(NamedTuple):
         pv: before the first sample, oldest first, shape (R, H, p).
         stem: before the first sample, oldest first, shape (R, H, m).
         op: the last one before the first sample, shape (R, m).
+        laws: per valve, the rules that move its stem and the factor of a slip, shape (m, 2).
     """
 
     friction: FloatArray
@@ -75,6 +80,7 @@ class Runs(NamedTuple):
     pv: FloatArray
     stem: FloatArray
     op: FloatArray
+    laws: FloatArray
 
 
 @compiled
@@ -121,7 +127,8 @@ def run_loops(
     wanted, added = np.empty((whole, outputs, LANES)), np.empty((whole, outputs, LANES))
     command, error = np.empty((valves, LANES)), np.zeros((valves, 2, LANES))
     friction, tuning = np.empty((valves, 2, LANES)), np.empty((valves, 3, LANES))
-    value, bound = np.empty(LANES), np.empty(LANES)
+    value, bound, memory = np.empty(LANES), np.empty(LANES), np.zeros((valves, 6, LANES))
+    ends = np.empty((valves, 2, LANES))
     op, gone = np.empty((whole, valves, LANES)), np.empty(LANES, dtype=np.int64)
     for first in range(0, number, LANES):
         _in_lanes(runs.pv, first, y)
@@ -130,6 +137,9 @@ def run_loops(
         _in_lanes(runs.tuning, first, tuning)
         _in_lanes(sp, first, wanted)
         _in_lanes(load, first, added)
+        for j in range(valves):
+            ends[j, 0] = friction[j, 0] + friction[j, 1]
+            ends[j, 1] = friction[j, 0] - friction[j, 1]
         for lane in range(LANES):
             run = min(first + lane, number - 1)
             size = 1.0
@@ -139,6 +149,11 @@ def run_loops(
             bound[lane], gone[lane] = BEYOND * size, 0
             for j in range(valves):
                 command[j, lane] = runs.op[run, j]
+                at = stem[past - 1, j, lane]
+                way = np.sign(at - stem[past - 2, j, lane])  # it moves on, or rests
+                memory[j, 0, lane], memory[j, 3, lane] = at, at
+                memory[j, 1, lane], memory[j, 2, lane] = command[j, lane], way
+                memory[j, 4:, lane] = friction[j, 0, lane] if way == 0.0 else -1.0
                 i = controllers.output[j]
                 if i >= 0:
                     late = past - 1 - controllers.lag[j]
@@ -184,13 +199,29 @@ def run_loops(
                         command[j, lane] = high if moved > high else moved
                         error[j, 1, lane] = before
                         error[j, 0, lane] = e
+                rule, factor = runs.laws[j, 0], runs.laws[j, 1]
+                if rule == SLOPES:
+                    slope_step(memory[j], command[j], friction[j, 1], ends[j])
                 for lane in range(LANES):
                     op[k, j, lane] = command[j, lane]
                     apart = command[j, lane] - stem[k - 1, j, lane]
                     still = abs(apart) <= friction[j, 0, lane]
                     slip = -friction[j, 1, lane] if apart > 0.0 else friction[j, 1, lane]
+                    if rule == FOLLOWS:
+                        goes_on = memory[j, 2, lane] * (command[j, lane] - memory[j, 1, lane]) > 0.0
+                        if not goes_on:
+                            memory[j, 2, lane] = 0.0 if still else np.sign(apart)
+                        still, slip = (
+                            still and not goes_on,
+                            -memory[j, 2, lane] * friction[j, 1, lane],
+                        )
+                        memory[j, 1, lane] = command[j, lane]
                     slipped = command[j, lane] + slip
+                    if factor != 1.0 and friction[j, 0, lane] > 0.0:
+                        slipped = stem[k - 1, j, lane] + factor * (apart + slip)
                     stem[k, j, lane] = stem[k - 1, j, lane] if still else slipped
+                    if rule == SLOPES and friction[j, 0, lane] > 0.0:
+                        stem[k, j, lane] = memory[j, 0, lane]
         for lane in range(min(LANES, number - first)):
             until = whole if gone[lane] == 0 else gone[lane] + 1
             for i in range(outputs):

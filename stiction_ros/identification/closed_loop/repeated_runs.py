@@ -8,7 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
+from stiction_ros.effects.friction.moving_rules import FollowingRules
+from stiction_ros.effects.friction.switching import MovingCells, SlipPolygons
+from stiction_ros.identification.closed_loop.loop_run import (
+    FOLLOWS,
+    SLOPES,
+    Controllers,
+    Process,
+    Runs,
+    run_loops,
+)
 from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
 from stiction_ros.identification.closed_loop.oscillation import (
     REGULAR,
@@ -17,6 +26,8 @@ from stiction_ros.identification.closed_loop.oscillation import (
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
+from stiction_ros.identification.friction.further import first_values
+from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 
 STARTS = (0.2, 0.5, 0.8)
@@ -61,6 +72,16 @@ def controllers_of(pairs: Pairs) -> Controllers:
     )
 
 
+def law_of(valve: ValveEstimate) -> tuple[float, float]:
+    """Return what the runs are told of a valve's law; of one without switching patterns, He's."""
+    law = find_law(valve.law)
+    if isinstance(law.switching, MovingCells):
+        return (FOLLOWS if law.switching.rules is FollowingRules else SLOPES), 1.0
+    if isinstance(law.switching, SlipPolygons):
+        return 0.0, (tuple(valve.further.values()) or first_values(law))[0]
+    return 0.0, 1.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Repeated:
     """One loop, ready to be run again and again; everything scaled.
@@ -69,6 +90,7 @@ class Repeated:
         loop: the signals.
         process: equation (9).
         frictions: per valve the (f_S, f_D) tried, the estimate first, shape (m, F, 2).
+        laws: per valve, :func:`law_of`, shape (m, 2).
         pairs: per valve the output of its controller, −1 for none, and the controller.
         periods: of OP of each valve, samples.
         simulated: PV of the process driven by the estimated stems, shape (N, p).
@@ -78,6 +100,7 @@ class Repeated:
     loop: ScaledLoop
     process: Process
     frictions: FloatArray
+    laws: FloatArray
     pairs: Pairs
     periods: tuple[float, ...]
     simulated: FloatArray
@@ -99,6 +122,7 @@ class Repeated:
             loop,
             process,
             np.round(frictions / loop.op_scale[:, None, None], loop.digits),
+            np.array([law_of(valve) for valve in valves]),
             pairs,
             tuple(periods),
             simulated,
@@ -260,6 +284,7 @@ class Repeated:
             np.repeat(self.simulated[rows][None], number, axis=0),
             np.repeat(self.loop.stem[rows][None], number, axis=0),
             np.repeat(self.loop.op[first + past - 1][None], number, axis=0),
+            self.laws,
         )
         repeated = np.repeat(sp[None], number, axis=0)
         outside = np.ascontiguousarray(load)
@@ -290,6 +315,7 @@ class Repeated:
             np.array([start.pv for start in begins]),
             np.array([start.stem for start in begins]),
             np.array([start.op for start in begins]),
+            self.laws,
         )
         op, _ = run_loops(self.process, self.controllers, runs, sp, np.zeros_like(sp[:1]), False)
         return np.ascontiguousarray(op[:, :, valve])

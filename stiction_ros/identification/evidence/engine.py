@@ -15,6 +15,7 @@ from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
+from stiction_ros.identification.evidence.laws import with_own_laws
 from stiction_ros.identification.evidence.measured_figures import figures_of
 from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.rates import (
@@ -27,6 +28,8 @@ from stiction_ros.identification.evidence.rates import (
     looks,
 )
 from stiction_ros.identification.evidence.unseen import Unseen
+from stiction_ros.identification.friction.further import first_values
+from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import half_gains, is_deadband
@@ -77,10 +80,14 @@ def identify_by_evidence(
     data = prepare(record, options)
     report(0.02)
     part = liveliest(record)
-    seen = looks(part, options)
+    seen, told = with_own_laws(looks(part, options), options)
     report(0.7)
     found = concluded(record, data, part, seen, options)
     report(1.0)
+    notes = [
+        f"friction of {v}: {said}" for v, said in zip(record.valves, told, strict=True) if said
+    ]
+    found = dataclasses.replace(found, notes=(*found.notes, *notes))
     return dataclasses.replace(found, seconds=time.perf_counter() - begun)
 
 
@@ -141,7 +148,7 @@ def _estimate(
     estimate = ValveEstimate(
         name=record.valves[valve],
         verdict=VerdictKind.UNDECIDED,
-        law=options.law,
+        law=str(problem.laws[valve].law),
         static_friction=static,
         static_interval=unseen.static(held.static),
         dynamic_friction=dynamic,
@@ -229,12 +236,22 @@ def _over_all(
     valves = tuple(
         dataclasses.replace(valve, stem_start=op) for valve, op in zip(valves, first, strict=True)
     )
-    stems = data.u.copy()
-    for j in np.flatnonzero(found.friction[:, 0]):
-        stems[j] = stem_of(data, int(j), found.friction[j], 0.0)
-    nowhere = np.zeros(len(stems))
-    model = dataclasses.replace(found, start=nowhere, stems=stems)
+    nowhere = np.zeros(len(valves))
+    model = dataclasses.replace(found, start=nowhere, stems=_stems(data, valves, nowhere))
     return valves, refit(data, model, found.fits[0].orders, warm=False)
+
+
+def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) -> FloatArray:
+    """Return the stems of valves, each by its own law, shape (m, N)."""
+    stems = data.u.copy()
+    for j, valve in enumerate(valves):
+        if valve.static_friction > 0.0:
+            law = find_law(valve.law)
+            further = (tuple(valve.further.values()) or first_values(law),) * len(stems)
+            own = dataclasses.replace(data, law=law, further=further)
+            friction = np.array([valve.static_friction, valve.dynamic_friction])
+            stems[j] = stem_of(own, j, friction, float(starts[j]))
+    return stems
 
 
 def _process(
@@ -246,13 +263,7 @@ def _process(
     """Return orders, delays and linear parts for the stems, and all orders that were tried."""
     friction = np.array([[v.static_friction, v.dynamic_friction] for v in valves])
     starts = np.array([v.stem_start for v in valves]) - record.op[0]
-    if data.further:
-        told = zip(valves, data.further, strict=True)
-        held = tuple(tuple(valve.further.values()) or first for valve, first in told)
-        data = dataclasses.replace(data, further=held)
-    stems = data.u.copy()
-    for j in np.flatnonzero(friction[:, 0]):
-        stems[j] = stem_of(data, int(j), friction[j], float(starts[j]))
+    stems = _stems(data, valves, starts)
     delays = ((data.delay[0],) * len(valves),) * len(data.y)
     base = Model(friction, starts, stems, delays, ())
     rivals = [(orders, linear_model(data, orders, base)) for orders in windows(options)]

@@ -13,6 +13,7 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
 from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.fit_kernels import Lines
+from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.identification_options import IdentificationOptions, limited
 from stiction_ros.identification.kernels.lags import in_rows
@@ -42,7 +43,7 @@ class Problem:
         op: about its mean over its span, shape (m, N): all frictions here are shares of the span.
         pv: means of ``rate`` samples, about their mean over their standard deviation, (p, n).
         rate: samples of OP per row.
-        law: friction law.
+        laws: friction law of each valve.
         span: of OP per valve, %, shape (m,).
         limit: largest f_S per valve, shape (m,).
         scale: standard deviation of ``op`` per valve, shape (m,).
@@ -58,7 +59,7 @@ class Problem:
     op: FloatArray
     pv: FloatArray
     rate: int
-    law: type[FrictionLaw]
+    laws: tuple[type[FrictionLaw], ...]
     span: FloatArray
     limit: FloatArray
     scale: FloatArray
@@ -99,7 +100,7 @@ class Problem:
             op=np.ascontiguousarray(op),
             pv=np.ascontiguousarray(pv.round(DIGITS)),
             rate=rate,
-            law=find_law(options.law),
+            laws=(find_law(options.first_law),) * len(span),
             span=span,
             limit=limited(span, options.friction_limit) / span,
             scale=op.std(axis=1),
@@ -118,6 +119,12 @@ class Problem:
             pv=np.ascontiguousarray(self.pv[:, :rows]),
             least_moves=FEW_MOVES,
         )
+
+    def under(self, valve: int, law: type[FrictionLaw]) -> Problem:
+        """Return the problem with another law of one valve, what it has behind f_S and f_D held."""
+        laws, further = list(self.laws), list(self.further or ((),) * len(self.laws))
+        laws[valve], further[valve] = law, first_values(law)
+        return dataclasses.replace(self, laws=tuple(laws), further=tuple(further))
 
     def with_waves(self, lines: Sequence[Sequence[float]]) -> Problem:
         """Return the problem beside waves from outside.
@@ -219,13 +226,14 @@ class Problem:
         op = self.op[valve]
         begin = op[0] + np.broadcast_to(np.asarray(starts, dtype=float), (len(friction),))
         further = self.further[valve] if self.further else ()
-        if self.law.switching is None:  # it may know sizes in %, not J and S alone
+        law = self.laws[valve]
+        if law.switching is None:  # it may know sizes in %, not J and S alone
             rows = friction.copy()
             rows[:, :2] *= self.span[valve]
             op, begin = self.span[valve] * op, self.span[valve] * begin
-            stems = simulate(self.law, rows, op, begin, further) / self.span[valve]
+            stems = simulate(law, rows, op, begin, further) / self.span[valve]
         else:
-            stems = simulate(self.law, friction, op, begin, further)
+            stems = simulate(law, friction, op, begin, further)
         return self._in_rows(stems, valve)
 
     def _in_rows(self, stems: FloatArray, valve: int) -> FloatArray:

@@ -31,8 +31,9 @@ def settled(problem: Problem) -> tuple[tuple[float, ...], ...]:
     Args:
         problem: a record at its own rate.
     """
-    first = first_values(problem.law)
-    if not searched(problem.law):
+    (law,) = set(problem.laws)
+    first = first_values(law)
+    if not searched(law):
         return (first,) * len(problem.op) if first else ()
     problem = dataclasses.replace(problem, further=(first,) * len(problem.op))
     beside = ideal(problem)
@@ -58,11 +59,11 @@ def with_further(
 ) -> ValveEstimate:
     """Return the estimate of valve j with its further parameters and intervals over all."""
     best = found.best
-    if not problem.further or best.friction[j, 0] == 0.0 or valve.static_friction == 0.0:
+    keys = [entry.key for entry in problem.laws[j].parameters()[2:]]
+    if not keys or best.friction[j, 0] == 0.0 or valve.static_friction == 0.0:
         return valve
-    keys = [entry.key for entry in problem.law.parameters()[2:]]
     values = dict(zip(keys, problem.further[j], strict=True))
-    if not searched(problem.law):
+    if not searched(problem.laws[j]):
         return dataclasses.replace(valve, further=values)
     gain = max(found.without[j].loss - best.loss, 0.0)
     slack = chi2_quantile(confidence, FREEDOM + len(keys)) + MISFIT * gain
@@ -79,7 +80,7 @@ def _nearby(problem: Problem, best: Candidate, valve: int) -> Settled:
 
 def _search(problem: Problem, beside: Candidate, valve: int) -> FurtherSearch:
     judge = Judge.of(problem, beside, valve, beside.fits)
-    return FurtherSearch(problem.law, float(problem.limit[valve]), judge.losses)
+    return FurtherSearch(problem.laws[valve], float(problem.limit[valve]), judge.losses)
 
 
 def _with_further(problem: Problem, valve: int, row: FloatArray) -> Problem:

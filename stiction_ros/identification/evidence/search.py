@@ -298,6 +298,16 @@ def search_again(problem: Problem, found: Found, seeds: Sequence[Candidate]) -> 
     return _concluded(problem, met, found.ideal, tried=found.met[:HEADS])
 
 
+def search_law(problem: Problem, found: Found, valve: int, seeds: Sequence[Candidate]) -> Found:
+    """Return what is found under another law of one valve than before, as ``problem`` has it."""
+    met = [one for one in found.met if not one.friction[valve].any()]
+    met += search_valve(problem, found.without[valve], valve)
+    told = search_again(problem, _concluded(problem, met, found.ideal), seeds)
+    without = list(told.without)
+    without[valve] = min(without[valve], found.without[valve], key=lambda one: one.loss)
+    return dataclasses.replace(told, without=tuple(without))
+
+
 def better(plain: Found, other: Found) -> Found:
     """Return the better of two searches of one record; no valve's rival is worse than in either."""
     best = min(plain, other, key=lambda found: found.best.loss)

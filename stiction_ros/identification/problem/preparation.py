@@ -30,7 +30,7 @@ def prepare(record: Record, options: IdentificationOptions) -> Data:
     needed = orders.first + max(MIN_SAMPLES, 5 * free)
     require_samples(record, needed, TOO_SHORT)
     u, y = np.ascontiguousarray(record.op.T), np.ascontiguousarray(record.pv.T)
-    law = find_law(options.law)
+    law = find_law(options.first_law)
     first = first_values(law)
     return Data(
         y=(y - y.mean(axis=1, keepdims=True)) / y.std(axis=1, keepdims=True),

@@ -6,7 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects import FloatArray, HeStiction
+from stiction_ros.effects import FloatArray
+from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
@@ -31,6 +32,7 @@ class Kind:
     noise: float = 0.02
     lag: int = 0
     limits: tuple[float, float] = (-np.inf, np.inf)
+    law: str = "he"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,10 +54,13 @@ def known(
     noise = kind.noise * np.random.default_rng(seed).standard_normal(samples)
     outside = np.zeros(samples) if load is None else load
     wanted = np.full(samples, 20.0) if sp is None else sp
-    valve = HeStiction(*kind.friction)
+    valve = find_law(kind.law).from_frictions(*kind.friction)
     y, pv, op, stem = np.zeros(samples), np.zeros(samples), np.zeros(samples), np.zeros(samples)
     start = -0.9 * kind.friction[0]  # no rest to stay in
     position, command, before = start, 0.0, 0.0
+    memory = valve.rest(start)
+    if isinstance(memory, tuple):  # OP rests at its middle
+        memory = (start, command, *memory[2:])
     error = np.zeros(samples)
     for k in range(samples):
         for i in range(2):
@@ -70,8 +75,8 @@ def known(
         command = min(max(command, kind.limits[0] - 50.0), kind.limits[1] - 50.0)
         before = seen
         op[k] = command
-        position = command if max(kind.friction) == 0.0 else valve.step(position, command)[1]
-        stem[k] = position
+        memory, position = valve.step(memory, float(command))
+        stem[k] = command if max(kind.friction) == 0.0 else position
     columns = (50.0 + op, pv, wanted, 50.0 + stem)
     record = Record("known", 5.0, ("V1",), ("PV1",), *(column[:, None] for column in columns))
     return Known(record, truth(record, kind))
@@ -83,7 +88,7 @@ def truth(record: Record, kind: Kind) -> Identification:
     valve = ValveEstimate(
         name="V1",
         verdict=VerdictKind.STICKY if f_s > 0.0 else VerdictKind.HEALTHY,
-        law="he",
+        law=kind.law,
         static_friction=f_s,
         static_interval=(0.95 * f_s, 1.05 * f_s),
         dynamic_friction=f_d,

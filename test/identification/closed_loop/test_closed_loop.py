@@ -23,8 +23,11 @@ def closed(one: Known) -> ClosedLoop:
 
 @pytest.mark.parametrize("friction", [(3.0, 1.0), (2.0, 1.0), (6.0, 2.0)])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_sticky_valve_keeps_the_loop_cycling(friction: tuple[float, float], seed: int) -> None:
-    valve = closed(known(Kind(friction=friction), seed)).valves[0]
+@pytest.mark.parametrize("law", ["he", "kano", "choudhury", "semi_physical"])
+def test_a_sticky_valve_keeps_the_loop_cycling(
+    friction: tuple[float, float], seed: int, law: str
+) -> None:
+    valve = closed(known(Kind(friction=friction, law=law), seed)).valves[0]
     assert valve.status is LoopStatus.SUSTAINED
     assert 0.8 < valve.with_friction.ratio < 1.2
     assert valve.without_friction.ratio < 0.05
