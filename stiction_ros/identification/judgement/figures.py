@@ -63,17 +63,17 @@ class Figures:
         "the simulated loop moves nearly as much without it",
         1,
     )
-    loop_without: float = _figure(
-        "ratio",
-        "movement of OP with an ideal valve, simulated, over the recorded one",
-        "with an ideal valve the simulated loop moves as well",
-        -1,
+    loop_closer: float = _figure(
+        "log ratio",
+        "by which the simulated loop's movement is closer to the recorded one with the friction "
+        "than with an ideal valve",
+        "with an ideal valve the simulated loop moves as recorded, too",
+        1,
     )
-    ringing: float = _figure(
-        "ratio",
-        "of a swing of the simulated loop with an ideal valve to the one before",
-        "controller and process ring by themselves",
-        -1,
+    moves: float = _figure(
+        "count",
+        "of samples at which the estimated stem moves",
+        "the estimated stem moves too seldom, or in nearly every sample",
     )
     controller_fit: float = _figure(
         "R²", "of OP's moves by the recovered controller", "the controller is hardly known"
