@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 77_956
+LINES = 78_198
 LINES_OF_STUDIES = 23_696
 NUMERIC_CONSTANTS = 1_014
 
