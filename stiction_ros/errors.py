@@ -46,12 +46,12 @@ def foreign(where: object) -> Iterator[None]:
     """Tell whatever readers of foreign data raise inside the block as an :class:`InputError`.
 
     Args:
-        where: the file.
+        where: the file, which errors get that name no place.
     """
     try:
         yield
-    except InputError:
-        raise
+    except InputError as error:
+        raise error if error.where else error.within(str(where)) from None
     except Exception as error:  # readers of other packages raise anything, of no common base
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(f"cannot be read ({said})", where=str(where)) from error

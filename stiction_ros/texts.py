@@ -26,6 +26,11 @@ def json_text(value: Any, *, indent: int | None = 2) -> str:
     return json.dumps(finite(value), indent=indent, ensure_ascii=False, allow_nan=False)
 
 
+def plural(count: int, what: str) -> str:
+    """Return ``1 row`` or ``3 rows``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def spoken(seconds: float) -> str:
     """Return a time of three digits in the unit that suits it: ``45.5 s``, ``4.78 h``, ``12.3 d``.
 

@@ -21,6 +21,7 @@ from stiction_ros.cli.shared.intake_options import (
     tell,
 )
 from stiction_ros.cli.shared.progress import bar
+from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -38,6 +39,7 @@ MEASURES = {
     "travel_per_hour": "travel %/h",
     "moves_per_hour": "moves/h",
     "reversals_per_hour": "reversals/h",
+    "period": "period s",
 }
 """Measures in the order in which they are printed, and what they are called."""
 
@@ -56,11 +58,12 @@ def add(commands: Any) -> None:
     )
     add_columns(parser)
     add_intake(parser)
+    add_law(parser)
     parser.add_argument("--valve", metavar="TAG", help="of several valves (default: widest band)")
     parser.add_argument("--set-points", metavar="F", help="schedule, for a model")
     parser.add_argument("--samples", type=int, metavar="N", help="of a run, for a model (2000)")
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, law=None)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -84,6 +87,8 @@ def run(options: argparse.Namespace) -> int:
 def _of_model(options: argparse.Namespace) -> Any:
     from stiction_ros.gain.model_gain import SAMPLES, gain_of_model
 
+    if options.law is not None:
+        raise InputError("a model brings its own", where="--law", fix="leave it out")
     model = LoopModel.load(find_config(options.record))
     schedule = None
     if options.set_points is not None:
@@ -97,7 +102,7 @@ def _of_model(options: argparse.Namespace) -> Any:
 
 def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
     from stiction_ros.gain.gain import gain_of
-    from stiction_ros.identification import identify
+    from stiction_ros.identification import IdentificationOptions, identify
     from stiction_ros.records.parts import longest_part
 
     for key in ("set_points", "samples"):
@@ -108,8 +113,9 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
     loop = opened(options)
     tell(loop)
     record = longest_part(loop.parts)
+    settings = IdentificationOptions(law=options.law or IdentificationOptions.law)
     with bar("identifying") as show_share:
-        identified = identify(record, progress=show_share)
+        identified = identify(record, settings, show_share)
     with bar("simulating"):
         gain = gain_of(record, identified, options.valve)
     return gain, _verdict(record, identified, gain)
@@ -124,7 +130,7 @@ def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str,
     valve = identified.valves[index].to_json()
     cause = identified.outputs[record.outputs.index(gain.output)].cause
     turns = round(ValveWork.of(identified.stem[:, index]).reversals)
-    keys = ("verdict", "f_s", "f_s_interval", "f_d", "f_d_interval")
+    keys = ("verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval")
     sure = confidence(valve, None if cause is None else cause.kind.value, turns)
     return {key: valve[key] for key in keys} | {"confidence": sure}
 
@@ -180,6 +186,8 @@ def _rows(now: Any, option: Any) -> Iterator[tuple[str, ...]]:
         if (value := getattr(now, key)) is None:
             continue
         then = None if option.measures is None else getattr(option.measures, key)
+        if key == "period" and _figure(then) in ("–", _figure(value)):
+            continue
         low, high = option.interval.get(key, (None, None))
         between = "" if low is None else f"{_figure(low)} to {_figure(high)}"
         yield shown, name, _figure(value), _figure(then), between

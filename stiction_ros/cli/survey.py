@@ -25,7 +25,7 @@ from stiction_ros.cli.shared.intake_options import (
 from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.cli.survey_list import print_list
 from stiction_ros.cli.survey_progress import progress
-from stiction_ros.errors import InputError, storing
+from stiction_ros.errors import InputError, foreign, storing
 from stiction_ros.intake.sheets.cells import Numbers
 from stiction_ros.intake.sheets.layout import delimiter_of
 from stiction_ros.intake.sheets.text import open_text
@@ -192,7 +192,7 @@ def _pairs(file: str | None) -> list[tuple[int, str, str]]:
     """
     if file is None:
         return []
-    with open_text(Path(file)) as source:
+    with foreign(file), open_text(Path(file)) as source:
         lines = source.read().splitlines()
     read = enumerate(csv.reader(lines, delimiter=delimiter_of(lines)), start=1)
     rows = [(number, row) for number, row in read if row and row[0].strip()]

@@ -32,12 +32,13 @@ import numpy as np
 
 from stiction_ros.control import ControlMode, FrictionSpread, MpcController
 from stiction_ros.control.design import ControlDesign, History
+from stiction_ros.control.jump_form import jump_form
 from stiction_ros.control_settings import ControlSettings
-from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.gain.draws import Draws
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
+from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop import LoopModel
 
@@ -65,9 +66,6 @@ MARGIN = 0.3
 RUNS = 12
 """Drawn loops that it is run on, at most."""
 
-BEYOND = 1e4
-"""Standard deviations of PV from which on a run is taken as gone."""
-
 PAST = 1000
 """Samples before a run that the controller takes over, at most."""
 
@@ -88,13 +86,13 @@ class EmbeddingDesign:
     Attributes:
         model: of the process, its valve without friction.
         settings: weights and observer.
-        friction: f_S and f_D.
+        friction: law of the valve.
         spread: half-widths of their intervals; None where they are known.
     """
 
     model: LoopModel
     settings: ControlSettings
-    friction: HeStiction
+    friction: Behaviour
     spread: FrictionSpread | None
 
     @classmethod
@@ -127,7 +125,11 @@ class EmbeddingDesign:
             loop.record.name,
         )
         static, dynamic = pair_of(estimate)
-        friction = HeStiction(static / scale, dynamic / scale)
+        percent = {one.key for one in find_law(estimate.law).parameters() if "%" in one.unit}
+        further = {k: v / scale if k in percent else v for k, v in estimate.further.items()}
+        estimate = dataclasses.replace(estimate, further=further)
+        friction = estimate.with_frictions(static / scale, dynamic / scale).behaviour()
+        assert friction is not None
         spread = FrictionSpread(
             0.5 * MARGIN * float(np.ptp(estimate.static_interval)) / scale,
             0.5 * MARGIN * float(np.ptp(estimate.dynamic_interval)) / scale,
@@ -139,7 +141,7 @@ class EmbeddingDesign:
     def by_rule(
         cls,
         model: LoopModel,
-        friction: HeStiction,
+        friction: Behaviour,
         spread: FrictionSpread | None,
         variances: tuple[float, float],
     ) -> EmbeddingDesign:
@@ -147,10 +149,14 @@ class EmbeddingDesign:
 
         Args:
             model: one valve and one output, the valve without friction.
-            friction: of the valve.
+            friction: law of the valve.
             spread: half-widths of the intervals of its frictions; None where they are known.
             variances: of the output's noise, and of a sample's move of its wandering load.
+
+        Raises:
+            InputError: a law by which no OP can be planned.
         """
+        static = jump_form(friction).static_friction
         response, soon = _response(model)
         gain = float(response[soon])
         noise, walk = variances
@@ -159,7 +165,7 @@ class EmbeddingDesign:
             output_weights=(1.0,),
             move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
             embedding_move_weights=(max(MOVE_SHARE * gain**2, 1e-9),),
-            state_noise=(STEM_NOISE * friction.static_friction) ** 2,
+            state_noise=(STEM_NOISE * static) ** 2,
             disturbance_noise=(walk,),
             measurement_noise=(noise,),
             jump_price=PRICED * noise,
@@ -246,47 +252,17 @@ def embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws) -> list[
     Returns:
         None for a run that grows without end.
     """
-    return [_embedded(loop, design, draws, r) for r in range(min(RUNS, len(draws)))]
+    i, j, begin = loop.output, loop.valve, loop.begin
+    draws = draws.taken(list(range(min(RUNS, len(draws)))))
+    past = slice(max(loop.loop.longest[0], loop.rows[0] - PAST), loop.rows[0])
+    pvs, ops, sp = loop.loop.pv[past, i], loop.loop.op[past, j], loop.set_points[begin:, i]
+    runs = [EmbeddingRun(design, pvs, ops) for _ in range(len(draws))]
 
+    def control(k: int, pv: FloatArray, op: FloatArray) -> None:
+        for r, run in enumerate(runs):
+            op[r, k, j] = run(float(pv[r, k, i]), float(sp[k]), float(op[r, k - 1, j]))
 
-def _embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws, r: int) -> Measures | None:
-    i, j = loop.output, loop.valve
-    a, b, delay, _ = draws.equations
-    static, dynamic = (draws.frictions[r] / loop.op_scale).tolist()
-    outside = draws.equations.outside[r, i] + _others(draws, r, i, j)
-    span, begin = slice(loop.begin, loop.rows[1]), loop.rows[0] - loop.begin
-    y, stem = loop.loop.pv[span, i].copy(), draws.stems[r, j].copy()
-    sp, recorded = loop.set_points[span, i], loop.loop.op[span, j]
-    op, at = float(recorded[begin - 1]), float(stem[begin - 1])
-    whole = slice(max(loop.loop.longest[0], loop.rows[0] - PAST), loop.rows[0])
-    control = EmbeddingRun(design, loop.loop.pv[whole, i], loop.loop.op[whole, j])
-    back_a, back_b = a[r, i, ::-1].copy(), b[r, i, j, ::-1].copy()
-    lags, late = len(back_a), int(delay[i, j])
-    for k in range(begin, len(y)):
-        known = float(back_b @ stem[k - late - lags : k - late])
-        y[k] = outside[k] - float(back_a @ y[k - lags : k]) + known
-        if not abs(y[k]) < BEYOND:
-            return None
-        op = control(float(y[k]), float(sp[k]), op)
-        apart = op - at
-        if abs(apart) > static:
-            at = op - math.copysign(dynamic, apart)
-        stem[k] = at
-    errors = y[begin:] - sp[begin:]
-    return loop.yardstick.measure(loop.pv_scale * errors, loop.op_scale * stem[begin:])
-
-
-def _others(draws: Draws, r: int, i: int, j: int) -> FloatArray:
-    """Return what the other valves, as recorded, add to an output, shape (N,)."""
-    _, b, delay, outside = draws.equations
-    added = np.zeros(outside.shape[2])
-    for v, stem in enumerate(draws.stems[r]):
-        if v == j:
-            continue
-        for lag, weight in enumerate(b[r, i, v].tolist()):
-            shift = 1 + int(delay[i, v]) + lag
-            added[shift:] += weight * stem[:-shift]
-    return added
+    return loop.under(control, draws)
 
 
 def _response(model: LoopModel) -> tuple[FloatArray, int]:

@@ -217,12 +217,8 @@ def _repeats(now: Measures, run: Measures | None) -> bool:
     """Tell whether a drawn loop does what was recorded."""
     if run is None:
         return False
-    pairs = [(getattr(now, key), getattr(run, key)) for key in ("iae_per_hour", "amplitude")]
-    return all(
-        abs(simulated - recorded) <= REPEATS * recorded
-        for recorded, simulated in pairs
-        if recorded is not None and simulated is not None
-    )
+    pairs = [(getattr(now, key), getattr(run, key)) for key in WORDS]
+    return all(abs(came - was) <= REPEATS * was for was, came in pairs if None not in (was, came))
 
 
 def _doubt(now: Measures, runs: Sequence[Measures | None], kept: int) -> str:
@@ -241,7 +237,7 @@ def _doubt(now: Measures, runs: Sequence[Measures | None], kept: int) -> str:
 def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:
     if not draws.frictions.any():
         return _as_now(What.SERVICE, now, "No friction was found: a service changes nothing.")
-    runs = loop.run(draws, frictions=np.zeros_like(draws.frictions))
+    runs = loop.run(draws, serviced=True)
     note = "The valve without friction under the controller that is there."
     return option_of(What.SERVICE, runs, note, likeliest=draws.likeliest)
 
@@ -259,15 +255,13 @@ def _retune(loop: RecordedLoop, draws: Draws, found: Identification, now: Measur
     cause = found.outputs[loop.output].cause
     if cause is not None and cause.kind in RETUNED:
         tuning = best_tuning(loop, draws)
-        note = "No other tuning with enough distance from instability helps."
+        note = tuning.note
     else:
         note = "Neither valve nor tuning is the cause: another tuning is not looked for."
-    settings = {"gain_factor": tuning.gain, "integral_time_factor": tuning.integral_time}
     if tuning == UNCHANGED:
-        return _as_now(What.RETUNE, now, note, settings)
+        return _as_now(What.RETUNE, now, note, tuning.settings)
     runs = loop.run(draws, tunings=tuning.applied(draws.tunings))
-    note = f"Gain times {tuning.gain:g}, integral time times {tuning.integral_time:g}."
-    return option_of(What.RETUNE, runs, note, settings, draws.likeliest)
+    return option_of(What.RETUNE, runs, note, tuning.settings, draws.likeliest)
 
 
 def _embedding(loop: RecordedLoop, found: Identification, now: Measures) -> Option:

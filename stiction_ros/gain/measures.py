@@ -1,7 +1,7 @@
 """What a loop is measured by: now, and under each thing that could be done about it.
 
-- *Amplitude*: √2 × RMS of the spectral line of PV − SP at the period at which the loop cycles
-  now, over pieces of four cycles, see :mod:`stiction_ros.identification.closed_loop.oscillation`.
+- *Amplitude* and *period* of the dominant line of PV − SP, each run its own: see
+  :mod:`stiction_ros.identification.closed_loop.oscillation`.
 - *IAE per hour*: ∫|PV − SP| dt per hour with time in hours, which is the mean |PV − SP|.
 - *Travel*, *moves* and *reversals* of the stem, an hour: :mod:`stiction_ros.records.valve_work`.
 """
@@ -16,11 +16,10 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.oscillation import (
     LEAST_LINE,
-    NEAR,
     REGULAR,
     Oscillation,
     amplitude,
-    dominant_cycle,
+    oscillation,
     pieces,
 )
 from stiction_ros.records.valve_work import ValveWork
@@ -31,12 +30,12 @@ class Measures:
     """How a loop does.
 
     Attributes:
-        amplitude: engineering units of PV; None where the loop does not cycle now, so that there
-            is no period to look at.
+        amplitude: engineering units of PV; None where the loop does not cycle now.
         iae_per_hour: engineering units of PV.
         travel_per_hour: of the stem, %.
         moves_per_hour: of the stem.
         reversals_per_hour: of the stem.
+        period: at which the amplitude is, s; None where there is none.
     """
 
     amplitude: float | None
@@ -44,6 +43,7 @@ class Measures:
     travel_per_hour: float
     moves_per_hour: float
     reversals_per_hour: float
+    period: float | None = None
 
     def to_json(self) -> dict[str, float | None]:
         """Return the mapping of ``gain --json``."""
@@ -56,38 +56,34 @@ class Yardstick:
 
     Attributes:
         sample_time: s.
-        period: at which the loop cycles now, samples; None where it does not.
+        cycles: whether the loop cycles now; else no run has an amplitude.
         stretches: without a move of the set-point, in samples of a run.
     """
 
     sample_time: float
-    period: float | None
+    cycles: bool
     stretches: Sequence[tuple[int, int]]
 
-    def measure(self, error: FloatArray, stem: FloatArray, *, repeats: bool = False) -> Measures:
+    def measured(self, error: FloatArray, stem: FloatArray) -> Measures | None:
+        """Return the measures of one run, as :meth:`measure`; None where it grows without end."""
+        return self.measure(error, stem) if np.isfinite(error).all() else None
+
+    def measure(self, error: FloatArray, stem: FloatArray) -> Measures:
         """Return the measures of one run.
 
         Args:
             error: PV − SP, shape (n,), engineering units.
             stem: shape (n,), %.
-            repeats: whether the run is to repeat the record: then the line is looked at where it
-                is, as a cycle that goes a little faster than the recorded one is no smaller.
         """
         hours = len(error) * self.sample_time / 3600.0
-        period = self._own(error) if repeats else self.period
-        line = None
-        if period is not None:
-            line = amplitude(error, pieces(self.stretches, period), period)
+        line = 0.0 if self.cycles else None
+        period = None
+        if self.cycles and (swing := oscillation(error, self.stretches)) is not None:
+            line = amplitude(error, pieces(self.stretches, swing.period), swing.period)
+            period = swing.period * self.sample_time
         work = ValveWork.of(stem).per_hour(hours)
-        return Measures(line, float(np.abs(error).mean()), work.travel, work.moves, work.reversals)
-
-    def _own(self, error: FloatArray) -> float | None:
-        """Return the period near the recorded one at which a run cycles, samples."""
-        if self.period is None:
-            return None
-        near = self.period / NEAR, self.period * NEAR
-        cycle = dominant_cycle(error[:, None], self.stretches, near)
-        return self.period if cycle is None else cycle.period
+        iae = float(np.abs(error).mean())
+        return Measures(line, iae, work.travel, work.moves, work.reversals, period)
 
 
 def cycle_period(swing: Oscillation | None) -> float | None:

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from stiction_ros.control import MpcController
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.friction.parameters import FrictionPair, SlipJumpPair
 from stiction_ros.errors import InputError
 from stiction_ros.gain.embedding import EmbeddingDesign
 from stiction_ros.gain.gain import Gain, Option, What, option_of
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
 from stiction_ros.gain.retuning import (
-    CALMER,
-    SENSITIVE,
     UNCHANGED,
-    WORTH,
     Tuning,
-    candidates,
+    calm,
     frequencies,
+    most_helpful,
     peak,
 )
 from stiction_ros.identification.closed_loop.oscillation import oscillation
@@ -31,6 +29,7 @@ from stiction_ros.loop.model import PiTuning
 from stiction_ros.loop.plant import Measurement
 from stiction_ros.loop.set_points import SetPoints, holds
 from stiction_ros.processes.process import NoiseEntry
+from stiction_ros.records.record import Record
 
 SAMPLES = 2000
 """Samples that are simulated."""
@@ -48,6 +47,9 @@ QUIET = 0.02
 """Noise of a model without any, in what a push makes of PV."""
 
 
+Friction = FrictionPair | SlipJumpPair
+
+
 @dataclasses.dataclass(frozen=True)
 class ModelLoop:
     """One valve, one output, one PI controller, ready to be simulated.
@@ -55,14 +57,14 @@ class ModelLoop:
     Attributes:
         model: as given.
         tuning: of its controller.
-        friction: of its valve; None without one.
+        friction: law of its valve; None without one.
         set_points: schedule.
         samples: of a run.
     """
 
     model: LoopModel
     tuning: PiTuning
-    friction: HeStiction | None
+    friction: Friction | None
     set_points: SetPoints
     samples: int
 
@@ -92,7 +94,7 @@ class ModelLoop:
                 where=model.name,
                 fix="give the model of one loop with one valve",
             )
-        laws = [effect for effect in model.valves[0].effects if isinstance(effect, HeStiction)]
+        laws = [effect for effect in model.valves[0].effects if isinstance(effect, Friction)]
         friction = laws[0] if laws else None
         push = _push(model, friction)
         if set_points is None:
@@ -101,17 +103,12 @@ class ModelLoop:
             set_points = SetPoints(model.outputs, np.array([0.0, 20.0 * model.sample_time]), moves)
         return cls(model, model.controller, friction, set_points, samples)
 
-    def run(self, model: LoopModel, control: Callable[[], Controller]) -> list[_Run]:
+    def run(self, model: LoopModel, control: Callable[[], Controller]) -> list[Record]:
         """Return one run for each seed, each under a new controller."""
-        found = []
-        for seed in SEEDS:
-            out = simulate_closed_loop(model, control(), self.set_points, self.samples, seed)
-            record = out.record
-            assert record.sp is not None
-            assert record.stem is not None
-            error = record.pv[:, 0] - record.sp[:, 0]
-            found.append(_Run(error, record.stem[:, 0], record.sp))
-        return found
+        return [
+            simulate_closed_loop(model, control(), self.set_points, self.samples, seed).record
+            for seed in SEEDS
+        ]
 
     def pi(self, tuning: Tuning = UNCHANGED) -> Callable[[], Controller]:
         """Return what makes the PI controller with factors on its tuning."""
@@ -134,28 +131,24 @@ class ModelLoop:
         return peak(np.asarray(control * np.array(plant)))
 
 
-@dataclasses.dataclass(frozen=True)
-class _Run:
-    error: FloatArray
-    stem: FloatArray
-    sp: FloatArray
-
-
 def gain_of_model(
     model: LoopModel, set_points: SetPoints | None = None, samples: int = SAMPLES
 ) -> Gain:
     """Simulate what would help the loop of a model; see :meth:`ModelLoop.of`."""
     loop = ModelLoop.of(model, set_points, samples)
     first = loop.run(model, loop.pi())
+    assert first[0].sp is not None
     stretches = holds(first[0].sp)
-    period = cycle_period(oscillation(first[0].error, stretches))
-    yardstick = Yardstick(model.sample_time, period, stretches)
+    period = cycle_period(oscillation((first[0].pv - first[0].sp)[:, 0], stretches))
+    yardstick = Yardstick(model.sample_time, period is not None, stretches)
 
-    def measured(runs: list[_Run]) -> list[Measures | None]:
-        return [
-            yardstick.measure(run.error, run.stem) if np.isfinite(run.error).all() else None
-            for run in runs
-        ]
+    def measured(runs: list[Record]) -> list[Measures | None]:
+        found = []
+        for run in runs:
+            assert run.sp is not None
+            assert run.stem is not None
+            found.append(yardstick.measured((run.pv - run.sp)[:, 0], run.stem[:, 0]))
+        return found
 
     left = option_of(What.LEAVE, measured(first), "The loop as it is, simulated.")
     if left.measures is None:
@@ -173,36 +166,21 @@ def gain_of_model(
     )
 
 
-Measured = Callable[[list[_Run]], list[Measures | None]]
+Measured = Callable[[list[Record]], list[Measures | None]]
 
 
 def _retune(loop: ModelLoop, measured: Measured) -> Option:
-    present = loop.sensitivity(UNCHANGED)
-    best, least = UNCHANGED, np.inf
-    kept = measured(loop.run(loop.model, loop.pi()))
-    base = _mean_iae(kept)
-    for tuning in candidates(loop.friction is not None):
-        if loop.sensitivity(tuning) > max(SENSITIVE, CALMER * present):
-            continue
-        runs = measured(loop.run(loop.model, loop.pi(tuning)))
-        mean = _mean_iae(runs)
-        if mean < min(least, (1.0 - WORTH) * base):
-            best, least, kept = tuning, mean, runs
-    note = f"Gain times {best.gain:g}, integral time times {best.integral_time:g}."
-    if best == UNCHANGED:
-        note = "No other tuning with enough distance from instability helps."
-    settings = {"gain_factor": best.gain, "integral_time_factor": best.integral_time}
-    return option_of(What.RETUNE, kept, note, settings)
-
-
-def _mean_iae(runs: Sequence[Measures | None]) -> float:
-    """Return the mean IAE per hour; infinite where a run grows without end."""
-    return float(np.mean([np.inf if run is None else run.iae_per_hour for run in runs]))
+    runs = {
+        tuning: measured(loop.run(loop.model, loop.pi(tuning)))
+        for tuning in calm(loop.friction is not None, loop.sensitivity)
+    }
+    best = most_helpful(runs)
+    return option_of(What.RETUNE, runs[best], best.note, best.settings)
 
 
 def _embedding(loop: ModelLoop, measured: Measured) -> Option:
     if loop.friction is None or loop.friction.static_friction <= 0.0:
-        return Option(What.EMBEDDING, None, {}, "The valve follows no law that can be embedded.")
+        return Option(What.EMBEDDING, None, {}, "The valve follows no law of stiction.")
     model = loop.model.with_ideal_valves()
     noise = float(np.max([model.process.noise_std(entry).max() for entry in NoiseEntry]))
     noise = max(noise, QUIET * abs(_push(model, loop.friction))) ** 2
@@ -227,7 +205,7 @@ class _Mpc:
         return self._op
 
 
-def _push(model: LoopModel, friction: HeStiction | None) -> float:
+def _push(model: LoopModel, friction: Friction | None) -> float:
     """Return by how much PV moves when the stem moves by some bands, within a hundred samples."""
     band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
     linear = model.process.linear(model.sample_time)

@@ -27,12 +27,11 @@ from stiction_ros.gain.draws import (
     possible_frictions,
     resampled,
 )
-from stiction_ros.gain.loop_runs import Equations, Valves, run_again
+from stiction_ros.gain.loop_runs import Control, Equations, Laws, RecoveredControl, Stems, run_again
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
-from stiction_ros.gain.stems import stems_of
 from stiction_ros.identification.closed_loop.closed_loop import output_oscillation, paired
 from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.closed_loop.oscillation import oscillation
+from stiction_ros.identification.closed_loop.oscillation import NEEDED_CYCLES, oscillation
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.repeated_runs import controllers_of, period_of
 from stiction_ros.identification.closed_loop.scaled_loop import (
@@ -45,6 +44,7 @@ from stiction_ros.identification.closed_loop.scaled_loop import (
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.rates import LEAST_ROWS, RATES
+from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
@@ -121,7 +121,7 @@ class RecordedLoop:
         period = cycle_period(output_oscillation(loop, output))
         rows = slice(first + past, last)
         stretches = holds(law.set_point[rows, None])
-        if period is not None and max(b - a for a, b in stretches) < 2.0 * period:
+        if period is not None and max(b - a for a, b in stretches) < NEEDED_CYCLES * period:
             stretches = [(0, rows.stop - rows.start)]
         return cls(
             record=record,
@@ -134,7 +134,7 @@ class RecordedLoop:
             begin=first,
             rows=(first + past, last),
             answers=answers,
-            yardstick=Yardstick(record.sample_time, period, stretches),
+            yardstick=Yardstick(record.sample_time, period is not None, stretches),
         )
 
     @property
@@ -243,52 +243,59 @@ class RecordedLoop:
     def _stems(self, frictions: FloatArray) -> FloatArray:
         """Return the stems of all valves by frictions of the one, scaled, shape (C, m, N)."""
         number, j, whole = len(frictions), self.valve, slice(self.begin, self.rows[1])
+        mean = float(self.loop.op_mean[j])
         stems = np.repeat(self.loop.stem[whole].T[None], number, axis=0)
-        op = np.repeat(self.loop.op[whole, j][None], number, axis=0)
-        start = np.full(number, self.loop.stem[self.begin, j])
-        stems[:, j] = stems_of(op, frictions / self.op_scale, start)
+        op = self.loop.op[whole, j] * self.op_scale + mean
+        start = float(self.loop.stem[self.begin, j]) * self.op_scale + mean
+        further = tuple(self.estimate.further.values())
+        moved = simulate(find_law(self.estimate.law), frictions, op, start, further).T
+        moved[frictions[:, 0] <= 0.0] = op
+        stems[:, j] = (moved - mean) / self.op_scale
         return stems
 
+    def _laws(self, frictions: FloatArray) -> Laws:
+        """Return the laws of all valves by frictions of the one, %, shape (C, 2)."""
+        laws, j = [valve.behaviour() for valve in self.estimates], self.valve
+        own = (self.estimate.with_frictions(*pair).behaviour() for pair in frictions.tolist())
+        return [[*laws[:j], law, *laws[j + 1 :]] for law in own]
+
     def run(
-        self,
-        draws: Draws,
-        frictions: FloatArray | None = None,
-        tunings: FloatArray | None = None,
+        self, draws: Draws, tunings: FloatArray | None = None, *, serviced: bool = False
     ) -> list[Measures | None]:
         """Return the measures of drawn loops, as they are or with something changed.
 
         Args:
             draws: R loops.
-            frictions: of the valve in place of those drawn, %, shape (R, 2).
             tunings: of its controller in place of those drawn, scaled, shape (R, 3).
+            serviced: whether the valve has no friction.
 
         Returns:
             None for a run that grows without end.
         """
-        repeats = frictions is None and tunings is None
-        number, j, i = len(draws), self.valve, self.output
-        friction = np.empty((number, len(self.estimates), 2))
-        tuning = np.empty((number, len(self.estimates), 3))
-        for v, valve in enumerate(self.estimates):
-            pair = np.array([valve.static_friction, valve.dynamic_friction])
-            friction[:, v] = pair / self.loop.op_scale[v]
-            tuning[:, v] = self.pairs[v][1].coefficients
-        friction[:, j] = (draws.frictions if frictions is None else frictions) / self.op_scale
-        tuning[:, j] = draws.tunings if tunings is None else tunings
-        whole, ahead = slice(self.begin, self.rows[1]), self.rows[0] - self.begin
-        sp = np.ascontiguousarray(self.set_points[whole])
-        pv, _, stems = run_again(
+        own = np.array([law.coefficients for _, law in self.pairs])
+        tuning = np.repeat(own[None], len(draws), axis=0)
+        tuning[:, self.valve] = draws.tunings if tunings is None else tunings
+        sp, pv = self.set_points[self.begin : self.rows[1]], self.loop.pv[self.begin : self.rows[0]]
+        control = RecoveredControl(controllers_of(self.pairs), tuning, sp, pv)
+        return self.under(control, draws, serviced=serviced)
+
+    def under(
+        self, control: Control, draws: Draws, *, serviced: bool = False
+    ) -> list[Measures | None]:
+        """Return the measures of drawn loops under a controller, as :meth:`run` does."""
+        whole, past = slice(self.begin, self.rows[1]), slice(self.begin, self.rows[0])
+        laws = self._laws(0.0 * draws.frictions if serviced else draws.frictions)
+        pv, stems = run_again(
             draws.equations,
-            controllers_of(self.pairs),
-            Valves(friction, tuning, np.ascontiguousarray(draws.stems[:, :, :ahead])),
-            (self.loop.op[whole].copy(), self.loop.pv[whole].copy(), sp),
+            draws.stems[:, :, : past.stop - past.start],
+            Stems(laws, self.loop, past, self.record.sample_time),
+            control,
+            (self.loop.op[whole], self.loop.pv[whole]),
         )
-        errors = pv[:, :, i] - sp[ahead:, i]
+        errors = pv[:, :, self.output] - self.set_points[slice(*self.rows), self.output]
         return [
-            self.yardstick.measure(self.pv_scale * error, self.op_scale * moved, repeats=repeats)
-            if np.isfinite(error).all()
-            else None
-            for error, moved in zip(errors, stems[:, :, j], strict=True)
+            self.yardstick.measured(self.pv_scale * error, self.op_scale * moved)
+            for error, moved in zip(errors, stems[:, :, self.valve], strict=True)
         ]
 
 

@@ -2,18 +2,20 @@
 
 Gain and integral time are multiplied by a few factors each. A tuning may be taken where the loop
 without friction keeps its distance from instability, and it is chosen for the least mean IAE over
-some of the loops that the identification does not tell apart.
+some of the loops that the identification does not tell apart. It must not make the cycle wider.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.gain.draws import Draws
+from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.recorded_loop import RecordedLoop
 
 ComplexArray = np.ndarray[tuple[int], np.dtype[np.complex128]]
@@ -61,6 +63,18 @@ class Tuning:
         factors = np.array([self.gain, self.gain / self.integral_time, self.gain])
         return np.asarray(tunings * factors)
 
+    @property
+    def settings(self) -> dict[str, float]:
+        """The factors by their names in the JSON."""
+        return {"gain_factor": self.gain, "integral_time_factor": self.integral_time}
+
+    @property
+    def note(self) -> str:
+        """What is done, one sentence."""
+        if self == UNCHANGED:
+            return "No other tuning with enough distance from instability helps."
+        return f"Gain times {self.gain:g}, integral time times {self.integral_time:g}."
+
 
 UNCHANGED = Tuning()
 
@@ -72,21 +86,46 @@ def candidates(friction: bool) -> list[Tuning]:
 
 
 def best_tuning(loop: RecordedLoop, draws: Draws) -> Tuning:
-    """Return the tuning of least IAE over the first draws; unchanged where none saves enough."""
-    draws = draws.taken(list(range(min(TRIED, len(draws)))))
-    present = sensitivity(loop, draws, UNCHANGED)
-    best, least, before = UNCHANGED, np.inf, np.inf
-    for tuning in [UNCHANGED, *candidates(bool(draws.frictions.any()))]:
-        near = sensitivity(loop, draws, tuning) <= max(SENSITIVE, CALMER * present)
-        if tuning != UNCHANGED and not near:
-            continue
-        runs = loop.run(draws, tunings=tuning.applied(draws.tunings))
-        mean = float(np.mean([np.inf if run is None else run.iae_per_hour for run in runs]))
-        if tuning == UNCHANGED:
-            before = mean
-        elif mean < least:
-            best, least = tuning, mean
-    return best if least < (1.0 - WORTH) * before else UNCHANGED
+    """Return the tuning that helps most on the first draws; unchanged where none does."""
+    few = list(range(min(TRIED, len(draws))))
+    draws = draws.taken(few)
+    tunings = calm(bool(draws.frictions.any()), lambda tuning: sensitivity(loop, draws, tuning))
+    applied = np.concatenate([tuning.applied(draws.tunings) for tuning in tunings])
+    runs = loop.run(draws.taken(few * len(tunings)), tunings=applied)
+    by_tuning = [runs[k : k + len(few)] for k in range(0, len(runs), len(few))]
+    return most_helpful(dict(zip(tunings, by_tuning, strict=True)))
+
+
+def calm(friction: bool, peak_of: Callable[[Tuning], float]) -> list[Tuning]:
+    """Return the present tuning, then those that keep their distance from instability.
+
+    Args:
+        friction: whether the valve has some.
+        peak_of: peak of the sensitivity under a tuning.
+    """
+    limit = max(SENSITIVE, CALMER * peak_of(UNCHANGED))
+    return [UNCHANGED, *(one for one in candidates(friction) if peak_of(one) <= limit)]
+
+
+def most_helpful(runs: Mapping[Tuning, Sequence[Measures | None]]) -> Tuning:
+    """Return the tuning of least mean IAE without a wider cycle; unchanged where none is worth it.
+
+    Args:
+        runs: under each tuning, the present one among them.
+    """
+    error, width = (_mean(runs[UNCHANGED], key) for key in ("iae_per_hour", "amplitude"))
+    better = {
+        tuning: mean
+        for tuning, of in runs.items()
+        if (mean := _mean(of, "iae_per_hour")) < (1.0 - WORTH) * error
+        and _mean(of, "amplitude") <= width
+    }
+    return min(better, key=better.__getitem__, default=UNCHANGED)
+
+
+def _mean(runs: Sequence[Measures | None], key: str) -> float:
+    """Return the mean of a measure, 0 where there is none; infinite where a run grows."""
+    return float(np.mean([np.inf if run is None else getattr(run, key) or 0.0 for run in runs]))
 
 
 def sensitivity(loop: RecordedLoop, draws: Draws, tuning: Tuning) -> float:

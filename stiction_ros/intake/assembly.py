@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.clocks import put_right
 from stiction_ros.intake.intake_options import IntakeOptions
 from stiction_ros.intake.loop import Loop
@@ -18,9 +19,9 @@ from stiction_ros.intake.plausible import in_percent, refuse_swapped, refuse_twi
 from stiction_ros.intake.repairs import (
     Rules,
     checked,
+    each,
     filled,
     in_order,
-    plural,
     sorted_rows,
     with_times,
     with_values,
@@ -32,6 +33,7 @@ from stiction_ros.intake.tables.block import Block, joined
 from stiction_ros.records.parts import ALIKE
 from stiction_ros.records.record import Record
 from stiction_ros.records.whole import Source, Whole
+from stiction_ros.texts import plural
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,9 +41,7 @@ class Found:
     """What was read of one loop.
 
     Attributes:
-        name: of the loop.
         record: name of its records.
-        blocks: its signals.
         named: whether a user said which column is what.
         shared: whether other loops stand in the same rows.
     """
@@ -67,52 +67,37 @@ def loop_of(found: Found, options: IntakeOptions) -> Loop:
     _refuse_incomplete(found)
     rules = Rules(options.strict)
     for note, block in {note: one for one in found.blocks for note in one.mended}.items():
-        rules.tell(note, block, note)
-    timed = put_right([with_times(block, rules) for block in found.blocks], rules)
-    if not options.as_given:
-        timed = [with_values(block, rules, shared=found.shared) for block in timed]
+        with foreign(block.path):
+            rules.tell(note, note)
+    timed = put_right(each(found.blocks, rules, with_times), rules)
+    timed = each(timed, rules, partial(with_values, shared=found.shared))
     if len(timed) > 1:
-        timed = [sorted_rows(one, rules) for one in timed]
-    block, differing = joined([checked(one, rules) for one in timed])
+        timed = each(timed, rules, sorted_rows)
+    block, differing = joined(each(timed, rules, checked))
     for name, count in differing.items():
         said = f"{name}: {plural(count, 'value')} at a stamp that another table has differ"
-        rules.tell(f"{said}: the later table counts", block, said, "leave one of them out")
+        rules.tell(f"{said}: the later table counts", said, "leave one of them out")
     notes = [*dict.fromkeys(note for one in found.blocks for note in one.notes), *rules.told]
     rules.told.clear()
     block = without_outliers(block, rules)
-    unit = "its own unit"
-    if not options.as_given:
-        refuse_twice(block)
-        block, unit, note = in_percent(block, options.op_unit, named=found.named)
-        rules.told.extend([note] if note else [])
-        if not found.named:
-            refuse_swapped(block)
+    refuse_twice(block)
+    block, unit, note = in_percent(block, options.op_unit, named=found.named)
+    rules.told.extend([note] if note else [])
+    if not found.named:
+        refuse_swapped(block)
     parts: list[Record] = []
     for run in in_order(block, rules):
-        run = manual_marked(run, rules, options.automatic, told=not options.as_given)
-        parts += _records(run, found, options, rules)
+        parts += _records(manual_marked(run, rules, options.automatic), found, options, rules)
     notes = list(dict.fromkeys((*notes, *rules.told)))
     whole = tuple(dataclasses.replace(part, notes=(*notes, *part.notes)) for part in parts)
     every = tuple(dict.fromkeys(note for part in whole for note in part.notes))
-    return Loop(
-        found.name,
-        found.files,
-        whole,
-        every,
-        columns=columns_of(found.blocks),
-        op_unit=unit,
-        spreads=spreads_of(found.blocks),
-        modes=modes_of(found.blocks, rules.modes),
+    return dataclasses.replace(
+        unread(found, None, rules.modes), parts=whole, notes=every, op_unit=unit
     )
 
 
-def unread(found: Found, problem: str) -> Loop:
-    """Return a loop that cannot be made into records, with what stands in its columns.
-
-    Args:
-        found: as read.
-        problem: why, and what helps.
-    """
+def unread(found: Found, problem: str | None, modes: Mapping[str, str] = {}) -> Loop:
+    """Return a loop without records, with what stands in its columns, and the ``modes`` known."""
     return Loop(
         found.name,
         found.files,
@@ -120,7 +105,7 @@ def unread(found: Found, problem: str) -> Loop:
         problem=problem,
         columns=columns_of(found.blocks),
         spreads=spreads_of(found.blocks),
-        modes=modes_of(found.blocks, {}),
+        modes=modes_of(found.blocks, modes),
     )
 
 
@@ -131,7 +116,6 @@ def _refuse_incomplete(found: Found) -> None:
         names = ", ".join(c.name for block in found.blocks for c in block.columns.values())
         raise InputError(
             f"loop {found.name} has no {' and no '.join(missing)}, only {names}",
-            where=str(found.files[0]),
             fix="say which tags belong to it with --tags FILE",
         )
 
@@ -147,37 +131,29 @@ def _records(run: Block, found: Found, options: IntakeOptions, rules: Rules) -> 
                 return kept
         except InputError:
             mixed = own is not run or wanted is not None
-            if not mixed and (options.strict or options.as_given or len(run.time) < 3):
+            if not mixed and (options.strict or len(run.time) < 3):
                 raise
     del rules.told[told:]
-    return _resampled(run, found, options, rules)
-
-
-def _resampled(
-    run: Block, found: Found, options: IntakeOptions, rules: Rules
-) -> tuple[Record, ...]:
     parts: list[Record] = []
-    stretches = on_grid(run, options.sample_time, rules)
+    stretches = on_grid(run, wanted, rules)
     for stretch in stretches:
-        block = filled(stretch, rules)
-        parts += _whole(block).records(Source(found.record, str(run.path), block.place))
+        source = Source(found.record, str(run.path), stretch.place)
+        parts += _whole(filled(stretch, rules)).records(source)
     if len(stretches) > 1:
         rules.told.append(f"cut at {len(stretches) - 1} gaps without a report")
     return tuple(parts)
 
 
 def _whole(block: Block) -> Whole:
-    valves, outputs = block.tags("op"), block.tags("pv")
+    valves, outputs = (tuple(key.tag for key in block.of(signal)) for signal in ("op", "pv"))
 
     def side_by_side(signal: str, tags: Sequence[str]) -> FloatArray | None:
-        columns = {key.tag: column for key, column in block.columns.items() if key.signal == signal}
-        if set(columns) != set(tags):
-            return None
-        return np.column_stack([columns[tag].values for tag in tags])
+        columns = {key.tag: column.values for key, column in block.of(signal).items()}
+        return np.column_stack([columns[t] for t in tags]) if {*columns} == {*tags} else None
 
     op, pv = side_by_side("op", valves), side_by_side("pv", outputs)
     if op is None or pv is None:
-        raise InputError("has no OP or no PV left", where=str(block.path))
+        raise InputError("has no OP or no PV left")
     return Whole(
         valves=valves,
         outputs=outputs,

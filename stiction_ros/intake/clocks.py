@@ -9,14 +9,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
-from stiction_ros.intake.repairs import Rules
+from stiction_ros.errors import InputError, foreign
+from stiction_ros.intake.repairs import Rules, each
 from stiction_ros.intake.summer_time import Change, ahead, changes, shown
 from stiction_ros.intake.tables.block import Block, FlagArray
 from stiction_ros.texts import DAY, HOUR
@@ -31,13 +30,7 @@ def put_right(blocks: Sequence[Block], rules: Rules) -> list[Block]:
         InputError: a clock of 12 hours without AM and PM, or rows of an hour that is passed twice
             that do not tell which pass they belong to.
     """
-    found = [_turned(block, rules) for block in blocks]
-    for place, block in enumerate(found):
-        if not block.clock.zoned and (block.clock.dated or block.clock.daily):
-            _refuse_half_days(block)
-        if block.clock.daily:
-            falls = np.diff(block.time, prepend=block.time[:1]) < -0.5 * DAY
-            found[place] = dataclasses.replace(block, time=block.time + DAY * np.cumsum(falls))
+    found = each(each(blocks, rules, _turned), rules, _with_days)
     local = {k: b.clock.zone for k, b in enumerate(found) if b.clock.dated and not b.clock.zoned}
     for zone in dict.fromkeys(local.values()):
         places = [place for place, other in local.items() if other == zone]
@@ -52,41 +45,51 @@ def _turned(block: Block, rules: Rules) -> Block:
     if not steps.any() or np.count_nonzero(steps < 0) <= 0.9 * np.count_nonzero(steps):
         return block
     said = f"time does not increase at {block.place(1)}"
-    rules.tell("rows stood from the last to the first and are turned", block, said, "sort the rows")
+    rules.tell("rows stood from the last to the first and are turned", said, "sort the rows")
     return block.rows(np.arange(len(block.time))[::-1])
 
 
-def _refuse_half_days(block: Block) -> None:
-    """Raise where hours are 1 to 12 alone and time falls at one, or leaps a day at midnight."""
+def _with_days(block: Block, _: Rules) -> Block:
+    """Return times of the day alone with midnights counted.
+
+    Hours are refused that are 1 to 12 alone where time falls at one, or leaps a day at midnight.
+    """
+    if block.clock.zoned or not (block.clock.dated or block.clock.daily):
+        return block
     wall = block.clock.start + block.time
     hours = wall % DAY // HOUR
     halves = np.rint(np.diff(wall) / (0.5 * DAY))
     leaps = (halves == 2.0) & (hours[:-1] == 11.0) & (hours[1:] == 12.0)
     falls = np.flatnonzero((halves == -1.0) | leaps)
-    if not len(falls) or hours.min() < 1.0 or hours.max() > 12.0:
-        return
-    row = int(falls[0]) + 1
-    again = row + np.flatnonzero(np.isin(wall[row:], wall[:row]))[:1]
-    first, then, *twice = (shown(wall[k])[11 * block.clock.daily :] for k in (row - 1, row, *again))
-    raise InputError(
-        f"the clock has 12 hours, without AM and PM: {first} is followed by {then} in "
-        f"{block.place(row)}{''.join(f', {stamp} is there twice' for stamp in twice)}",
-        where=str(block.path),
-        fix="export stamps with 24 hours, or with AM and PM",
-    )
+    if len(falls) and hours.min() >= 1.0 and hours.max() <= 12.0:
+        row = int(falls[0]) + 1
+        again = row + np.flatnonzero(np.isin(wall[row:], wall[:row]))[:1]
+        stamps = [shown(wall[k])[11 * block.clock.daily :] for k in (row - 1, row, *again)]
+        raise InputError(
+            f"the clock has 12 hours, without AM and PM: {stamps[0]} is followed by {stamps[1]} in "
+            f"{block.place(row)}{''.join(f', {stamp} is there twice' for stamp in stamps[2:])}",
+            fix="export stamps with 24 hours, or with AM and PM",
+        )
+    if not block.clock.daily:
+        return block
+    midnights = np.diff(block.time, prepend=block.time[:1]) < -0.5 * DAY
+    return dataclasses.replace(block, time=block.time + DAY * np.cumsum(midnights))
 
 
 @dataclasses.dataclass(frozen=True)
 class _Rows:
-    """Rows in their order.
-
-    Attributes:
-        wall: local time, s since 1970, shape (N,).
-        rank: their order in the file, shape (N,).
-    """
+    """Local times of rows, s since 1970, by their rank in the file, shape (N,) each."""
 
     wall: FloatArray
     rank: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, *blocks: Block) -> _Rows:
+        """Return the rows of blocks of one file, which may stand from the last to the first."""
+        lines = [b.lines if b.lines[0] <= b.lines[-1] else -b.lines for b in blocks]
+        wall, rank = np.concatenate([b.clock.start + b.time for b in blocks]), np.concatenate(lines)
+        order = np.argsort(rank, kind="stable")
+        return cls(wall[order], rank[order])
 
     @functools.cached_property
     def usual(self) -> float:
@@ -123,21 +126,19 @@ class _Rows:
 
 
 def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block]:
-    """Return dated blocks with what follows each change of their clock moved.
+    """Return dated blocks of one local time with what follows each change of their clock moved.
 
-    Args:
-        blocks: of one local time.
-        zone: whose it is; empty where that is not known, and a change counts that rows show.
-        rules: what was done is noted there.
+    Where its ``zone`` is not known, and empty, a change counts that rows show.
     """
-    rows = [
-        _Rows(b.clock.start + b.time, b.lines if b.lines[0] <= b.lines[-1] else -b.lines)
-        for b in blocks
-    ]
+    rows = [_Rows.of(block) for block in blocks]
     known = changes(zone, np.concatenate([one.wall // DAY for one in rows]))
     if not zone:
         known += dict.fromkeys(change for one in rows for change in _others(one, known))
-    files = _by_file(blocks, rows, known)
+    files = {}
+    for path in {block.path for block in blocks}:
+        every = _Rows.of(*(block for block in blocks if block.path == path))
+        if _falls_by(every, known):
+            files[path] = every
     shifts = [np.zeros(len(one.wall)) for one in rows]
     for change in known:
         seen = any(len(one.seams(change)) for one in (*rows, *files.values()))
@@ -150,13 +151,14 @@ def _in_one_time(blocks: Sequence[Block], zone: str, rules: Rules) -> list[Block
             continue
         count = 0
         for block, one, shift in zip(blocks, rows, shifts, strict=True):
-            moved = _after(block, one, files.get(block.path), change)
+            moved = _after(block, (one, files.get(block.path)), change)
             shift[moved] += change.moves
             count += int(np.count_nonzero(moved))
         way = "on, both passes are kept" if change.back else "back"
         note = f"{change.said}: {count} rows that follow are moved {way}"
         if not zone:
-            rules.tell(note, blocks[0], change.said, FIX)
+            with foreign(blocks[0].path):
+                rules.tell(note, change.said, FIX)
         elif change.back and seen:
             rules.told.append(note)
     early = 0.0
@@ -182,46 +184,35 @@ def _others(one: _Rows, known: Sequence[Change]) -> list[Change]:
     return [Change(float(then), float(then) + HOUR, back=True)] if off <= 0.5 * one.usual else []
 
 
-def _by_file(
-    blocks: Sequence[Block], rows: Sequence[_Rows], known: Sequence[Change]
-) -> dict[Path, _Rows]:
-    """Return all rows of each file with several blocks, where they stand in their order in time."""
-    found = {}
-    for path in {block.path for block in blocks}:
-        own = [one for one, block in zip(rows, blocks, strict=True) if block.path == path]
-        rank = np.concatenate([one.rank for one in own])
-        order = np.argsort(rank, kind="stable")
-        every = _Rows(np.concatenate([one.wall for one in own])[order], rank[order])
-        seams = [every.seams(change) for change in known if change.back]
-        if not np.setdiff1d(
-            np.flatnonzero(np.diff(every.wall) < 0.0) + 1, np.concatenate([[], *seams])
-        ).size:
-            found[path] = every
-    return found
+def _falls_by(rows: _Rows, known: Sequence[Change]) -> bool:
+    """Return whether time falls at changes alone, as it does not where tags follow each other."""
+    seams = [rows.seams(change) for change in known if change.back]
+    falls = np.flatnonzero(np.diff(rows.wall) < 0.0) + 1
+    return not len(np.setdiff1d(falls, np.concatenate([[], *seams])))
 
 
-def _after(block: Block, one: _Rows, file: _Rows | None, change: Change) -> FlagArray:
+def _after(block: Block, told: Sequence[_Rows | None], change: Change) -> FlagArray:
     """Return the rows of a block that follow a change.
 
-    Raises:
-        InputError: rows of an hour that is passed twice do not tell which pass they belong to.
+    The rows ``told``, its own and those of its whole file, may tell which pass they belong to;
+    where they do not they are refused.
     """
-    wall, (low, high) = one.wall, change[:2]
+    wall, (low, high) = block.clock.start + block.time, change[:2]
     if not change.back:
         return wall >= high
-    for told in (one, file):
-        if told is not None and len(seams := told.seams(change)) == 1:
-            late = one.rank >= told.rank[seams[0]]
+    for rows in told:
+        if rows is not None and len(seams := rows.seams(change)) == 1:
+            late = _Rows.of(block).rank >= rows.rank[seams[0]]
             return np.asarray((wall > high) | (wall >= low) & late)
     inside = (wall >= low) & (wall < high)
-    if inside.any():
-        steps, late = np.diff(wall), bool((wall >= high).any())
-        # One pass is there. Were it the other one, there would be a hole longer than all others.
-        hole = np.min(steps[inside[1:] | inside[:-1]], initial=np.inf) + high - low
-        if late == (wall < low).any() or hole <= np.max(steps, initial=high - low):
-            raise _untold(block, change)
-        return wall >= (low if late else high)
-    return wall >= high
+    if not inside.any():
+        return wall >= high
+    # One pass is there. Were it the other one, there would be a hole longer than all others.
+    steps, late = np.diff(wall), bool((wall >= high).any())
+    hole = np.min(steps[inside[1:] | inside[:-1]], initial=np.inf) + high - low
+    if late == (wall < low).any() or hole <= np.max(steps, initial=high - low):
+        raise _untold(block, change)
+    return wall >= (low if late else high)
 
 
 def _untold(block: Block, change: Change) -> InputError:

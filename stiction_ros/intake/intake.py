@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError, foreign
@@ -15,10 +16,9 @@ from stiction_ros.intake.sheets.sheet import SUFFIXES, Sheet, stem
 from stiction_ros.intake.sheets.typed import open_sheets
 from stiction_ros.intake.shown import spreads_of_records
 from stiction_ros.intake.tables.block import Block
-from stiction_ros.intake.tables.file_way import FileWay, way_of
 from stiction_ros.intake.tables.plan import Plan, Shape, plan_of
 from stiction_ros.intake.tables.reading import blocks_of
-from stiction_ros.intake.tables.tags import TagList, read_tag_list
+from stiction_ros.intake.tables.tags import FileWay, TagList, read_tag_list
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_loops, read_bag_parts
 from stiction_ros.records.storage.files import listed_names, split_number
@@ -46,12 +46,16 @@ def loops(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Loop]:
         InputError: the tag list cannot be read, or names a file that may be one of several.
     """
     tags = None if options.tags is None else read_tag_list(options.tags)
-    yield from _with_names_of_their_own(_loops(paths, options, tags))
+    files: Iterable[Path] = _files(paths, options)
+    if tags is not None and tags.rows:
+        files = list(files)
+        tags.refuse_ambiguous(files)
+    yield from _with_names_of_their_own(_loops(files, options, tags))
 
 
-def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
+def _loops(files: Iterable[Path], options: IntakeOptions, tags: TagList | None) -> Iterator[Loop]:
     tables: list[_Table] = []
-    for file in _named(_files(paths, options), tags):
+    for file in files:
         told = Path(str(file).encode(errors="backslashreplace").decode())
         if told != file:  # no page and no list could hold it
             said = f"{told}: its name is not in UTF-8; rename it"
@@ -63,7 +67,7 @@ def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) 
         try:
             if os.path.exists(file) and not (os.path.isfile(file) or os.path.isdir(file)):
                 raise InputError("is a pipe or a device", where=str(file), fix="save it as a file")
-            way = way_of(file, options, tags)
+            way = FileWay(options) if tags is None else tags.way_of(file, options)
             with foreign(file):
                 sheets = open_sheets(file)
         except InputError as error:
@@ -81,23 +85,20 @@ def _loops(paths: Sequence[Path], options: IntakeOptions, tags: TagList | None) 
                 yield from _read([table])
             else:
                 tables.append(table)
-    for group in _groups(tables):
+    long = [table for table in tables if table.plan.shape is Shape.LONG]
+    wide = [table for table in tables if table.plan.shape is Shape.WIDE]
+    for group in (long, *_groups(wide)):
         yield from _read(group)
 
 
 def strange_files(paths: Sequence[Path], options: IntakeOptions) -> list[str]:
-    """Return the files that the tag list names and that are not there.
-
-    Args:
-        paths: files and folders.
-        options: how to read them.
+    """Return the files that the tag list names and that are none of those below ``paths``.
 
     Raises:
         InputError: the tag list cannot be read.
     """
-    if options.tags is None:
-        return []
-    return read_tag_list(options.tags).strange(list(_files(paths, options)))
+    tags = None if options.tags is None else read_tag_list(options.tags)
+    return [] if tags is None else tags.strange(list(_files(paths, options)))
 
 
 def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loop:
@@ -111,8 +112,7 @@ def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loo
     Raises:
         InputError: the loop cannot be read, there is none, or there are several.
     """
-    found = []
-    names = []
+    found, names = [], []
     for loop in _bags(path, options) if is_bag(path) else loops([path], options):
         names.append(loop.name)
         if name is None or loop.name.casefold() == name.casefold():
@@ -121,9 +121,9 @@ def one_loop(path: Path, options: IntakeOptions, name: str | None = None) -> Loo
             break
     if not names:
         raise InputError("holds no file of a loop", where=str(path), fix="check the path")
-    if len(found) != 1 and name is None and is_bag(path):
-        read_bag_parts(path)  # tells how to choose one
     if len(found) != 1:
+        if name is None and is_bag(path):
+            read_bag_parts(path)  # tells how to choose one
         listed = ", ".join(names[:OTHERS]) + (" and others" if len(names) > OTHERS else "")
         what = "holds several loops" if name is None else f"has no loop {name}"
         raise InputError(f"{what}: {listed}", where=str(path), fix="choose one with --loop NAME")
@@ -158,19 +158,6 @@ class _Table:
     sheet: Sheet
     plan: Plan
     way: FileWay
-
-
-def _named(files: Iterator[Path], tags: TagList | None) -> Iterator[Path]:
-    """Return the files, none of which a row of the tag list takes for another.
-
-    Raises:
-        InputError: a row names several.
-    """
-    if tags is None or not tags.rows:
-        return files
-    every = list(files)
-    tags.refuse_ambiguous(list(dict.fromkeys(every)))
-    return iter(every)
 
 
 def _files(paths: Sequence[Path], options: IntakeOptions) -> Iterator[Path]:
@@ -211,13 +198,13 @@ def _may_hold_loops(path: Path) -> bool:
 
 def _bags(path: Path, options: IntakeOptions) -> Iterator[Loop]:
     """Yield the loops of a bag: all, or the one of the namespace that was chosen."""
+    found: Mapping[str, tuple[Record, ...] | InputError]
     try:
         with foreign(path):
-            if options.namespace is not None:
-                parts = read_bag_parts(path, namespace=options.namespace)
-                found: dict[str, tuple[Record, ...] | InputError] = {"": parts}
-            else:
+            if options.namespace is None:
                 found = read_bag_loops(path)
+            else:
+                found = {"": read_bag_parts(path, namespace=options.namespace)}
     except InputError as error:
         found = {"": error}
     for space, read in found.items():
@@ -233,84 +220,68 @@ def _with_names_of_their_own(found: Iterator[Loop]) -> Iterator[Loop]:
     """Yield loops; a name that was there already gets its folder, and if need be a number."""
     seen: set[str] = set()
     for loop in found:
-        name = loop.name
-        if name in seen:
-            name = f"{loop.name} ({loop.files[0].parent.name})"
-        number = 2
-        while name in seen:
-            name, number = f"{loop.name} ({loop.files[0].parent.name} {number})", number + 1
+        folder = loop.files[0].parent.name
+        others = (f"{loop.name} ({folder} {number})" for number in itertools.count(2))
+        names = itertools.chain([loop.name, f"{loop.name} ({folder})"], others)
+        name = next(name for name in names if name not in seen)
         seen.add(name)
         yield loop if name == loop.name else dataclasses.replace(loop, name=name)
 
 
-def _groups(tables: Sequence[_Table]) -> Iterator[list[_Table]]:
-    """Yield tables that have loops in common; long ones, whose loops are not known, together."""
-    long = [table for table in tables if table.plan.shape is Shape.LONG]
-    if long:
-        yield long
-    groups: list[tuple[set[str], list[_Table]]] = []
+def _groups(tables: Sequence[_Table]) -> list[list[_Table]]:
+    """Return tables that have loops in common together, in the order of the first of each."""
+    groups: dict[int, list[_Table]] = {}
     owner: dict[str, int] = {}
-    for table in tables:
-        if table.plan.shape is not Shape.WIDE:
-            continue
-        names = set(table.plan.loops)
-        known = sorted({owner[name] for name in names if name in owner})
-        place = known[0] if known else len(groups)
-        if not known:
-            groups.append((set(), []))
-        for other in known[1:]:
-            groups[place][0].update(groups[other][0])
-            groups[place][1].extend(groups[other][1])
-            groups[other][0].clear()
-            groups[other][1].clear()
-        groups[place][0].update(names)
-        groups[place][1].append(table)
-        owner.update(dict.fromkeys(groups[place][0], place))
-    yield from (members for _, members in groups if members)
+    for place, table in enumerate(tables):
+        first, *others = sorted({owner.get(name, place) for name in table.plan.loops})
+        joining = [*itertools.chain(*(groups.pop(other, []) for other in others)), table]
+        groups.setdefault(first, []).extend(joining)
+        owner.update((name, first) for member in joining for name in member.plan.loops)
+    return list(groups.values())
 
 
 def _read(group: Sequence[_Table]) -> Iterator[Loop]:
     """Yield the loops of tables that belong together."""
     blocks: dict[str, list[Block]] = {}
-    ways = {table.sheet.path: table.way for table in group}
     for table in group:
+        path = table.sheet.path
         try:
-            with foreign(table.sheet.path):
-                read_blocks = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
-            for name, read in read_blocks.items():
-                blocks.setdefault(name, []).extend(read)
-            if not read_blocks:
-                column = table.sheet.layout.given[table.plan.tag]
-                said = (
-                    f"{table.sheet.path}: has no tag such as FIC101.PV or FIC101/OP in column "
-                    f"{column}; say which belong together with --tags F, or name the columns "
-                    "with --long TAG,TIME,VALUE"
-                )
-                yield Loop(table.sheet.name, (table.sheet.path,), (), problem=said)
+            with foreign(path):
+                read = blocks_of(table.sheet, table.plan, table.way.options, table.way.tags)
+                if not read and table.plan.long is not None:
+                    raise InputError(
+                        "has no tag such as FIC101.PV or FIC101/OP in column "
+                        f"{table.sheet.layout.given[table.plan.long.tag]}",
+                        fix="say which belong together with --tags F, or name the columns with "
+                        "--long TAG,TIME,VALUE",
+                    )
         except InputError as error:
             for name in table.plan.loops or [table.sheet.name]:
-                yield Loop(name, (table.sheet.path,), (), problem=str(error))
+                yield Loop(name, (path,), (), problem=str(error))
+            continue
+        for name, found in read.items():
+            blocks.setdefault(name, []).extend(found)
     for name in list(blocks):
-        own = tuple(blocks.pop(name))
-        single = group[0].plan.shape is Shape.ONE
-        record = own[0].path.name if single else name
-        files = {block.path for block in own}
-        named = all(table.plan.named for table in group if table.sheet.path in files)
-        found = Found(name, record, own, named, not single)
-        try:
-            with foreign(found.files[0]):
-                loop = loop_of(found, _options_of(found, ways))
-        except InputError as error:
-            loop = unread(found, str(error))
-        yield loop
+        yield _loop(name, tuple(blocks.pop(name)), group)
+
+
+def _loop(name: str, blocks: tuple[Block, ...], group: Sequence[_Table]) -> Loop:
+    """Return a loop of tables, with its problem where it cannot be made into records."""
+    single = group[0].plan.shape is Shape.ONE
+    files = {block.path for block in blocks}
+    own = [table for table in group if table.sheet.path in files]
+    named = all(table.plan.named for table in own)
+    found = Found(name, blocks[0].path.name if single else name, blocks, named, not single)
+    try:
+        with foreign(found.files[0]):
+            ways = {table.sheet.path: table.way for table in own}
+            return loop_of(found, _options_of(found, ways))
+    except InputError as error:
+        return unread(found, str(error))
 
 
 def _options_of(found: Found, ways: Mapping[Path, FileWay]) -> IntakeOptions:
-    """Return the options of a loop, of which several files may hold signals.
-
-    Raises:
-        InputError: its files have OP in different units, or other sample times.
-    """
+    """Return the options of a loop, of which several files may hold signals."""
     of_op = {block.path for block in found.blocks if any(k.signal == "op" for k in block.columns)}
     single = not found.shared
     units = {ways[path].op_unit(found.name, single=single) for path in of_op}
@@ -319,7 +290,6 @@ def _options_of(found: Found, ways: Mapping[Path, FileWay]) -> IntakeOptions:
         if len(said) > 1:
             raise InputError(
                 f"the {what} of {found.name} is not the same in all its files",
-                where=str(found.files[0]),
                 fix="say it in a row of --tags for each of them",
             )
     first = ways[found.files[0]].options

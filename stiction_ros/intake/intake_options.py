@@ -7,25 +7,19 @@ import enum
 from collections.abc import Mapping
 from pathlib import Path
 
-from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets.stamps import DateOrder
-from stiction_ros.intake.words import by_word
+from stiction_ros.intake.words import WORDS, by_word
 
 
 class OpUnit(enum.StrEnum):
-    """What OP is counted in."""
+    """What OP is counted in; ``words.yaml`` has the ranges."""
 
     PERCENT = "percent"
     SHARE = "share"
-    """0 to 1."""
     CURRENT = "ma"
-    """4 to 20 mA."""
     PSI = "psi"
-    """3 to 15 psi, see IEC 60382."""
     BAR = "bar"
-    """0.2 to 1 bar, see IEC 60382."""
     KILOPASCAL = "kpa"
-    """20 to 100 kPa, see IEC 60382."""
     VOLT_10 = "0-10v"
     VOLT_1_5 = "1-5v"
     VOLT_2_10 = "2-10v"
@@ -34,16 +28,8 @@ class OpUnit(enum.StrEnum):
 
 
 TO_PERCENT = {
-    OpUnit.PERCENT: (1.0, 0.0),
-    OpUnit.SHARE: (100.0, 0.0),
-    OpUnit.CURRENT: (6.25, -25.0),
-    OpUnit.PSI: (100.0 / 12.0, -25.0),
-    OpUnit.BAR: (125.0, -25.0),
-    OpUnit.KILOPASCAL: (1.25, -25.0),
-    OpUnit.VOLT_10: (10.0, 0.0),
-    OpUnit.VOLT_1_5: (25.0, -25.0),
-    OpUnit.VOLT_2_10: (12.5, -25.0),
-    OpUnit.OTHER: (1.0, 0.0),
+    OpUnit(unit): (100.0 / (high - low), -100.0 * low / (high - low))
+    for unit, (low, high, _) in WORDS["op_ranges"].items()
 }
 """Factor and offset that make % of an OP."""
 
@@ -63,16 +49,7 @@ class TimeUnit(enum.StrEnum):
     NANOSECONDS = "ns"
 
 
-SECONDS = {
-    TimeUnit.DAYS: 86400.0,
-    TimeUnit.HOURS: 3600.0,
-    TimeUnit.MINUTES: 60.0,
-    TimeUnit.SECONDS: 1.0,
-    TimeUnit.MILLISECONDS: 1e-3,
-    TimeUnit.MICROSECONDS: 1e-6,
-    TimeUnit.NANOSECONDS: 1e-9,
-}
-
+SECONDS = {TimeUnit(unit): float(size) for unit, size in WORDS["seconds"].items()}
 _TIME_UNITS = {word: TimeUnit(unit) for word, unit in by_word("time_units").items()}
 
 
@@ -120,8 +97,6 @@ class IntakeOptions:
             time; None finds it.
         long: columns of tag, time and value of tables with one value a row; None finds them.
         automatic: what MODE shows in automatic; None knows the usual words.
-        as_given: whether signals are taken as they are: OP and numbers as times are not brought
-            to another unit, and nothing is asked.
     """
 
     columns: CsvColumns = CsvColumns()
@@ -134,21 +109,6 @@ class IntakeOptions:
     sample_time: float | None = None
     long: tuple[str, ...] | None = None
     automatic: tuple[str, ...] | None = None
-    as_given: bool = False
-
-
-def op_unit(word: str, where: str | Path) -> OpUnit:
-    """Return the unit of an OP by its word.
-
-    Raises:
-        InputError: another word.
-    """
-    found = known_op_unit(word)
-    if found is None:
-        raise InputError(
-            f"unit {word!r} of OP is unknown", where=str(where), fix=f"use {', '.join(OpUnit)}"
-        )
-    return found
 
 
 def known_op_unit(word: str) -> OpUnit | None:

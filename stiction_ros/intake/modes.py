@@ -5,15 +5,19 @@ from __future__ import annotations
 import dataclasses
 import re
 import shlex
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
-from stiction_ros.intake.repairs import Rules, plural
+from stiction_ros.intake.repairs import Rules
 from stiction_ros.intake.sheets.cells import number
-from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
+from stiction_ros.intake.tables.block import Block
 from stiction_ros.intake.words import pattern_of
 from stiction_ros.records.quality import Quality
+from stiction_ros.texts import plural
 
 AUTOMATIC, MANUAL = pattern_of("automatic"), pattern_of("manual")
 """Words of modes; in tracking and initialisation OP follows something else than the controller."""
@@ -25,101 +29,76 @@ BUSY = 0.2
 """Share of samples at which OP moves at least in automatic, for the same."""
 
 
-def mode_column(block: Block) -> tuple[Key, Column] | None:
-    """Return the column of the mode; None when there is none."""
-    return next(((k, c) for k, c in block.columns.items() if k.signal == "mode"), None)
-
-
-def manual_marked(
-    block: Block, rules: Rules, automatic: tuple[str, ...] | None, *, told: bool = True
-) -> Block:
+def manual_marked(block: Block, rules: Rules, automatic: tuple[str, ...] | None) -> Block:
     """Return the block with samples in manual or tracking marked so, and without its mode.
 
     An empty mode goes on as before. Numbers are told apart by OP, which stands still in manual.
 
-    Args:
-        block: one row a sample or a stamp.
-        rules: what is cut is noted there.
-        automatic: what is shown in automatic; None knows the usual words.
-        told: whether a word that is not known is noted.
+    What is shown in ``automatic`` may be said; None knows the usual words.
 
     Raises:
         InputError: modes of which it cannot be told which is automatic.
     """
-    found = mode_column(block)
-    if found is None:
+    columns = dict(block.columns)
+    column = next((columns.pop(key) for key in block.columns if key.signal == "mode"), None)
+    if column is None:
         return block
-    key, column = found
-    rest = {k: c for k, c in block.columns.items() if k != key}
-    block = dataclasses.replace(block, columns=rest)
-    codes, shown = _held_codes(column)
-    if not shown:
+    block = dataclasses.replace(block, columns=columns)
+    there = np.flatnonzero(~column.blank & np.isfinite(column.values))
+    if not len(there):
         return block
-    off = _not_automatic(block, column.name, codes, shown, automatic)
-    rules.modes.update(
-        {word: "not automatic" if word in off else "automatic" for word in shown.values()}
-    )
-    if told and automatic is None and (alone := _alone(shown)) is not None:
-        rules.told.append(
-            f"{column.name} shows {alone} alone, which is not known: taken as automatic; if it is "
-            "not say --auto WORD, with the word that stands for automatic"
-        )
+    before = np.searchsorted(there, np.arange(len(column.values)), side="right") - 1
+    codes = column.values[there[np.maximum(before, 0)]].astype(np.intp)
+    shown = {code: column.known[code] for code in np.unique(codes).tolist()}
+    off = _not_automatic(block, column.name, _Modes(codes, shown), automatic, rules)
+    for word in shown.values():
+        rules.modes[word] = "not automatic" if word in off else "automatic"
     marked = np.isin(codes, [code for code, word in shown.items() if word in off])
     if not marked.any():
         return block
-    mask = np.zeros(len(codes), dtype=np.uint8) if block.mask is None else np.array(block.mask)
+    mask = block.own_mask()
     mask[marked & (mask != Quality.BAD)] = Quality.MANUAL
-    words = ", ".join(sorted(off))
-    rules.told.append(f"{plural(int(marked.sum()), 'sample')} not in automatic ({words}), cut out")
+    count = plural(int(marked.sum()), "sample")
+    rules.told.append(f"{count} not in automatic ({', '.join(sorted(off))}), cut out")
     return dataclasses.replace(block, mask=mask)
 
 
-def _held_codes(column: Column) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], dict[int, str]]:
-    """Return the mode of each row, empty ones as before, and the words of those that occur."""
-    there = np.flatnonzero(~column.blank & np.isfinite(column.values))
-    if not len(there):
-        return np.zeros(len(column.values), dtype=np.intp), {}
-    before = np.searchsorted(there, np.arange(len(column.values)), side="right") - 1
-    codes = column.values[there[np.maximum(before, 0)]].astype(np.intp)
-    shown = {code: column.known[code].strip() for code in np.unique(codes).tolist()}
-    return codes, shown
+class _Modes(NamedTuple):
+    """The code of the mode of each row, shape (N,), and the word that each code stands for."""
+
+    codes: NDArray[np.intp]
+    shown: Mapping[int, str]
 
 
 def _not_automatic(
-    block: Block,
-    name: str,
-    codes: np.ndarray[tuple[int], np.dtype[np.intp]],
-    shown: dict[int, str],
-    automatic: tuple[str, ...] | None,
+    block: Block, name: str, modes: _Modes, automatic: tuple[str, ...] | None, rules: Rules
 ) -> set[str]:
     """Return the modes that are not automatic, as they are shown."""
-    words = set(shown.values())
+    words = set(modes.shown.values())
     if automatic is not None:
         wanted = {word.casefold() for word in automatic}
         return {word for word in words if not _alike(word, wanted)}
-    known_off = {word for word in words if MANUAL.fullmatch(_bare(word))}
-    unknown = {word for word in words - known_off if not AUTOMATIC.fullmatch(_bare(word))}
-    if not unknown or len(words) == 1:
-        return known_off
+    off = {word for word in words if MANUAL.fullmatch(_bare(word))}
+    unknown = sorted(word for word in words - off if not AUTOMATIC.fullmatch(_bare(word)))
+    if not unknown:
+        return off
+    if len(words) == 1:
+        rules.told.append(
+            f"{name} shows {unknown[0]} alone, which is not known: taken as automatic; if it is "
+            "not say --auto WORD, with the word that stands for automatic"
+        )
+        return off
+    moved = _moves(block, modes)
     if all(number(word) is not None for word in words):
-        told = _by_movement(block, codes, shown)
-        if told is not None:
-            return told
-    moved = _moves(block, codes, shown)
-    likely = max(sorted(unknown), key=lambda word: max(moved.get(word, [0.0])))
+        still = {word for word, share in moved.items() if share <= STILL}
+        busy = {word for word, share in moved.items() if share >= BUSY}
+        if busy and still | busy == words:
+            return still
+    likely = max(unknown, key=lambda word: moved.get(word, 0.0))
     raise InputError(
         f"{name} shows {', '.join(sorted(words))}, of which it is not known which is automatic",
-        where=str(block.path),
         fix=f"say which with --auto, such as --auto {shlex.quote(likely)}",
     )
-
-
-def _alone(shown: dict[int, str]) -> str | None:
-    """Return the one word of a mode that says nothing of what it means; None for any other."""
-    words = set(shown.values())
-    (word,) = words if len(words) == 1 else ("a",)
-    known = AUTOMATIC.fullmatch(_bare(word)) or MANUAL.fullmatch(_bare(word))
-    return None if known else word
 
 
 def _bare(word: str) -> str:
@@ -129,34 +108,16 @@ def _bare(word: str) -> str:
 
 def _alike(word: str, wanted: set[str]) -> bool:
     value = number(word)
-    return word.casefold() in wanted or (
-        value is not None and any(number(other) == value for other in wanted)
-    )
+    return word.casefold() in wanted or (value is not None and value in map(number, wanted))
 
 
-def _by_movement(
-    block: Block, codes: np.ndarray[tuple[int], np.dtype[np.intp]], shown: dict[int, str]
-) -> set[str] | None:
-    """Return the modes in which OP stands still while it moves in others; None when unclear."""
-    shares = _moves(block, codes, shown)
-    still = {word for word, moved in shares.items() if max(moved) <= STILL}
-    busy = {word for word, moved in shares.items() if max(moved) >= BUSY}
-    return still if busy and still | busy == set(shown.values()) else None
-
-
-def _moves(
-    block: Block, codes: np.ndarray[tuple[int], np.dtype[np.intp]], shown: dict[int, str]
-) -> dict[str, list[float]]:
-    """Return the share of samples at which each OP moves, by mode."""
-    shares: dict[str, list[float]] = {}
-    for key, column in block.columns.items():
-        if key.signal != "op":
-            continue
+def _moves(block: Block, modes: _Modes) -> dict[str, float]:
+    """Return by mode the share of samples at which the busiest OP moves."""
+    shares: dict[str, float] = {}
+    for column in block.of("op").values():
         rows = np.flatnonzero(~column.blank & np.isfinite(column.values))
-        modes = codes[rows]
-        moving: FlagArray = np.diff(column.values[rows], prepend=column.values[rows[:1]]) != 0
-        inside = ~np.insert(np.diff(modes) != 0, 0, True)
-        for code, word in shown.items():
-            if (chosen := inside & (modes == code)).any():
-                shares.setdefault(word, []).append(float(np.mean(moving[chosen])))
+        mode, moving = modes.codes[rows], np.diff(column.values[rows]) != 0
+        for code, word in modes.shown.items():
+            if (inside := (mode[1:] == code) & (mode[:-1] == code)).any():
+                shares[word] = max(float(np.mean(moving[inside])), shares.get(word, 0.0))
     return shares

@@ -11,20 +11,18 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections import Counter
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.words import WORDS
 from stiction_ros.records.parts import stretches
-from stiction_ros.records.quality import Quality, QualityArray
-from stiction_ros.records.regular import evenly
-
-IndexArray = NDArray[np.intp]
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.regular import spread_evenly
+from stiction_ros.texts import plural
 
 HELD = 5
 """Samples in a row that are held at most; a gap in time is one from 5.5 samples on."""
@@ -40,12 +38,6 @@ SENTINELS: tuple[float, ...] = tuple(WORDS["sentinels"])
 
 FEWEST_USUAL = 10
 """Values from which on it can be told that another one does not belong to them."""
-
-FEWEST_STAMPS = 5
-"""Stamps from which on it can be told that they are cut off."""
-
-DIFFERENT = 0.5
-"""Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
 
 RARE = 0.2
 """Share of a signal that may lie far outside."""
@@ -64,38 +56,28 @@ FIX = "correct it, fill it or cut the record there"
 
 @dataclasses.dataclass(frozen=True)
 class Rules:
-    """How strict to be.
-
-    Attributes:
-        strict: whether anything wrong is an error.
-        told: sentences on what was done, in their order.
-        modes: word of a mode to what it is taken for.
-    """
+    """Whether anything wrong is an error, what was done, and what words of a mode are taken for."""
 
     strict: bool
     told: list[str] = dataclasses.field(default_factory=list)
     modes: dict[str, str] = dataclasses.field(default_factory=dict)
 
-    def tell(self, note: str, where: Block, said: str, fix: str = FIX) -> None:
-        """Note what is repaired, or raise when nothing may be.
-
-        Args:
-            note: for the record.
-            where: what is repaired.
-            said: what is wrong, for the error.
-            fix: how to mend it.
-
-        Raises:
-            InputError: strict.
-        """
+    def tell(self, note: str, said: str, fix: str = FIX) -> None:
+        """Note what is repaired; strict, raise an :class:`InputError` that says what is wrong."""
         if self.strict:
-            raise InputError(said, where=str(where.path), fix=fix)
+            raise InputError(said, fix=fix)
         self.told.append(note)
 
 
-def plural(count: int, what: str) -> str:
-    """Return ``1 row`` or ``3 rows``."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
+def each(
+    blocks: Sequence[Block], rules: Rules, mend: Callable[[Block, Rules], Block]
+) -> list[Block]:
+    """Return blocks mended by a rule; errors name the file of theirs."""
+    mended = []
+    for block in blocks:
+        with foreign(block.path):
+            mended.append(mend(block, rules))
+    return mended
 
 
 def with_times(block: Block, rules: Rules) -> Block:
@@ -108,73 +90,58 @@ def with_times(block: Block, rules: Rules) -> Block:
     lost = len(there) - int(np.count_nonzero(there))
     if not lost:
         return block
-    where = str(block.path)
     said = f"{plural(strange, 'stamp')} of {len(there)} not understood, the first: {block.stray}"
     if strange > FEW * len(there) or lost == len(there):
         fix = f"{FORMS}; or choose the column with --time COLUMN"
-        raise InputError(said if strange else block.stray, where=where, fix=fix)
+        raise InputError(said if strange else block.stray, fix=fix)
     if strange:
-        rules.tell(f"{said}, left out", block, block.stray)
+        rules.tell(f"{said}, left out", block.stray)
     if lost > strange:
-        note = f"{plural(lost - strange, 'row')} without a time left out"
-        rules.tell(note, block, block.stray)
+        rules.tell(f"{plural(lost - strange, 'row')} without a time left out", block.stray)
     return block.rows(there)
 
 
 def with_values(block: Block, rules: Rules, *, shared: bool) -> Block:
     """Return the rows in which OP, PV, SP or the stem has a value, be it a bad one.
 
-    Args:
-        block: as read.
-        rules: what is left out is noted there.
-        shared: whether other loops stand in the same rows, which then say nothing of this one.
+    Rows that are ``shared`` with other loops say nothing of this one, and no note tells of them.
     """
-    columns = [column for key, column in block.columns.items() if key.signal != "mode"]
-    empty = np.all([column.blank for column in columns], axis=0)
-    if block.mask is not None:
-        empty &= block.mask != Quality.BAD
+    empty = np.all([column.blank for column in block.measured.values()], axis=0)
+    empty &= block.own_mask() != Quality.BAD
     if not empty.any() or empty.all():
         return block
     if not shared:
         row = int(np.argmax(empty))
         note = f"{plural(int(empty.sum()), 'row')} without any value left out"
-        rules.tell(note, block, f"{block.place(row)} has no value")
+        rules.tell(note, f"{block.place(row)} has no value")
     return block.rows(~empty)
 
 
 def checked(block: Block, rules: Rules) -> Block:
     """Return the block with what is no number counted; strict, the first such cell is an error."""
-    for key, column in block.columns.items():
-        if key.signal == "mode":
-            continue
-        missing = ~np.isfinite(column.values)
-        if block.mask is not None:
-            missing &= block.mask != Quality.BAD
+    for key, column in block.measured.items():
+        missing = ~np.isfinite(column.values) & (block.own_mask() != Quality.BAD)
         if missing.all() and key.signal in ("op", "pv"):
             shown = " ".join(repr(word) for word, _ in column.words.most_common(2) if word)
             raise InputError(
                 f"column {column.name} holds no number{f', but {shown}' if shown else ''}",
-                where=str(block.path),
                 fix="choose others with --op TAG=COLUMN --pv TAG=COLUMN, or tags with --tags F",
             )
         if not missing.any():
             continue
-        row = int(np.argmax(missing))
-        said = column.said if column.said and column.row == row else "is bad"
+        row, wrong = int(np.argmax(missing)), column.wrong
+        said = wrong.said if wrong is not None and wrong.row == row else "is bad"
         rules.tell(
             f"{column.name}: {plural(int(missing.sum()), 'value')} of {len(missing)} "
             f"missing{_listed(column, missing)}",
-            block,
             f"column {column.name} {said} in {block.place(row)}",
         )
     return block
 
 
 def _listed(column: Column, missing: FlagArray) -> str:
-    """Return what stands in the place of missing values, without counts where they are not known.
-
-    Words are counted over all rows of the file, of which those without a time are left out.
-    """
+    """Return what stands in the place of missing values, with counts where these are known."""
+    # Words are counted over all rows of the file, of which those without a time are left out.
     words = Counter({word: count for word, count in column.words.items() if word and count})
     empty = int(np.count_nonzero(missing & column.blank))
     counted = words.total() + empty <= np.count_nonzero(missing)
@@ -189,15 +156,13 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
     steps = np.diff(time)
     if (steps > 0).all():
         return [block]
-    falls = np.flatnonzero(steps <= 0)
-    row = int(falls[0]) + 1
-    said = (
-        f"time does not increase at {block.place(row)} ({block.clock.start + time[row - 1]:.9g}, "
-        f"then {block.clock.start + time[row]:.9g} s)"
-    )
-    fix = "sort the rows and remove those that are there twice"
     if rules.strict:
-        raise InputError(said, where=str(block.path), fix=fix)
+        row = int(np.argmax(steps <= 0)) + 1
+        first, then = block.clock.start + time[row - 1 : row + 1]
+        raise InputError(
+            f"time does not increase at {block.place(row)} ({first:.9g}, then {then:.9g} s)",
+            fix="sort the rows and remove those that are there twice",
+        )
     back = np.flatnonzero(steps < 0)
     if len(back) and len(back) <= 0.001 * len(time) + 3:
         runs = np.split(np.arange(len(time)), back + 1)
@@ -216,9 +181,9 @@ def in_order(block: Block, rules: Rules) -> list[Block]:
 def sorted_rows(block: Block, rules: Rules) -> Block:
     """Return the rows of one of several tables by :func:`in_order`, as one block."""
     told = len(rules.told)
-    runs = in_order(block, rules)
-    if len(runs) == 1:
-        return runs[0]
+    (first, *others) = in_order(block, rules)
+    if not others:
+        return first
     del rules.told[told:]
     return _without_repeats(block.rows(np.argsort(block.time, kind="stable")), rules)
 
@@ -228,18 +193,16 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
     last = np.append(np.diff(block.time) > 0, True)
     if last.all():
         return block
-    differing = 0
-    first = np.flatnonzero(np.insert(last[:-1], 0, True))
-    group = np.cumsum(np.insert(last[:-1], 0, True)) - 1
-    columns: dict[Key, Column] = {}
+    begins = np.insert(last[:-1], 0, True)
+    first, group = np.flatnonzero(begins), np.cumsum(begins) - 1
     moved = np.ptp(np.sign(np.diff(block.lines))) > 0
-    spread = None if moved else _spread(block, first)
+    signals = [column.values for column in block.of("op", "pv").values()]
+    spread = None if moved else spread_evenly(block.time, first, signals)
     if spread is not None:
-        rules.told.append(
-            f"stamps lack what is below {spread.step:g} s: {spread.usual} rows on each, spread "
-            "evenly"
-        )
-        return dataclasses.replace(block, time=spread.time)
+        rules.told.append(spread[1])
+        return dataclasses.replace(block, time=spread[0])
+    differing = 0
+    columns: dict[Key, Column] = {}
     for key, column in block.columns.items():
         here = np.flatnonzero(~column.blank)
         values = np.full(len(first), np.nan)
@@ -249,68 +212,17 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
         there = here[np.isfinite(column.values[here])]
         differing += int(np.count_nonzero(column.values[there] != values[group[there]]))
         columns[key] = dataclasses.replace(column, values=values, blank=blank)
-    kept = block.rows(last)
     of = f"{next(iter(columns.values())).name}: " if len(columns) == 1 else ""
     said = f"{of}{plural(len(last) - len(first), 'row')} with a stamp that was there already"
     note = f"{said}: the last value counts, {differing} differ" if differing else f"{said} left out"
-    rules.tell(note, block, said, "remove those that are there twice")
-    return dataclasses.replace(kept, columns=columns)
-
-
-class _Spread(NamedTuple):
-    step: float
-    usual: str
-    time: FloatArray
-
-
-def _spread(block: Block, first: IndexArray) -> _Spread | None:
-    """Return times of rows whose stamps were cut off, as minutes without their seconds.
-
-    Then every stamp has as many rows but for one, stamps follow each other evenly, and what stands
-    in the rows differs; where a stamp has one row, those with two come evenly. None for rows that
-    are there twice.
-
-    Args:
-        block: rows in order.
-        first: first row of each stamp.
-    """
-    counts = np.diff(np.append(first, len(block.time)))
-    stamps = block.time[first]
-    if len(first) < FEWEST_STAMPS:
-        return None
-    steps, inner = np.diff(stamps), counts[1:-1]
-    usual = int(np.median(inner))
-    even = np.ptp(steps) <= 1e-6 * steps[0] and np.ptp(inner) <= 1 and counts.max() <= usual + 1
-    again = np.setdiff1d(np.arange(len(block.time)), first)
-    differs = [
-        column.values[again] != column.values[again - 1]
-        for key, column in block.columns.items()
-        if key.signal in ("op", "pv")
-    ]
-    if not even or not np.any(differs, axis=0).mean() > DIFFERENT:
-        return None
-    rows, step = np.arange(len(block.time)), float(steps[0])
-    line = np.polyval(np.polyfit(rows, block.time - stamps[0], 1), rows) + stamps[0]
-    late, scan = line - block.time, float(line[1] - line[0])
-    twice = evenly(np.flatnonzero(inner > 1))
-    fits = bool(np.ptp(inner)) and np.ptp(late) <= step + 0.5 * scan
-    if fits and (usual > 1 or (len(twice) > 1 and twice.all())):
-        return _Spread(step, f"{step / scan:.3g}", line - late.min())
-    if usual < 2:
-        return None
-    within = np.arange(len(block.time)) - np.repeat(first, counts)
-    of = np.maximum(np.repeat(counts, counts), usual)
-    within[: counts[0]] += max(usual - int(counts[0]), 0)  # the first stamp has its last rows
-    time = block.time + step * within / of
-    return _Spread(step, str(usual), np.asarray(time))
+    rules.tell(note, said, "remove those that are there twice")
+    return dataclasses.replace(block.rows(last), columns=columns)
 
 
 def without_outliers(block: Block, rules: Rules) -> Block:
     """Return OP, PV and SP with NaN where a value is far outside everything else."""
-    columns = dict(block.columns)
-    for key, column in block.columns.items():
-        if key.signal == "mode":
-            continue
+    columns = {}
+    for key, column in block.measured.items():
         far = outside(column.values)
         if not far.any():
             continue
@@ -319,69 +231,52 @@ def without_outliers(block: Block, rules: Rules) -> Block:
         rules.tell(
             f"{column.name}: {plural(int(far.sum()), 'value')} such as {worst} far outside "
             "all others taken as missing",
-            block,
             f"column {column.name} is {worst} in {block.place(row)}, far outside all others",
         )
         columns[key] = dataclasses.replace(column, values=np.where(far, np.nan, column.values))
-    return dataclasses.replace(block, columns=columns)
+    return block.with_columns(columns)
 
 
 def outside(values: FloatArray) -> FlagArray:
     """Return which values are sentinels or stray far from all others, shape (N,)."""
+
+    def far(low: float, high: float, times: float) -> FlagArray:
+        room = times * max(high - low, 1e-3 * abs(high), 1e-12)
+        return (values < low - room) | (values > high + room)
+
     there = np.isfinite(values)
     found = np.zeros(len(values), dtype=np.bool_)
     known = np.isin(values, SENTINELS)
     rest = values[there & ~known]
     if known.any() and len(rest) and len(values) > FEWEST_USUAL:
-        low, high = float(rest.min()), float(rest.max())
-        room = SENTINEL_FAR * max(high - low, 1e-3 * abs(high), 1e-12)
-        found |= known & ((values < low - room) | (values > high + room))
+        found |= known & far(float(rest.min()), float(rest.max()), SENTINEL_FAR)
     usual = values[there & ~found]
     if len(usual) >= FEWEST_USUAL:
-        low, high = np.percentile(usual, [1.0, 99.0])
-        room = FAR * max(float(high - low), 1e-3 * abs(float(high)), 1e-12)
-        stray = there & ~found & ((values < low - room) | (values > high + room))
-        if _isolated(stray, there):
+        low, high = np.percentile(usual, [1.0, 99.0]).tolist()
+        stray = there & ~found & far(low, high, FAR)
+        begins, ends = stretches(stray[there])
+        # Where they do not come alone the signal was that far out.
+        if np.max(ends - begins, initial=0) <= HELD and stray.sum() <= 0.02 * there.sum():
             found |= stray
     return found if np.count_nonzero(found) <= RARE * len(values) else np.zeros_like(found)
 
 
-def _isolated(stray: FlagArray, there: FlagArray) -> bool:
-    """Return whether stray values come alone, so that no signal was that far out."""
-    if not stray.any():
-        return False
-    begins, ends = stretches(stray[there])
-    return bool((ends - begins).max() <= HELD and stray.sum() <= 0.02 * there.sum())
-
-
 def filled(block: Block, rules: Rules) -> Block:
-    """Return the block without missing values but in rows that are bad.
-
-    Args:
-        block: one row a sample.
-        rules: what was done is noted there.
-    """
-    count = len(block.time)
-    mask: QualityArray = (
-        np.zeros(count, dtype=np.uint8) if block.mask is None else np.array(block.mask)
-    )
+    """Return a block of one row a sample without missing values but in rows that are bad."""
+    mask = block.own_mask()
     columns = dict(block.columns)
-    held, bad = np.zeros(count, dtype=np.bool_), mask == Quality.BAD
+    held, bad = np.zeros(len(mask), dtype=np.bool_), mask == Quality.BAD
     given = bad.copy()
-    for key, column in block.columns.items():
-        if key.signal == "mode":
-            continue
+    for key, column in block.measured.items():
         missing = ~np.isfinite(column.values) & ~given
         if not missing.any():
             continue
         if key.signal in ("sp", "stem") and missing.mean() > 0.5:
             note = f"{column.name} is missing at more than half of the rows, left out"
-            rules.tell(note, block, note)
+            rules.tell(note, note)
             columns = {k: c for k, c in columns.items() if k.signal != key.signal}
             continue
-        short = missing if key.signal == "sp" else _short(missing)
-        values = _carried(column.values, short, block.time, key)
-        short = short & np.isfinite(values)
+        short, values = _carried(column.values, missing, block.time, key)
         held |= short & (key.signal != "sp")
         bad |= missing & ~short
         columns[key] = dataclasses.replace(column, values=values)
@@ -391,29 +286,27 @@ def filled(block: Block, rules: Rules) -> Block:
     if held.any():
         samples = plural(int(held.sum()), "sample")
         note = f"{samples} held over at most {HELD} in a row (PV between its neighbours)"
-        rules.tell(note, block, f"{samples} missing in OP or PV")
+        rules.tell(note, f"{samples} missing in OP or PV")
     if (bad & ~given).any():
         note = f"{plural(int((bad & ~given).sum()), 'sample')} bad"
-        rules.tell(f"{note}, cut out", block, note)
+        rules.tell(f"{note}, cut out", note)
     return dataclasses.replace(block, columns=columns, mask=mask if mask.any() else None)
 
 
-def _short(missing: FlagArray) -> FlagArray:
-    """Return which missing values stand in stretches that are held, shape (N,)."""
-    begins, ends = stretches(missing)
-    found = np.zeros(len(missing), dtype=np.bool_)
-    for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
-        inside = first > 0 and last < len(missing)
-        found[first:last] = inside and last - first <= HELD
-    return found
-
-
-def _carried(values: FloatArray, wanted: FlagArray, time: FloatArray, key: Key) -> FloatArray:
-    """Return values with the wanted ones held, or of PV and stem interpolated."""
+def _carried(
+    values: FloatArray, missing: FlagArray, time: FloatArray, key: Key
+) -> tuple[FlagArray, FloatArray]:
+    """Return which missing values can be held, or of PV and stem interpolated, and all values."""
+    short = missing.copy()
+    if key.signal != "sp":
+        for first, last in zip(*stretches(missing), strict=True):
+            short[first:last] = first > 0 and last < len(missing) and last - first <= HELD
     there = np.flatnonzero(np.isfinite(values))
     if not len(there):
-        return values
+        return np.zeros_like(short), values
     if key.signal in ("pv", "stem"):
-        return np.where(wanted, np.interp(time, time[there], values[there]), values)
-    before = np.searchsorted(there, np.arange(len(values)), side="right") - 1
-    return np.where(wanted, values[there[np.maximum(before, 0)]], values)
+        carried = np.interp(time, time[there], values[there])
+    else:
+        before = np.searchsorted(there, np.arange(len(values)), side="right") - 1
+        carried = values[there[np.maximum(before, 0)]]
+    return short, np.where(short, carried, values)

@@ -9,17 +9,18 @@ OP holds, as a line through the stairs of OP gives another friction.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.errors import InputError
-from stiction_ros.intake.repairs import Rules, plural
+from stiction_ros.intake.repairs import Rules
 from stiction_ros.intake.tables.block import Block, Column, Key
 from stiction_ros.records.quality import Quality, QualityArray
 from stiction_ros.records.regular import GAP
+from stiction_ros.texts import plural
 
 COVERED = 0.75
 """Share of all stamps that OP and PV each have, from which they were sampled together."""
@@ -36,68 +37,47 @@ QUIET = 60
 
 def is_reported(block: Block) -> bool:
     """Return whether OP and PV came at stamps of their own."""
-    there = (
-        np.ones(len(block.time), dtype=bool) if block.mask is None else block.mask != Quality.BAD
-    )
+    there = block.own_mask() != Quality.BAD
     if not there.any():
         return False
-    shares = [
-        float(np.mean(~column.blank[there]))
-        for key, column in block.columns.items()
-        if key.signal in ("op", "pv")
-    ]
-    return min(shares) < COVERED
+    signals = block.of("op", "pv").values()
+    return min(float(np.mean(~column.blank[there])) for column in signals) < COVERED
 
 
 def at_pv(block: Block, rules: Rules) -> Block | None:
     """Return the rows of PV with what every other signal was last, or None.
 
     So nothing measured is moved where each tag is asked as often as the other on a clock of its
-    own: PV has no value but its own, and OP is what the valve had been given.
-
-    Args:
-        block: as :func:`on_grid` takes it.
-        rules: what was done is noted there.
-
-    Returns:
-        None where there are several PV, or PV has fewer stamps than another signal.
+    own: PV has no value but its own, and OP is what the valve had been given. It is None where
+    there are several PV, or PV has fewer stamps than another signal.
     """
-    outputs = [key for key in block.columns if key.signal == "pv"]
-    stamps = {key: _reports(block, column) for key, column in block.columns.items()}
-    busiest = max(map(len, stamps.values()))
-    if len(outputs) != 1 or len(stamps[outputs[0]]) < COVERED * busiest:
+    stamps, outputs = _reports(block), list(block.of("pv"))
+    if len(outputs) != 1 or len(stamps[outputs[0]]) < COVERED * max(map(len, stamps.values())):
         return None
-    begin = max((at[0] for key, at in stamps.items() if key.signal == "op" and len(at)), default=0)
+    begin = max((stamps[key][0] for key in block.of("op") if len(stamps[key])), default=0)
     chosen = ~block.columns[outputs[0]].blank & (block.time >= begin)
     time = block.time[chosen]
     if len(time) < 2:
         return None
     mask: QualityArray = np.zeros(len(time), dtype=np.uint8)
     columns = {}
-    for key, column in block.columns.items():
-        at, values = stamps[key], column.values[~column.blank]
+    for key, at in stamps.items():
         if not len(at):
             continue
-        before = np.searchsorted(at, time, side="right") - 1
+        before, values = _last(block.columns[key], at, time)
         if key.signal == "op":  # none came since the row before
             mask[time - at[before] > 1.5 * float(np.median(np.diff(time)))] = Quality.HELD
-        held = np.where(before < 0, np.nan, values[before])
-        if key.signal == "mode":
-            held = values[np.maximum(before, 0)]
-        columns[key] = dataclasses.replace(column, values=held, blank=before < 0)
-    if block.mask is not None:
-        given = block.mask[chosen]
-        mask = np.where(given != Quality.GOOD, given, mask)
+        if key.signal != "mode":
+            values[before < 0] = np.nan
+        columns[key] = dataclasses.replace(block.columns[key], values=values, blank=before < 0)
     rules.tell(
         f"OP and PV have stamps of their own: taken at the {len(time)} of PV, with the last value "
         "of OP and SP at each",
-        block,
         "OP and PV have stamps of their own",
         "leave --strict out, or export all tags at the same times",
     )
-    return dataclasses.replace(
-        block, time=time, lines=block.lines[chosen], columns=columns, mask=mask
-    )
+    rows = np.flatnonzero(chosen)
+    return dataclasses.replace(block.rows(rows), columns=columns, mask=_mask(block, rows, mask))
 
 
 def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block]:
@@ -106,50 +86,60 @@ def on_grid(block: Block, sample_time: float | None, rules: Rules) -> list[Block
     Args:
         block: signals at increasing stamps, blank where nothing was reported.
         sample_time: s; None takes the scan that the stamps show.
-        rules: what was done is noted there.
+        rules: get the note.
 
     Raises:
         InputError: a signal has fewer than two reports, or strict.
     """
-    stamps = {key: _reports(block, column) for key, column in block.columns.items()}
-    needed = {key: at for key, at in stamps.items() if key.signal in ("op", "pv")}
+    stamps = _reports(block)
+    needed = {key: stamps[key] for key in block.of("op", "pv")}
+    counts, least = [], []
     for key, at in needed.items():
-        values = int(np.count_nonzero(np.isfinite(block.columns[key].values)))
-        if min(values, len(at)) < 2:
-            raise InputError(
-                f"{block.columns[key].name} has {plural(values, 'value')}",
-                where=str(block.path),
-                fix="export a longer time",
-            )
+        column = block.columns[key]
+        values = column.values[np.isfinite(column.values)]
+        if min(len(values), len(at)) < 2:
+            said = f"{column.name} has {plural(len(values), 'value')}"
+            raise InputError(said, fix="export a longer time")
+        moves = np.abs(np.diff(values))
+        smallest = np.min(moves[moves > 0], initial=np.inf)
+        counts.append(f"{column.name} {len(at)}")
+        least.append(f"{column.name} {smallest if np.isfinite(smallest) else 0.0:.3g}")
     step = sample_time or _scan(list(needed.values()))
     begin = max(float(at[0]) for at in needed.values())
     every = np.unique(np.concatenate(list(needed.values())))
     every = every[every >= begin - 1e-9]
     if len(every) < 2:
-        raise InputError("OP and PV were not kept at the same time", where=str(block.path))
+        raise InputError("OP and PV were not kept at the same time")
     steps = np.diff(every)
     longest = max(GAP * float(np.percentile(steps, 99.0)), QUIET * step)
-    cuts = np.flatnonzero(steps > longest) + 1
-    edges = [0, *cuts.tolist(), len(every)]
-    stretches = [every[a:b] for a, b in itertools.pairwise(edges) if b - a > 1]
-    found = [_regular(block, stamps, stretch, step) for stretch in stretches]
+    stretches = np.split(every, np.flatnonzero(steps > longest) + 1)
+    found = [_regular(block, stamps, one, step) for one in stretches if len(one) > 1]
     samples = sum(len(one.time) for one in found)
-    counts = ", ".join(f"{block.columns[key].name} {len(at)}" for key, at in needed.items())
-    least = ", ".join(
-        f"{block.columns[key].name} {_least(block.columns[key]):.3g}" for key in needed
-    )
     rules.tell(
-        f"reports when values changed ({counts}) brought onto {samples} samples of {step:.6g} s, "
-        f"OP and SP held, PV interpolated; lost is what moved less than was reported ({least})",
-        block,
-        f"signals were reported when they changed ({counts})",
+        f"reports when values changed ({', '.join(counts)}) brought onto {samples} samples of "
+        f"{step:.6g} s, OP and SP held, PV interpolated; lost is what moved less than was reported "
+        f"({', '.join(least)})",
+        f"signals were reported when they changed ({', '.join(counts)})",
         "leave --strict out, or export at a fixed interval",
     )
     return found
 
 
-def _reports(block: Block, column: Column) -> FloatArray:
-    return np.asarray(block.time[~column.blank])
+def _reports(block: Block) -> dict[Key, FloatArray]:
+    """Return the times at which each signal was reported."""
+    return {key: block.time[~column.blank] for key, column in block.columns.items()}
+
+
+def _last(column: Column, at: FloatArray, time: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return which report is the last one at each time, -1 for none yet, and its value."""
+    before = np.searchsorted(at, time, side="right") - 1
+    return before, column.values[~column.blank][np.maximum(before, 0)]
+
+
+def _mask(block: Block, rows: IntArray, mask: QualityArray) -> QualityArray:
+    """Return the quality of samples: that of the rows that they are taken of, else ``mask``."""
+    given = block.own_mask()[rows]
+    return np.where(given != Quality.GOOD, given, mask)
 
 
 def _scan(stamps: list[FloatArray]) -> float:
@@ -168,45 +158,30 @@ def _scan(stamps: list[FloatArray]) -> float:
 
 
 def _regular(
-    block: Block, stamps: dict[Key, FloatArray], stretch: FloatArray, step: float
+    block: Block, stamps: Mapping[Key, FloatArray], stretch: FloatArray, step: float
 ) -> Block:
+    """Return one stretch on a grid, with samples marked that no report is near."""
     count = math.floor((stretch[-1] - stretch[0]) / step + 1e-6) + 1
     time = stretch[0] + step * np.arange(count)
+    until = time + 1e-6 * step
     mask: QualityArray = np.zeros(count, dtype=np.uint8)
     columns = {}
     for key, column in block.columns.items():
-        at = stamps[key]
-        values = column.values[~column.blank]
-        if not np.isfinite(values).any():
+        at, given = stamps[key], column.values[~column.blank]
+        there = np.isfinite(given)
+        if not there.any():
             continue
-        after = np.searchsorted(at, time + 1e-6 * step, side="right")
-        before = np.maximum(after - 1, 0)
-        held = values[before]
+        before, values = _last(column, at, until)
         if key.signal in ("op", "pv"):
-            near = np.minimum(
-                np.abs(at[before] - time), np.abs(at[np.minimum(after, len(at) - 1)] - time)
-            )
-            mask[(near > 0.5 * step) & (mask == Quality.GOOD)] = Quality.HELD
+            around = at[np.maximum(before, 0)], at[np.minimum(before + 1, len(at) - 1)]
+            far = np.min(np.abs(np.subtract(around, time)), axis=0) > 0.5 * step
+            mask[far] = Quality.HELD
         if key.signal in ("pv", "stem"):
-            there = np.isfinite(values)
-            held = np.where(np.isfinite(held), np.interp(time, at[there], values[there]), np.nan)
-        columns[key] = dataclasses.replace(column, values=held, blank=np.zeros(count, dtype=bool))
-    if block.mask is not None:
-        rows = np.maximum(np.searchsorted(block.time, time + 1e-6 * step, side="right") - 1, 0)
-        given = block.mask[rows]
-        mask = np.where(given != Quality.GOOD, given, mask)
-    return Block(
-        path=block.path,
-        row_word="sample",
-        clock=block.clock,
-        time=time,
-        lines=np.arange(count),
-        columns=columns,
-        mask=mask,
+            between = np.interp(time, at[there], given[there])
+            values = np.where(np.isfinite(values), between, np.nan)
+        columns[key] = dataclasses.replace(column, values=values, blank=np.zeros(count, dtype=bool))
+    rows = np.maximum(np.searchsorted(block.time, until, side="right") - 1, 0)
+    mask, lines = _mask(block, rows, mask), np.arange(count)
+    return dataclasses.replace(
+        block, row_word="sample", time=time, lines=lines, columns=columns, mask=mask
     )
-
-
-def _least(column: Column) -> float:
-    moves = np.abs(np.diff(column.values[~column.blank & np.isfinite(column.values)]))
-    moves = moves[moves > 0]
-    return float(moves.min()) if len(moves) else 0.0

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.repairs import outside
-from stiction_ros.intake.tables.block import Block, Column, Key
+from stiction_ros.intake.tables.block import Block, Key
 from stiction_ros.records.record import Record
 
 
@@ -36,61 +36,41 @@ def columns_of(blocks: Sequence[Block]) -> dict[str, str]:
 
 
 def spreads_of(blocks: Sequence[Block]) -> dict[str, Spread]:
-    """Return what numbers each signal of a loop has, without those far outside all others.
-
-    Args:
-        blocks: as read; signals that hold no number are left out.
-    """
-    found: dict[Key, list[FloatArray]] = {}
-    for block in blocks:
-        for key, column in block.columns.items():
-            if key.signal != "mode":
-                found.setdefault(key, []).append(column.values)
-    return _spreads({named(key): np.concatenate(pieces) for key, pieces in found.items()})
+    """Return what numbers each signal of a loop has, without those far outside all others."""
+    measured = (item for block in blocks for item in block.measured.items())
+    return _spreads((named(key), column.values) for key, column in measured)
 
 
 def spreads_of_records(parts: Sequence[Record]) -> dict[str, Spread]:
     """Return the same of records, whose OP is in %."""
-    found: dict[str, list[FloatArray]] = {}
+    found: list[tuple[str, FloatArray]] = []
     for part in parts:
-        for signal, tags, values in (
-            ("OP", part.valves, part.op),
-            ("PV", part.outputs, part.pv),
-            ("SP", part.outputs, part.sp),
-        ):
-            for tag, column in zip(tags, () if values is None else values.T, strict=False):
-                found.setdefault(f"{signal} {tag}", []).append(column)
-    return _spreads({name: np.concatenate(pieces) for name, pieces in found.items()})
+        found += zip((f"OP {tag}" for tag in part.valves), part.op.T, strict=True)
+        found += zip((f"PV {tag}" for tag in part.outputs), part.pv.T, strict=True)
+        if part.sp is not None:
+            found += zip((f"SP {tag}" for tag in part.outputs), part.sp.T, strict=True)
+    return _spreads(found)
 
 
 def modes_of(blocks: Sequence[Block], taken: Mapping[str, str]) -> tuple[str, ...]:
-    """Return words of the mode with count and what each is taken for, the most frequent first.
-
-    Args:
-        blocks: as read.
-        taken: word to what it is taken for; words that are not there are not told apart.
-    """
+    """Return words of the mode, most frequent first, with count and what each is ``taken`` for."""
     counts: Counter[str] = Counter()
     for block in blocks:
-        for key, column in block.columns.items():
-            if key.signal == "mode":
-                counts.update(_words(column))
+        for column in block.of("mode").values():
+            codes = column.values[np.isfinite(column.values)].astype(np.intp)
+            counts.update(column.known[code] for code in codes.tolist())
     return tuple(
         f"{count} {word or 'empty'}{f' ({taken[word]})' if word in taken else ''}"
         for word, count in counts.most_common()
     )
 
 
-def _words(column: Column) -> dict[str, int]:
-    codes = column.values[np.isfinite(column.values)].astype(np.intp)
-    shown, counts = np.unique(codes, return_counts=True)
-    pairs = zip(shown.tolist(), counts.tolist(), strict=True)
-    return dict(Counter({column.known[code].strip(): count for code, count in pairs}))
-
-
-def _spreads(signals: Mapping[str, FloatArray]) -> dict[str, Spread]:
+def _spreads(signals: Iterable[tuple[str, FloatArray]]) -> dict[str, Spread]:
+    pieces: dict[str, list[FloatArray]] = {}
+    for name, values in signals:
+        pieces.setdefault(name, []).append(values)
     found = {}
-    for name, values in signals.items():
+    for name, values in ((name, np.concatenate(some)) for name, some in pieces.items()):
         usual = values[np.isfinite(values) & ~outside(values)]
         if len(usual):
             found[name] = Spread(float(usual.min()), float(np.median(usual)), float(usual.max()))

@@ -19,12 +19,9 @@ YEARS = SPREADSHEET[1] - SPREADSHEET[0]
 
 
 class Change(NamedTuple):
-    """A clock is set forward or back.
+    """A clock leaps from ``low`` to ``high``, or falls back and what lies between comes twice.
 
-    Attributes:
-        low, high: local times between which it leaps or falls, s since 1970.
-        back: whether it falls, so that what lies between is passed twice.
-        before: s that local time was ahead of UTC until then.
+    Both are local, in s since 1970; ``before`` are the s that it was ahead of UTC until then.
     """
 
     low: float
@@ -40,20 +37,16 @@ class Change(NamedTuple):
     @property
     def said(self) -> str:
         """What happens, as a note says it."""
-        minutes = f"{(self.high - self.low) / 60.0:g} min"
-        way = "back" if self.back else "forward"
-        stamp = shown(self.high if self.back else self.low)
-        return (
-            f"the clock is set {way} by {'an hour' if minutes == '60 min' else minutes} at {stamp}"
-        )
+        minutes = (self.high - self.low) / 60.0
+        by = "an hour" if minutes == 60.0 else f"{minutes:g} min"
+        way, at = ("back", self.high) if self.back else ("forward", self.low)
+        return f"the clock is set {way} by {by} at {shown(at)}"
 
 
 def changes(zone: str, days: FloatArray) -> list[Change]:
-    """Return the changes of a zone from first to last; without one, those on the days themselves.
+    """Return the changes of a zone between days since 1970, from first to last.
 
-    Args:
-        zone: its name; empty for the zones that ``words.yaml`` lists.
-        days: local ones since 1970, one or more for each row.
+    Without a zone those on the days themselves, in the zones that ``words.yaml`` lists.
     """
     kept = np.unique(days[np.flatnonzero(np.diff(days, prepend=np.nan))]).clip(0.0, YEARS)
     if zone:

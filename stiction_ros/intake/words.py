@@ -19,11 +19,6 @@ def by_word(section: str) -> dict[str, Any]:
     return {word: key for key, words in WORDS[section].items() for word in words}
 
 
-def columns_named(what: str) -> tuple[str, ...]:
-    """Return the usual names of a column that is no signal: time, tag, value, quality, unit."""
-    return tuple(WORDS["columns"][what])
-
-
 def pattern_of(section: str) -> re.Pattern[str]:
     """Return an expression that one of the words of a section matches as a whole."""
     return re.compile("|".join(WORDS[section]), re.IGNORECASE)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,12 @@ row may be off its place."""
 
 SHORTEST = 3
 """Samples that a repair needs at least."""
+
+FEWEST_STAMPS = 5
+"""Stamps from which on it can be told that they are cut off."""
+
+DIFFERENT = 0.5
+"""Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
 
 WHOLE = 1e-3
 """Share of the smallest step by which others are off its multiples in rounded stamps, at most."""
@@ -154,7 +161,46 @@ def regular_part(time: FloatArray, first: int, last: int) -> Part:
     return Part(first, last, given[0] + step * np.arange(number), place, "; ".join(said))
 
 
-def evenly(rows: IntArray) -> NDArray[np.bool_]:
+def spread_evenly(
+    time: FloatArray, first: IntArray, values: Sequence[FloatArray]
+) -> tuple[FloatArray, str] | None:
+    """Return times of rows whose stamps were cut off, as minutes without their seconds, and a note.
+
+    Then every stamp has as many rows but for one, stamps follow each other evenly, and what stands
+    in the rows differs; where a stamp has one row, those with two come evenly. None for rows that
+    are there twice.
+
+    Args:
+        time: never falling, shape (rows,), s.
+        first: first row of each stamp.
+        values: of each signal, shape (rows,).
+    """
+    if len(first) < FEWEST_STAMPS:
+        return None
+    rows, stamps, counts = np.arange(len(time)), time[first], np.diff(np.append(first, len(time)))
+    steps, inner = np.diff(stamps), counts[1:-1]
+    usual, step = int(np.median(inner)), float(steps[0])
+    even = np.ptp(steps) <= 1e-6 * step and np.ptp(inner) <= 1 and counts.max() <= usual + 1
+    again = np.setdiff1d(rows, first)
+    differs = np.any([of[again] != of[again - 1] for of in values], axis=0)
+    if not even or not differs.mean() > DIFFERENT:
+        return None
+    said = "stamps lack what is below {:g} s: {} rows on each, spread evenly"
+    line = np.polyval(np.polyfit(rows, time - stamps[0], 1), rows) + stamps[0]
+    late, scan = line - time, float(line[1] - line[0])
+    twice = _evenly(np.flatnonzero(inner > 1))
+    fits = bool(np.ptp(inner)) and np.ptp(late) <= step + 0.5 * scan
+    if fits and (usual > 1 or (len(twice) > 1 and twice.all())):
+        return line - late.min(), said.format(step, f"{step / scan:.3g}")
+    if usual < 2:
+        return None
+    within = rows - np.repeat(first, counts)
+    of = np.maximum(np.repeat(counts, counts), usual)
+    within[: counts[0]] += max(usual - int(counts[0]), 0)  # the first stamp has its last rows
+    return time + step * within / of, said.format(step, usual)
+
+
+def _evenly(rows: IntArray) -> NDArray[np.bool_]:
     """Return which distances of rows are the usual one, or one row off it, shape (R - 1,).
 
     Halves that are rounded to even make them differ in turn, so two are looked at together.
@@ -196,7 +242,7 @@ def _of_rounded(given: FloatArray) -> IntArray | None:
     turns = steps / float(steps.min())
     whole = np.rint(turns)
     long = np.flatnonzero(whole == 2.0)
-    even = evenly(long)
+    even = _evenly(long)
     spoiled = 2.0 * SLIGHT  # a missing row stands within a distance and makes two of it
     if len(even) < 2 or np.mean(even) < 1.0 - spoiled or np.abs(turns - whole).max() > WHOLE:
         return None

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.intake import is_bag, one_loop
-from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit, TimeUnit
+from stiction_ros.intake.sheets.typed import open_sheets
+from stiction_ros.records.csv_names import tagged_columns
 from stiction_ros.records.parts import only_part
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_parts
@@ -31,11 +33,7 @@ def read_csv(
 
     Args:
         path: the file.
-        op: see :class:`CsvColumns`, as the others.
-        pv: …
-        sp: …
-        stem: …
-        time: …
+        op, pv, sp, stem, time: see :class:`CsvColumns`.
 
     Raises:
         InputError: no such file or column; a cell that is empty, not a number or not
@@ -58,8 +56,24 @@ def read_csv_parts(
     Raises:
         InputError: as :func:`read_csv` but for gaps.
     """
-    options = IntakeOptions(columns=columns, strict=True, as_given=True)
+    with foreign(path):
+        columns = _named(open_sheets(Path(path))[0].layout.given, columns)
+    unit, seconds = OpUnit.OTHER, TimeUnit.SECONDS
+    options = IntakeOptions(columns=columns, strict=True, op_unit=unit, time_unit=seconds)
     return one_loop(Path(path), options).parts
+
+
+def _named(header: Sequence[str], columns: CsvColumns) -> CsvColumns:
+    """Return the columns with every signal that is there named, so that nothing is asked."""
+    usual = {"op": {"V1": "OP"}, "pv": {"PV1": "PV"}, "sp": {"PV1": "SP"}, "stem": {"V1": "STEM"}}
+    found = dict(tagged_columns(header)) or {
+        key: named for key, named in usual.items() if key in ("op", "pv") or key.upper() in header
+    }
+    for key, after in (("op", "stem"), ("pv", "sp")):
+        if getattr(columns, key) is not None:
+            found[key], found[after] = getattr(columns, key), {}
+    given = {key: getattr(columns, key) for key in ("sp", "stem") if getattr(columns, key)}
+    return CsvColumns(**{**found, **given}, time=columns.time)
 
 
 def open_record(
@@ -68,15 +82,10 @@ def open_record(
     *,
     namespace: str | None = None,
 ) -> Record:
-    """Read a record without gaps from a CSV file or a bag.
-
-    Args:
-        path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
-        columns: which column is what, for CSV files only.
-        namespace: of the loop's topics, for bags that hold several loops.
+    """Read a record without gaps from a CSV file or a bag, as :func:`open_parts` does.
 
     Raises:
-        InputError: as :func:`open_parts`; gaps, several runs, bad samples.
+        InputError: as there; gaps, several runs, bad samples.
     """
     return only_part(open_parts(path, columns, namespace=namespace), str(path))
 
@@ -89,10 +98,7 @@ def open_parts(
 ) -> tuple[Record, ...]:
     """Read the records of a CSV file or a bag, one for each stretch without a gap.
 
-    Args:
-        path: a CSV file, a rosbag2 directory or a ``.mcap`` file.
-        columns: which column is what, for CSV files only.
-        namespace: of the loop's topics, for bags that hold several loops.
+    A file may have ``columns`` that are named, a bag a loop's ``namespace``.
 
     Raises:
         InputError: as :func:`read_csv_parts` and :func:`read_bag_parts`; columns given for a
@@ -100,16 +106,10 @@ def open_parts(
     """
     if is_bag(path) or Path(path).is_dir():
         if columns != CsvColumns():
-            raise InputError(
-                "is a bag, which has no columns",
-                where=str(path),
-                fix="leave --op, --pv, --sp, --stem and --time out",
-            )
+            said = "is a bag, which has no columns"
+            raise InputError(said, where=str(path), fix="leave --op, --pv … out")
         return read_bag_parts(path, namespace=namespace)
     if namespace is not None:
-        raise InputError(
-            "is a CSV file, which has no namespaces",
-            where=str(path),
-            fix="leave --namespace out",
-        )
+        said = "is a CSV file, which has no namespaces"
+        raise InputError(said, where=str(path), fix="leave --namespace out")
     return read_csv_parts(path, columns)

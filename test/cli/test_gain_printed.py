@@ -23,12 +23,13 @@ def test_a_terminal_of_80_columns_is_enough(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    now = Measures(0.139, 0.0354, 1234.5, 99.0, 12.0)
-    then = Measures(0.121, 0.0205, 1100.5, 80.0, 10.0)
+    now = Measures(0.139, 0.0354, 1234.5, 99.0, 12.0, 98.8)
+    then = Measures(0.121, 0.0205, 1100.5, 80.0, 10.0, 21.5)
     interval = {"amplitude": (0.101, 0.139), "travel_per_hour": (1000.0, 1200.0)}
     options = (
         Option(What.SERVICE, then, interval, NOTE),
         Option(What.EMBEDDING, None, {}, "It cannot be set up."),
+        Option(What.LEAVE, now, {}, "As it is."),
     )
     show(Gain("V1", "PV1", now, options), VERDICT)
     out = capsys.readouterr().out
@@ -36,5 +37,7 @@ def test_a_terminal_of_80_columns_is_enough(
     assert "does not decide" in " ".join(out.splitlines())
     assert "0.139 │ 0.121 │ 0.101 to 0.139" in " ".join(out.split())
     assert "1000 to 1200" in out
+    assert out.count("period s") == 1  # where it is another one
+    assert "98.8 │ 21.5" in " ".join(out.split())
     assert f"service: {NOTE[:50]}" in out
     assert max(map(len, out.splitlines())) <= 80

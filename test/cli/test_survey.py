@@ -162,11 +162,30 @@ def test_gain_of_a_model_in_json(tmp_path: Path, capsys: pytest.CaptureFixture[s
         "travel_per_hour",
         "moves_per_hour",
         "reversals_per_hour",
+        "period",
     }
     whats = [option["what"] for option in document["options"]]
     assert whats == ["service", "embedding", "retune", "leave"]
     for option in document["options"]:
         assert set(option) >= {*document["now"], "what", "interval", "note"}
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["gain", "config/flow.loop.yaml", "--law", "he"], "a model brings its own"),
+        (["gain", "EXPORT", "--law", "hee"], "unknown friction law 'hee'"),
+        (["survey", "EXPORT", "--law", "hee"], "unknown friction law 'hee'"),
+    ],
+)
+def test_a_law_that_cannot_be_is_refused_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str], said: str
+) -> None:
+    export = tmp_path / "export.csv"
+    rows = [f"{k},{50 + k % 7},{40 + k % 5},{42 + k % 3}" for k in range(200)]
+    export.write_text("\n".join(["t,OP,PV,SP", *rows]))
+    assert _code([str(export) if word == "EXPORT" else word for word in command]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_costs_are_read_like_exports(tmp_path: Path) -> None:

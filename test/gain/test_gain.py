@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from stiction_ros.effects import Stiction, from_mapping
 from stiction_ros.errors import InputError
 from stiction_ros.gain.draws import (
     DRAWS,
@@ -18,7 +19,7 @@ from stiction_ros.gain.gain import Gain, Option, What, embedding_part, gain_of
 from stiction_ros.gain.measures import Measures
 from stiction_ros.gain.model_gain import gain_of_model
 from stiction_ros.gain.recorded_loop import RecordedLoop
-from stiction_ros.gain.stems import stems_of
+from stiction_ros.gain.retuning import UNCHANGED, Tuning, most_helpful
 from stiction_ros.identification import Identification, IdentificationOptions, VerdictKind, identify
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import PiController, simulate_closed_loop
@@ -352,10 +353,83 @@ def test_frictions_are_taken_as_often_as_they_are_likely() -> None:
     assert not undecided[1::2].any()
 
 
-def test_stems_follow_the_law() -> None:
-    op = np.array([[0.0, 3.0, 5.0, 4.0, 1.0]])
-    stems = stems_of(op, np.array([[4.0, 1.0]]), np.zeros(1))
-    assert stems.tolist() == [[0.0, 0.0, 4.0, 4.0, 4.0]]
+def of_law(law: str) -> LoopModel:
+    friction = from_mapping({"effect": "stiction", "law": law, **PARAMETERS[law]})
+    valve = {**MODEL["valves"][0], "effects": [friction.to_mapping()]}  # type: ignore[index]
+    return LoopModel.from_mapping({**MODEL, "valves": [valve]})
+
+
+PARAMETERS = {
+    "kano": {"s": 5.5, "j": 2.5},
+    "choudhury": {"s": 5.5, "j": 2.5},
+    "semi_physical": {"f_s": 4.0, "f_d": 1.5, "k": 1.4},
+}
+
+
+@pytest.mark.parametrize("law", PARAMETERS)
+def test_a_loop_is_run_again_by_the_law_that_was_identified(law: str) -> None:
+    """With the true estimate the loop repeats its record, until a slip hangs on rounding."""
+    model = of_law(law)
+    assert model.controller is not None
+    control = PiController(model.controller, 1.0, 50.0, (0.0, 100.0))
+    moves = SetPoints(("PV1",), np.array([0.0, 20.0]), np.array([[50.0], [53.0]]))
+    run = simulate_closed_loop(model, control, moves, 1500, 3).record
+    assert run.stem is not None
+    found = identify(run, IdentificationOptions("exact", output_order=1, delay=(2, 2)))
+    friction = model.valves[0].effects[0]
+    assert isinstance(friction, Stiction)
+    (estimate,) = found.valves
+    further = {"k": 1.4} if law == "semi_physical" else {}
+    estimate = dataclasses.replace(estimate, law=law, further=further).with_frictions(4.0, 1.5)
+    true = dataclasses.replace(found, valves=(estimate,), stem=run.stem)
+    loop = RecordedLoop.of(run, true)
+    draws = drawn(loop)
+    stem = loop.op_scale * draws.stems[0, 0] + loop.loop.op_mean[0]
+    assert stem == pytest.approx(run.stem[loop.begin : loop.rows[1], 0], abs=1e-6)
+    again, now = loop.run(draws)[0], loop.now()
+    assert again is not None
+    assert again.iae_per_hour == pytest.approx(now.iae_per_hour, rel=0.05)
+    assert again.moves_per_hour == pytest.approx(now.moves_per_hour, rel=0.05)
+    if law == "choudhury":
+        with pytest.raises(InputError, match="no jump form"):
+            EmbeddingDesign.of(loop)
+    else:
+        assert type(EmbeddingDesign.of(loop).friction) is type(friction)
+
+
+@pytest.mark.parametrize("law", ["kano", "choudhury"])
+def test_the_law_of_a_model_is_embedded_where_an_op_can_be_planned(law: str) -> None:
+    embedding = gain_of_model(of_law(law), samples=300).option(What.EMBEDDING)
+    assert (embedding.measures is None) == (law == "choudhury")
+    assert ("no jump form" in embedding.note) == (law == "choudhury")
+
+
+def test_a_tuning_that_makes_the_cycle_wider_does_not_help() -> None:
+    now = Measures(1.0, 1.0, 0.0, 0.0, 0.0)
+    calmer, wider = Tuning(0.5), Tuning(2.0)
+    runs = {
+        UNCHANGED: [now],
+        calmer: [dataclasses.replace(now, iae_per_hour=0.9)],
+        wider: [dataclasses.replace(now, iae_per_hour=0.5, amplitude=1.1)],
+    }
+    assert most_helpful(runs) == calmer
+    del runs[calmer]
+    assert most_helpful(runs) == UNCHANGED
+
+
+def test_the_amplitude_of_another_tuning_is_that_of_its_own_cycle(
+    loop: RecordedLoop, draws: Draws
+) -> None:
+    """At the period of now a tuning that makes the cycle faster, and wider, seemed to end it."""
+    first, now = draws.taken([0]), loop.now()
+    (run,) = loop.run(first, tunings=Tuning(2.0).applied(first.tunings))
+    assert run is not None
+    assert now.amplitude is not None
+    assert now.period is not None
+    assert run.amplitude is not None
+    assert run.period is not None
+    assert run.period < 0.8 * now.period
+    assert run.amplitude > now.amplitude
 
 
 def test_a_note_says_on_which_measure_the_drawn_loops_do_not_agree() -> None:

@@ -13,19 +13,30 @@ from stiction_ros.records.valve_work import ValveWork
 
 def test_a_sine_has_its_amplitude_and_its_mean() -> None:
     error = 3.0 * np.sin(2 * np.pi * np.arange(2000) / 50.0)
-    found = Yardstick(2.0, 50.0, [(0, 2000)]).measure(error, np.zeros(2000))
-    assert found.amplitude == pytest.approx(3.0, rel=1e-3)
+    found = Yardstick(2.0, True, [(0, 2000)]).measure(error, np.zeros(2000))
+    assert found.amplitude == pytest.approx(3.0, rel=1e-2)
+    assert found.period == pytest.approx(100.0, rel=1e-2)
     assert found.iae_per_hour == pytest.approx(6.0 / math.pi, rel=1e-2)
     assert found.travel_per_hour == found.reversals_per_hour == 0.0
 
 
 def test_travel_and_reversals_are_counted_an_hour() -> None:
     stem = np.tile([0.0, 1.0, 2.0, 1.0], 900)
-    found = Yardstick(1.0, None, [(0, 3600)]).measure(np.zeros(3600), stem)
+    found = Yardstick(1.0, False, [(0, 3600)]).measure(np.zeros(3600), stem)
     assert found.amplitude is None
+    assert found.period is None
     assert found.travel_per_hour == pytest.approx(3599.0)
     assert found.moves_per_hour == pytest.approx(3599.0)
     assert found.reversals_per_hour == pytest.approx(1799.0)
+
+
+def test_a_faster_cycle_of_the_same_width_is_no_smaller() -> None:
+    yardstick = Yardstick(1.0, True, [(0, 4000)])
+    for turns in (50.0, 31.0):
+        error = 2.0 * np.sin(2 * np.pi * np.arange(4000) / turns)
+        found = yardstick.measure(error, np.zeros(4000))
+        assert found.amplitude == pytest.approx(2.0, rel=1e-2)
+        assert found.period == pytest.approx(turns, rel=1e-2)
 
 
 @given(

@@ -77,7 +77,7 @@ def outcomes(content: bytes, suffix: str, options: IntakeOptions) -> None:
             IntakeOptions(strict=True),
             IntakeOptions(sample_time=2.0),
             IntakeOptions(op_unit=OpUnit.SHARE, time_unit=TimeUnit.MILLISECONDS),
-            IntakeOptions(automatic=("1",), as_given=True),
+            IntakeOptions(automatic=("1",), op_unit=OpUnit.OTHER),
         ]
     ),
 )

@@ -71,6 +71,7 @@ def identification(of: Record) -> Identification:
 GAIN: dict[str, Any] = {
     "now": {
         "amplitude": 1.2,
+        "period": 90.0,
         "iae_per_hour": 0.9,
         "travel_per_hour": 240.0,
         "moves_per_hour": 120.0,
@@ -80,6 +81,7 @@ GAIN: dict[str, Any] = {
         {
             "what": what,
             "amplitude": 0.1,
+            "period": 90.0,
             "iae_per_hour": 0.2,
             "travel_per_hour": 90.0,
             "moves_per_hour": 40.0,

@@ -279,7 +279,8 @@ def test_an_op_in_its_own_unit_is_no_percent() -> None:
 def test_the_page_of_a_loop_says_why_and_what_next(loop_file: Path) -> None:
     source = loop_file.read_text(encoding="utf-8")
     assert "rests until OP has gone back by 3 %, and then jumps by 1 % or more." in source
-    assert "Next: Have V1 serviced" in source
+    assert "Next: Have V1 serviced (packing and positioner first).</p>" in source
+    assert "imulated" not in source.partition("<table")[0]  # what was not stands in the table
 
 
 def test_the_unit_of_pv_is_put_into_a_page(loop_file: Path) -> None:

@@ -13,8 +13,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.intake import CsvColumns, IntakeOptions, Loop, loops, one_loop
 from stiction_ros.intake.intake import OTHERS, is_bag, strange_files
 from stiction_ros.intake.intake_options import OpUnit, TimeUnit
-from stiction_ros.intake.repairs import plural
 from stiction_ros.intake.sheets.stamps import DateOrder
+from stiction_ros.texts import plural
 
 
 def add_columns(parser: argparse.ArgumentParser) -> None:

@@ -61,12 +61,13 @@ def materiality(estimate: ValveEstimate) -> str:
     return f"{said}; in simulation {away:.0f} % of the loop's movement goes away without it."
 
 
-def next_step(found: Identification, valve: int) -> str:
+def next_step(found: Identification, valve: int, *, asked: bool = False) -> str:
     """Return what to do next about a valve.
 
     Args:
         found: what identification made of the record.
         valve: index.
+        asked: whether what would help is told elsewhere, or that it could not be simulated.
     """
     estimate = found.valves[valve]
     if estimate.verdict is VerdictKind.UNDECIDED:
@@ -84,9 +85,12 @@ def next_step(found: Identification, valve: int) -> str:
         return f"First {other}; then {service}."
     if kind is not CauseKind.VALVE:
         return f"The friction makes no cycle: {service} at the next stop."
+    service = f"{service[0].upper()}{service[1:]}"
+    if asked:
+        return f"{service}."
     return (
-        f"{service[0].upper()}{service[1:]}; what a service, another tuning or a controller that "
-        "knows the friction would bring is simulated by stiction gain."
+        f"{service}; ask stiction gain what a service, another tuning or a controller that knows "
+        "the friction would bring."
     )
 
 

@@ -69,7 +69,7 @@ class Runs(NamedTuple):
         pv: before the first sample, oldest first, shape (R, H, p).
         stem: before the first sample, oldest first, shape (R, H, m).
         op: the last one before the first sample, shape (R, m).
-        laws: per valve, whether Kano's rules or Choudhury's move its stem, in place of He's law (4),
+        laws: per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4),
             and by which factor a slip is longer than He's, shape (m, 3).
     """
 

@@ -106,6 +106,10 @@ class ValveEstimate:
         static, dynamic = self.static_interval, self.dynamic_interval
         return static[0] + dynamic[0], static[1] + dynamic[1]
 
+    def with_frictions(self, static: float, dynamic: float) -> Self:
+        """Return the estimate with another f_S and f_D, %, further parameters kept."""
+        return dataclasses.replace(self, static_friction=static, dynamic_friction=dynamic)
+
     def behaviour(self) -> Behaviour | None:
         """Return the friction as an effect of a loop model; None for a valve without any."""
         if self.static_friction <= 0.0:

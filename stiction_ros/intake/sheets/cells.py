@@ -39,12 +39,7 @@ _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
 
 class Wrong(NamedTuple):
-    """The first cell of a column that is no number.
-
-    Attributes:
-        row: of it, counted from the first of the data.
-        said: ``is empty``, ``is 'bad', not a number`` …
-    """
+    """The first cell of a column that is no number: its row, and such as ``is empty``."""
 
     row: int
     said: str
@@ -64,6 +59,13 @@ def is_number(cell: str) -> bool:
     return number(cell) is not None or _COMMA.fullmatch(cell) is not None
 
 
+def as_text(cells: Cells) -> Sequence[str]:
+    """Return cells as text; numbers with nine digits, none as an empty cell."""
+    if isinstance(cells, np.ndarray):
+        return ["" if cell != cell else f"{cell:.9g}" for cell in cells.tolist()]
+    return cells
+
+
 @dataclasses.dataclass
 class Numbers:
     """A column of numbers as it grows.
@@ -80,61 +82,44 @@ class Numbers:
     words: Counter[str] = dataclasses.field(default_factory=Counter)
     _pieces: list[FloatArray] = dataclasses.field(default_factory=list)
     _blank: list[NDArray[np.bool_]] = dataclasses.field(default_factory=list)
-    _rows: int = 0
 
     def add(self, cells: Cells) -> None:
         """Add the next piece of the column."""
+        values = _all_numbers(cells)
+        if values is None:
+            read = [self._number(str(cell).strip()) for cell in cells]
+            values = np.array([math.nan if value is None else value for value in read])
         blank = np.zeros(len(cells), dtype=np.bool_)
-        piece = self._fast(cells, blank)
-        self._pieces.append(self._slow(cells, blank) if piece is None else piece)
+        of_numbers = isinstance(cells, np.ndarray) and cells.dtype.kind != "M"
+        for row in np.flatnonzero(~np.isfinite(values)).tolist():
+            text = "" if of_numbers else str(cells[row]).strip()
+            blank[row], values[row] = not text, math.nan
+            self.words[text[:SHOWN]] += 1
+            if self.wrong is None:
+                self.wrong = Wrong(sum(map(len, self._pieces)) + row, self._said(text))
+        self._pieces.append(values)
         self._blank.append(blank)
-        self._rows += len(cells)
 
     def values(self) -> FloatArray:
         """Return the whole column, shape (N,), NaN where there is no finite number."""
-        return np.concatenate(self._pieces) if self._pieces else np.zeros(0)
+        return np.concatenate([np.zeros(0), *self._pieces])
 
     def blank(self) -> NDArray[np.bool_]:
         """Return which cells are empty, shape (N,)."""
-        return np.concatenate(self._blank) if self._blank else np.zeros(0, dtype=np.bool_)
+        return np.concatenate([np.zeros(0, dtype=np.bool_), *self._blank])
 
-    def _fast(self, cells: Cells, blank: NDArray[np.bool_]) -> FloatArray | None:
-        """Return a piece of which every cell is a finite number; None for any other."""
-        if isinstance(cells, np.ndarray):
-            if cells.dtype.kind == "M":
-                return None
-            values = np.array(cells, dtype=np.float64)
-            missing = ~np.isfinite(values)
-            if missing.any():
-                self._note(int(np.argmax(missing)), "", int(np.count_nonzero(missing)))
-                values[missing] = np.nan
-                blank |= missing
-            return values
-        text = "".join(cells)
-        if "_" in text or "," in text:
-            return None
-        try:
-            values = np.array(cells, dtype=object).astype(np.float64)
-        except ValueError:
-            return None
-        return values if np.isfinite(values).all() else None
+    def _said(self, text: str) -> str:
+        if not text:
+            return "is empty"
+        if self._number(text) is None:
+            return f"is {text[:SHOWN]!r}, not a number"
+        return f"is {text[:SHOWN]}, not a finite number"
 
-    def _slow(self, cells: Cells, blank: NDArray[np.bool_]) -> FloatArray:
-        values = np.empty(len(cells))
-        for row, cell in enumerate(cells):
-            text = str(cell).strip()
-            value = number(text)
-            if value is None:
-                value = self._typeset(text)
-            if value is None or not math.isfinite(value):
-                self._note(row, text, 1, not_finite=value is not None)
-                value = math.nan
-                blank[row] = not text
-            values[row] = value
-        return values
-
-    def _typeset(self, text: str) -> float | None:
-        """Return the number in a cell that is written for people."""
+    def _number(self, text: str) -> float | None:
+        """Return the number in a cell, also in one that is written for people."""
+        value = number(text)
+        if value is not None:
+            return value
         plain = text.translate(_SIGNS)
         unit = _UNIT.fullmatch(plain)
         plain = unit[1] if unit else plain
@@ -142,46 +127,45 @@ class Numbers:
 
     def _with_point(self, text: str) -> str:
         comma, point = text.rfind(","), text.rfind(".")
+        if point > comma:
+            return text.replace(",", "")
         if point >= 0:
-            return (
-                text.replace(",", "") if point > comma else text.replace(".", "").replace(",", ".")
-            )
+            return text.replace(".", "").replace(",", ".")
         if self.decimal_comma and text.count(",") == 1:
             return text.replace(",", ".")
         grouped = re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+", text)
         return text.replace(",", "") if grouped and not self.decimal_comma else text
 
-    def _note(self, row: int, text: str, count: int, *, not_finite: bool = False) -> None:
-        self.words[text[:SHOWN]] += count
-        if self.wrong is None:
-            said = f"is {text[:SHOWN]!r}, not a number"
-            if not_finite:
-                said = f"is {text[:SHOWN]}, not a finite number"
-            self.wrong = Wrong(self._rows + row, said if text else "is empty")
+
+def _all_numbers(cells: Cells) -> FloatArray | None:
+    """Return cells as numbers, fast; None where one is text, or a number written for people."""
+    if isinstance(cells, np.ndarray):
+        return None if cells.dtype.kind == "M" else np.array(cells, dtype=np.float64)
+    text = "".join(cells)
+    if "_" in text or "," in text:
+        return None
+    try:
+        return np.array(cells, dtype=object).astype(np.float64)
+    except ValueError:
+        return None
 
 
 @dataclasses.dataclass
 class Words:
-    """A column of few different words as it grows.
-
-    Attributes:
-        known: word to its code.
-    """
+    """A column of few different words as it grows; each ``known`` one has a code."""
 
     known: dict[str, int] = dataclasses.field(default_factory=dict)
     _pieces: list[NDArray[np.int32]] = dataclasses.field(default_factory=list)
 
     def add(self, cells: Cells) -> None:
         """Add the next piece of the column."""
-        if isinstance(cells, np.ndarray):
-            cells = ["" if cell != cell else f"{cell:.9g}" for cell in cells.tolist()]
         known = self.known
-        codes = [known.setdefault(cell, len(known)) for cell in cells]
+        codes = [known.setdefault(cell, len(known)) for cell in as_text(cells)]
         self._pieces.append(np.array(codes, dtype=np.int32))
 
     def codes(self) -> NDArray[np.int32]:
         """Return the code of each cell, shape (N,)."""
-        return np.concatenate(self._pieces) if self._pieces else np.zeros(0, dtype=np.int32)
+        return np.concatenate([np.zeros(0, dtype=np.int32), *self._pieces])
 
     def where(self, wanted: set[str]) -> NDArray[np.bool_]:
         """Return which cells hold one of some words, shape (N,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 from stiction_ros.intake.sheets.cells import BAD_WORDS, is_number
 from stiction_ros.intake.sheets.names import VALUE_NAMES, is_name, read_tag
 from stiction_ros.intake.sheets.stamps import is_stamp
+from stiction_ros.intake.words import pattern_of
 
 DELIMITERS = ("\t", ";", "|", ",")
 """In the order in which they are tried: commas and bars may stand inside cells."""
@@ -23,16 +25,8 @@ WHOLE = 0.6
 LOOKED_AT = 40
 """Lines at the top of a file that are looked at."""
 
-UNITS = re.compile(
-    r"%|0-1|0\.\.1|4-20 ?ma|other|pct\.?|percent|prozent|[-–]|none|ratio|share|frac(?:tion)?|"
-    r"s|sec|seconds?|ms|msec|milliseconds?|us|µs|ns|min|minutes?|h|hours?|days?|ma|v|bar[ag]?|mbar|k?pa[ag]?|mpa|psi[ag]?|"
-    r"°?[cfk]|deg ?[cfk]|[kmg]?g/[hs]|t/h|kg/h|l/(h|s|min)|m3/h|m³/h|n?m3/h|nm³/h|m|mm|cm|"
-    r"kg|g|l|m3|m³|rpm|ph|ppm|vol%|wt%|eu|unit|utc|datetime|yyyy.*|dd.*|mm.*|float\d*|double|string",
-    re.IGNORECASE,
-)
-"""What may stand in a row of units."""
-
-BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
+UNITS = pattern_of("units_row")
+_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,15 +38,13 @@ class Layout:
         given: names as they stand there.
         units: unit of each column, empty where not known.
         first: row of cells (not counting blank ones) at which data begin.
-        skipped: rows above the data that are neither header nor units.
         place: row of cells of the header.
     """
 
     header: tuple[str, ...]
     given: tuple[str, ...]
     units: tuple[str, ...]
-    first: int
-    skipped: int
+    first: int = 0
     place: int = 0
 
 
@@ -81,17 +73,13 @@ def spaced(line: str) -> list[str]:
 
 
 def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
-    """Return where header, units and data are.
-
-    Args:
-        rows: the first rows that are not blank, :data:`LOOKED_AT` at most.
-    """
+    """Return where header, units and data are by the first rows that are not blank."""
     first = _first_data(rows)
     above = list(rows[:first])
     told = bool(above and re.fullmatch(r"sep=.?", above[0][0].strip()))
     above = above[told:]
     if not above:
-        return Layout((), (), (), first, 0)
+        return Layout((), (), (), first)
     width = len(rows[first]) if first < len(rows) else max(map(len, above))
     place = _header_place(above, width)
     given = [" ".join(cell.split()) for cell in above[place]]
@@ -99,24 +87,21 @@ def layout_of(rows: Sequence[Sequence[str]]) -> Layout:
     for k in alike if len(alike) > 1 else ():  # their tags stand above them
         near = next((cell for cell in above[place - 1][k::-1] if cell.strip()), "")
         given[k] = " ".join(near.split()) if read_tag(near) else given[k]
+    layout = named_columns(given)
+    below = next(filter(_is_units, above[place + 1 :]), [])
+    pairs = itertools.zip_longest(layout.units, below[: len(given)], fillvalue="")
+    units = tuple(unit or cell.strip() for unit, cell in pairs)
+    return dataclasses.replace(layout, units=units, first=first, place=told + place)
+
+
+def named_columns(given: Sequence[str]) -> Layout:
+    """Return the layout of columns by their names alone, units in brackets cut off."""
     header, units = [], []
     for name in given:
-        found = BRACKETS.search(name)
-        bare = BRACKETS.sub("", name) if found else name
-        header.append(bare if bare else name)
+        found, bare = _BRACKETS.search(name), _BRACKETS.sub("", name)
+        header.append(bare or name)
         units.append(found[1].strip() if found and bare else "")
-    below = above[place + 1 :]
-    for row in list(below):
-        if _is_units(row):
-            units = [unit or cell.strip() for unit, cell in _paired(units, row)]
-            below.remove(row)
-            break
-    skipped = place + len(below)
-    return Layout(tuple(header), tuple(given), tuple(units), first, skipped, told + place)
-
-
-def _paired(units: Sequence[str], row: Sequence[str]) -> list[tuple[str, str]]:
-    return [(unit, row[k] if k < len(row) else "") for k, unit in enumerate(units)]
+    return Layout(tuple(header), tuple(given), tuple(units))
 
 
 def _first_data(rows: Sequence[Sequence[str]]) -> int:
@@ -135,19 +120,13 @@ def _first_data(rows: Sequence[Sequence[str]]) -> int:
 
 def _header_place(above: Sequence[Sequence[str]], width: int) -> int:
     """Return which row holds the names: the one with most of them known, else the fullest."""
-
-    def rank(place: int) -> tuple[int, int, int]:
-        row = above[place]
-        full = sum(bool(cell.strip()) for cell in row)
-        known = sum(is_name(BRACKETS.sub("", cell)) for cell in row)
-        return (known, min(full, width), -place)
-
-    return max(range(len(above)), key=rank)
+    ranks = []
+    for place, row in enumerate(above):
+        known = sum(is_name(_BRACKETS.sub("", cell)) for cell in row)
+        ranks.append((known, min(sum(bool(cell.strip()) for cell in row), width), -place))
+    return -max(ranks)[2]
 
 
 def _is_units(row: Sequence[str]) -> bool:
-    cells = [cell.strip().strip("[]()") for cell in row]
-    told = [cell for cell in cells if cell]
-    if not told or all(is_number(cell) for cell in told):
-        return False
-    return all(UNITS.fullmatch(cell) for cell in told)
+    told = [cell for cell in (cell.strip().strip("[]()") for cell in row) if cell]
+    return all(map(UNITS.fullmatch, told)) and not all(map(is_number, told))

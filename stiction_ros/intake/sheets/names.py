@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from stiction_ros.intake.words import WORDS, by_word, columns_named
+from stiction_ros.intake.words import WORDS, by_word
 
-SIGNAL_WORDS: Mapping[str, Sequence[str]] = WORDS["signals"]
-"""Last part of a tag, by signal."""
-
-TIME_NAMES, TAG_NAMES = columns_named("time"), columns_named("tag")
-VALUE_NAMES, UNIT_NAMES = columns_named("value"), columns_named("unit")
+TIME_NAMES, TAG_NAMES, VALUE_NAMES, UNIT_NAMES = (
+    tuple(WORDS["columns"][what]) for what in ("time", "tag", "value", "unit")
+)
 
 _QUALITIES = by_word("qualities")
+_KINDS = {word.replace(" ", ""): kind for word, kind in _QUALITIES.items()}
 _TELLING = re.compile(r"quality|qualit[äé]|qualitaet|validity|confidence|questionable")
 """Words that tell of a quality wherever they stand in a name."""
 
 SIGNALS: Mapping[str, str] = by_word("signals")
-"""Word to signal."""
+"""Last part of a tag to its signal."""
 
 OR_ROW = "(or a row for this file in --tags)"
 """What helps in one file where an option would hold for all."""
@@ -34,13 +33,7 @@ _TAG = re.compile(rf"(?i)(.+?)\s*(?:[._:/\\ -]|::)\s*({_WORDS})")
 
 
 class Tag(NamedTuple):
-    """What a name says.
-
-    Attributes:
-        loop: name of the loop; empty for a bare ``PV``.
-        signal: ``pv``, ``sp``, ``op``, ``stem`` or ``mode``.
-        quality: whether it is the quality of that signal.
-    """
+    """What a name says: a signal or its quality, of a loop; that is empty for a bare ``PV``."""
 
     loop: str
     signal: str
@@ -54,11 +47,7 @@ def read_tag(name: str) -> Tag | None:
     """
     bare = " ".join(name.split())
     quality = _QUALITY.search(bare)
-    if quality:
-        bare = bare[: quality.start()]
-    attribute = _ATTRIBUTE.search(bare)
-    if attribute:
-        bare = bare[: attribute.start()]
+    bare = _ATTRIBUTE.sub("", _QUALITY.sub("", bare))
     signal = SIGNALS.get(bare.casefold())
     if signal is not None:
         return Tag("", signal, quality is not None)
@@ -83,18 +72,19 @@ def without_quality(name: str) -> str:
 
 def quality_kind(name: str) -> str | None:
     """Return what a number in a column of qualities is, see ``words.yaml``; None for others."""
-    tag, whole = read_tag(name), " ".join(name.split())
+    tag, whole = read_tag(name), folded(name)
     told = _QUALITY.search(whole) if tag is not None and tag.quality else None
-    folded = re.sub(r"[\W_]|\d+\W*$", "", (told[1] if told else whole).casefold())
-    kind = next(
-        (kind for word, kind in _QUALITIES.items() if word.replace(" ", "") == folded), None
-    )
-    telling = _TELLING.search(folded)
-    return _QUALITIES.get(telling[0], "code") if kind is None and telling else kind
+    bare = re.sub(r"[\W_]|\d+\W*$", "", told[1] if told else whole)
+    telling = _TELLING.search(bare)
+    return _KINDS.get(bare, _QUALITIES.get(telling[0], "code") if telling else None)
+
+
+def folded(name: str) -> str:
+    """Return a name in small letters, with single spaces."""
+    return " ".join(name.split()).casefold()
 
 
 def is_name(name: str) -> bool:
     """Return whether a cell looks like the name of a column."""
-    folded = " ".join(name.split()).casefold()
     known = (*TIME_NAMES, *TAG_NAMES, *VALUE_NAMES, *UNIT_NAMES)
-    return folded in known or quality_kind(name) is not None or read_tag(name) is not None
+    return folded(name) in known or quality_kind(name) is not None or read_tag(name) is not None

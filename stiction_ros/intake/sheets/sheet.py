@@ -9,7 +9,6 @@ import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ from stiction_ros.intake.sheets.layout import (
     layout_of,
     spaced,
 )
-from stiction_ros.intake.sheets.names import OR_ROW
+from stiction_ros.intake.sheets.names import OR_ROW, folded
 from stiction_ros.intake.sheets.stamps import is_stamp
 
 PIECE = 200_000
@@ -34,16 +33,8 @@ PIECE = 200_000
 _POINT, _COMMA = re.compile(r"[+-]?\d+\.\d+"), re.compile(r"[+-]?\d+,\d+")
 
 
-class Piece(NamedTuple):
-    """Some rows of a table.
-
-    Attributes:
-        columns: cells of each column.
-        lines: line of each row in the file, shape (n,).
-    """
-
-    columns: Sequence[Cells]
-    lines: NDArray[np.int64]
+Piece = tuple[Sequence[Cells], NDArray[np.int64]]
+"""Some rows of a table: the cells of each column, and the line of each row, shape (n,)."""
 
 
 class Sheet(abc.ABC):
@@ -55,6 +46,7 @@ class Sheet(abc.ABC):
         layout: header, units, where data begin.
         decimal_comma: whether a comma alone in a number is the decimal one.
         header_once: whether no row of data may be taken for the header that returns.
+        row_word: what a row is called in errors.
     """
 
     path: Path
@@ -62,6 +54,7 @@ class Sheet(abc.ABC):
     layout: Layout
     decimal_comma: bool = False
     header_once: bool = False
+    row_word: str = "line"
 
     @property
     def mended(self) -> list[str]:
@@ -70,56 +63,37 @@ class Sheet(abc.ABC):
 
     @abc.abstractmethod
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
-        """Yield the rows of data.
-
-        Args:
-            rows: in each piece; None takes :data:`PIECE` cells.
+        """Yield the data, so many ``rows`` at a time; None takes :data:`PIECE` cells.
 
         Raises:
             InputError: the file is damaged.
         """
 
-    @property
-    def row_word(self) -> str:
-        """What a row is called in errors."""
-        return "line"
-
     def find(self, name: str) -> int | None:
-        """Return the index of the column ``name``, its exact case first; None if absent.
-
-        Raises:
-            InputError: it is there more than once.
-        """
+        """Return the index of the one column ``name``, exact case first; None if absent."""
         name = " ".join(name.split())
-        folded = name.casefold()
         for names in (self.layout.given, self.layout.header):
-            exact = [i for i, column in enumerate(names) if column == name]
-            found = exact or [i for i, column in enumerate(names) if column.casefold() == folded]
+            exact = [k for k, other in enumerate(names) if other == name]
+            found = exact or [k for k, other in enumerate(names) if folded(other) == folded(name)]
             if len(found) > 1:
                 raise InputError(
-                    f"column {name} is there {len(found)} times",
-                    where=str(self.path),
-                    fix="rename one of them",
+                    f"column {name} is there {len(found)} times", fix="rename one of them"
                 )
             if found:
                 return found[0]
         return None
 
     def column(self, name: str, option: str) -> int:
-        """Return the index of the column ``name``.
+        """Return the index of the column ``name``; raise an :class:`InputError` if absent."""
+        if (index := self.find(name)) is not None:
+            return index
+        fix = f"{self.columns_said}; choose with {option} {OR_ROW}"
+        raise InputError(f"has no column {name}", fix=fix)
 
-        Raises:
-            InputError: there is none; the columns that are there, and how to choose.
-        """
-        index = self.find(name)
-        if index is None:
-            raise InputError(
-                f"has no column {name}",
-                where=str(self.path),
-                fix=f"its columns are {', '.join(self.layout.given)}; choose with {option} "
-                f"{OR_ROW}",
-            )
-        return index
+    @property
+    def columns_said(self) -> str:
+        """What its columns are, for errors."""
+        return f"its columns are {', '.join(self.layout.given)}"
 
 
 Rows = Callable[[], contextlib.AbstractContextManager[Iterator[tuple[int, list[str]]]]]
@@ -127,13 +101,7 @@ Rows = Callable[[], contextlib.AbstractContextManager[Iterator[tuple[int, list[s
 
 
 class RowSheet(Sheet):
-    """A table of text cells, row by row.
-
-    Args:
-        path: of the file.
-        name: of the table.
-        rows: opens it.
-        delimiter: between the cells, empty for a workbook.
+    """A table of text cells, row by row, with a ``delimiter`` between them, empty for a workbook.
 
     Raises:
         InputError: it is empty, has no header, or more cells than names.
@@ -144,28 +112,25 @@ class RowSheet(Sheet):
         with rows() as opened:
             filled = (cells for _, cells in opened if any(cell.strip() for cell in cells))
             top = list(itertools.islice(filled, LOOKED_AT))
-        where = str(path)
         if not top:
-            raise InputError("is empty", where=where, fix="give a CSV file with a header")
+            raise InputError("is empty", fix="give a CSV file with a header")
         self.layout = layout_of(top)
         if not self.layout.header or all(is_number(cell) for cell in self.layout.header):
             names = (delimiter or ",").join(
                 ("OP", "PV") if len(top[0]) < 3 else ("t", "OP", "PV", "SP")[: len(top[0])]
             )
-            raise InputError(
-                "has no header, its first line is numbers",
-                where=where,
-                fix=f"put the names of the columns above them, such as {names!r}",
-            )
+            fix = f"put the names of the columns above them, such as {names!r}"
+            raise InputError("has no header, its first line is numbers", fix=fix)
         data = top[self.layout.first :]
         spare = [row for row in data if any(c.strip() for c in row[len(self.layout.header) :])]
         if data and len(spare) == len(data):
             raise InputError(
                 f"has {len(data[0])} cells under {len(self.layout.header)} names",
-                where=where,
                 fix="name every column; decimal commas need semicolons or tabs between the cells",
             )
-        self.decimal_comma = delimiter != "," or _commas(data)
+        quoted = [cell.strip() for row in data for cell in row]
+        commas = any(map(_COMMA.fullmatch, quoted)) and not any(map(_POINT.fullmatch, quoted))
+        self.decimal_comma = delimiter != "," or commas
         self._names = [_plain(cell) for cell in top[self.layout.place]]
         self._again: list[tuple[int, list[str]]] = []
 
@@ -182,7 +147,7 @@ class RowSheet(Sheet):
             while piece := list(itertools.islice(data, size)):
                 lines, cells = zip(*piece, strict=True)
                 padded = [row[:width] + [""] * (width - len(row)) for row in cells]
-                yield Piece(list(zip(*padded, strict=True)), np.array(lines))
+                yield list(zip(*padded, strict=True)), np.array(lines)
 
     def _by_name(self, rows: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
         """Yield rows without headers that return; behind one in another order cells by name."""
@@ -192,12 +157,11 @@ class RowSheet(Sheet):
         for line, cells in rows:
             if not names.isdisjoint(cells) and (given := self._header(cells)) is not None:
                 self._again.append((line, given))
-                same = given[: len(self._names)] == self._names
-                order = None if same else self._order(given)
-                continue
-            if order is not None:
-                cells = [cells[k] if k < len(cells) else "" for k in order]
-            yield line, cells
+                order = None if self._is_same(given) else self._order(given)
+            elif order is None:
+                yield line, cells
+            else:
+                yield line, [cells[k] if 0 <= k < len(cells) else "" for k in order]
 
     def _header(self, cells: Sequence[str]) -> list[str] | None:
         """Return the names in a row that is a header of mostly these columns; None for data."""
@@ -207,34 +171,30 @@ class RowSheet(Sheet):
         data = any(is_number(name) or is_stamp(name) for name in told)
         return None if self.header_once or data or known < max(2, 0.5 * len(told)) else given
 
-    def _order(self, given: list[str]) -> list[int]:
-        """Return where each column stands in rows under another header; their end for nowhere."""
-        left, found = list(given), []
-        for name in self._names:
-            found.append(left.index(name) if name and name in left else len(left) + 10**6)
-            if name and name in left:
-                left[left.index(name)] = ""
-        return found
+    def _is_same(self, given: Sequence[str]) -> bool:
+        return given[: len(self._names)] == self._names
+
+    def _order(self, given: Sequence[str]) -> list[int]:
+        """Return where each column stands in rows under another header; -1 for nowhere."""
+        at = {name: iter([k for k, other in enumerate(given) if other == name]) for name in given}
+        return [next(at[name], -1) if name in at and name else -1 for name in self._names]
 
     @property
     def mended(self) -> list[str]:
         told = []
-        same = [line for line, given in self._again if given[: len(self._names)] == self._names]
+        same = [line for line, given in self._again if self._is_same(given)]
         if same:
-            told.append(
-                f"the header stands again at {self.row_word} {same[0]}"
-                f"{f' and {len(same) - 1} times more' if len(same) > 1 else ''}, left out"
-            )
+            more = f" and {len(same) - 1} times more" if len(same) > 1 else ""
+            told.append(f"the header stands again at {self.row_word} {same[0]}{more}, left out")
         for line, given in self._again:
             if line in same:
                 continue
-            lost = [name for name in self._names if name and name not in given]
-            new = [name for name in given if name and name not in self._names]
+            lost = ",".join(name for name in self._names if name and name not in given)
+            new = ",".join(name for name in given if name and name not in self._names)
             told.append(
                 f"the header of {self.row_word} {line} has other columns or another order: what "
-                "follows is read by its names"
-                f"{f', without {chr(44).join(lost)}' if lost else ''}"
-                f"{f'; {chr(44).join(new)} is left out' if new else ''}"
+                f"follows is read by its names{f', without {lost}' if lost else ''}"
+                f"{f'; {new} is left out' if new else ''}"
             )
         return told
 
@@ -243,18 +203,8 @@ def _plain(cell: str) -> str:
     return " ".join(cell.replace("\ufeff", "").split())
 
 
-def _commas(rows: Sequence[Sequence[str]]) -> bool:
-    """Return whether quoted numbers have decimal commas: some have commas and none a point."""
-    cells = [cell.strip() for row in rows for cell in row]
-    return any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
-
-
 def text_sheet(path: Path) -> Sheet:
-    """Open a text file; comma, semicolon, tab, bar or white space between the cells.
-
-    Raises:
-        InputError: as :func:`stiction_ros.intake.sheets.text.open_text` and :class:`RowSheet`.
-    """
+    """Open a text file; comma, semicolon, tab, bar or white space between the cells."""
     with text.open_text(path) as opened:
         lines = [line for line in itertools.islice(opened, LOOKED_AT) if line.strip()]
     delimiter = delimiter_of(lines)
@@ -269,9 +219,7 @@ def text_sheet(path: Path) -> Sheet:
             try:
                 yield ((reader.line_num, cells) for cells in reader)
             except csv.Error as error:
-                raise InputError(
-                    f"line {reader.line_num} is no CSV ({error})", where=str(path)
-                ) from None
+                raise InputError(f"line {reader.line_num} is no CSV ({error})") from None
 
     return RowSheet(path, stem(path), rows, delimiter)
 

@@ -9,7 +9,7 @@ import functools
 import re
 import unicodedata
 import zoneinfo
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,14 +32,7 @@ class _No(enum.IntEnum):
     STRANGE = -2
 
 
-_MONTHS: Mapping[str, int] = by_word("months")
-"""Names of the months in several languages, without accents."""
-
-_OFFSETS: Mapping[str, str] = by_word("zones")
-"""Zones by their names, of which each is one alone."""
-
-_HALVES: Mapping[str, str] = by_word("half_days")
-"""Words for the halves of a day, without points and spaces."""
+_MONTHS, _OFFSETS, _HALVES = by_word("months"), by_word("zones"), by_word("half_days")
 
 _SEP = r"(?:\.?[./-]|\.?,?\s+(?:del?\s+)?)"
 _DATE = re.compile(
@@ -66,37 +59,46 @@ class DateOrder(enum.StrEnum):
     MONTH = "mdy"
 
 
+class Clock(NamedTuple):
+    """What times are counted from.
+
+    Attributes:
+        start: the first time; seconds since 1970 in UTC for dates, else as given.
+        dated: whether it is a date.
+        zoned: whether its zone is known.
+        zone: whose local time it is, where that is not yet brought to UTC; else empty.
+        daily: whether it counts from midnight each day.
+    """
+
+    start: float
+    dated: bool = False
+    zoned: bool = False
+    zone: str = ""
+    daily: bool = False
+
+
 class Times(NamedTuple):
     """A column of times.
 
     Attributes:
         seconds: since the first that is one, shape (N,); NaN where the cell is empty, infinite
             where it is not understood.
-        start: the first one; seconds since 1970 in UTC for dates, else as given.
-        dated: whether they are dates.
-        zoned: whether they bear a zone.
+        clock: that they are counted on.
         wrong: first cell that is not understood, else the first empty one.
         note: how they were read, empty for the usual way.
-        zone: whose local time they are, where that is not yet brought to UTC; else empty.
-        daily: whether they are times of the day alone.
     """
 
     seconds: FloatArray
-    start: float
-    dated: bool
-    zoned: bool
-    wrong: Wrong | None
+    clock: Clock
+    wrong: Wrong | None = None
     note: str = ""
-    zone: str = ""
-    daily: bool = False
 
 
-class _Parts(NamedTuple):
-    """A date; ``asked`` where day and month may be the other way round."""
+class _Date(NamedTuple):
+    """Day since 1970 of a date in each order, None where it is none; whether they may differ."""
 
-    year: int
-    day: int
-    month: int
+    dmy: int | None
+    mdy: int | None
     asked: bool = False
 
 
@@ -104,20 +106,16 @@ class _Parts(NamedTuple):
 class Stamps:
     """A column of times as it grows; most cells of its first piece tell whether it is numbers.
 
-    Attributes:
-        decimal_comma: of numbers.
-        order: of days and months, None to find out.
+    The ``order`` of days and months may be said; None finds out.
     """
 
     decimal_comma: bool = False
     order: DateOrder | None = None
     _numbers: Numbers | None = None
     _dates: dict[str, int] = dataclasses.field(default_factory=lambda: {"": 0, "1970-01-01": 1})
-    _parts: list[_Parts] = dataclasses.field(default_factory=lambda: 2 * [_Parts(1970, 1, 1)])
+    _days: list[_Date] = dataclasses.field(default_factory=lambda: 2 * [_Date(0, 0)])
     _zones: dict[str, int] = dataclasses.field(default_factory=lambda: {"": 0})
-    _days: list[NDArray[np.int32]] = dataclasses.field(default_factory=list)
-    _clocks: list[NDArray[np.int64]] = dataclasses.field(default_factory=list)
-    _of: list[NDArray[np.int16]] = dataclasses.field(default_factory=list)
+    _pieces: list[tuple[NDArray[np.int64], ...]] = dataclasses.field(default_factory=list)
     _firsts: dict[int, Wrong] = dataclasses.field(default_factory=dict)
     _told: bool = False
     _rows: int = 0
@@ -136,7 +134,7 @@ class Stamps:
             self._other(cells)
         self._rows += len(cells)
 
-    def times(self, where: str) -> Times:
+    def times(self) -> Times:
         """Return the whole column.
 
         Raises:
@@ -152,24 +150,23 @@ class Stamps:
             values = np.where(strange, np.inf, read)
             first = float(values[np.argmax(np.isfinite(values))]) if len(values) else 0.0
             first = first if np.isfinite(first) else 0.0
-            return Times(values - first, first, False, False, self._wrong(values))
-        days, clocks = np.concatenate(self._days), np.concatenate(self._clocks)
-        of = np.concatenate(self._of)
+            return Times(values - first, Clock(first), self._wrong(values))
+        days, clocks, of = map(np.concatenate, zip(*self._pieces, strict=True))
         daily = not (days > 0).any()
         if not daily:  # a time of the day alone is no stamp among dates
             days[days == 0] = _No.STRANGE
             lone = [self._firsts.pop(day) for day in (0, _No.STRANGE) if day in self._firsts]
             self._firsts.update({_No.STRANGE: min(lone)} if lone else {})
-        numbered, note = self._day_numbers(days, clocks, where)
+        numbered, note = self._day_numbers(days, clocks)
         there = days >= 0
-        offsets, zone = self._offsets(of[there], where)
+        offsets, zone = self._offsets(of[there])
         stamps = DAY * numbered[days] + clocks - offsets[of]
         first = int(stamps[np.argmax(there)]) if there.any() else 0
         seconds = (stamps - first) / 1e6
         seconds[days == _No.EMPTY], seconds[days == _No.STRANGE] = np.nan, np.inf
         zoned = not zone and bool(of[there].any())
-        wrong = self._wrong(seconds)
-        return Times(seconds, first / 1e6, not daily, zoned, wrong, note, zone, daily)
+        clock = Clock(first / 1e6, not daily, zoned, zone, daily)
+        return Times(seconds, clock, self._wrong(seconds), note)
 
     def _is_numbers(self, cells: Sequence[str]) -> bool:
         if self._told:
@@ -202,9 +199,8 @@ class Stamps:
         return True
 
     def _other(self, cells: Sequence[str]) -> None:
-        days = np.full(len(cells), _No.EMPTY, dtype=np.int32)
-        clocks = np.zeros(len(cells), dtype=np.int64)
-        zones = np.zeros(len(cells), dtype=np.int16)
+        days = np.full(len(cells), _No.EMPTY, dtype=np.int64)
+        clocks, zones = np.zeros((2, len(cells)), dtype=np.int64)
         known: dict[str, tuple[int, str] | None] = {}
         for row, given in enumerate(cells):
             cell = given.strip()
@@ -224,55 +220,49 @@ class Stamps:
         self._keep(days, clocks, zones)
 
     def _keep(self, days: Any, clocks: NDArray[np.int64], zones: Any) -> None:
-        self._days.append(np.array(np.broadcast_to(days, clocks.shape), dtype=np.int32))
-        self._clocks.append(clocks)
-        self._of.append(np.array(np.broadcast_to(zones, clocks.shape), dtype=np.int16))
+        self._pieces.append(tuple(np.broadcast_arrays(days, clocks, zones)))
 
     def _new(self, date: str) -> int:
         """Return the place of a date that was not there yet; of none ``STRANGE``."""
-        parts = _parts(date)
-        self._dates[date] = _No.STRANGE if parts is None else len(self._parts)
-        self._parts += [] if parts is None else [parts]
+        read = _date(date)
+        self._dates[date] = _No.STRANGE if read is None else len(self._days)
+        self._days += [] if read is None else [read]
         return self._dates[date]
 
     def _day_numbers(
-        self, days: NDArray[np.int32], clocks: NDArray[np.int64], where: str
+        self, days: NDArray[np.int64], clocks: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], str]:
         """Return the day since 1970 of each date, and how they were read."""
         orders = [self.order] if self.order else list(DateOrder)
-        every = {order: [_day(parts, order) for parts in self._parts] for order in orders}
+        every = {order: [getattr(date, order) for date in self._days] for order in orders}
         found = {o: np.array(read) for o, read in every.items() if None not in read}
-        asked = [
-            text for text, place in self._dates.items() if place > 1 and self._parts[place].asked
-        ]
+        asked = [text for text, at in self._dates.items() if at > 1 and self._days[at].asked]
         if not found:
             texts = {place: text for text, place in self._dates.items()}
             none = dict.fromkeys(texts[read.index(None)] for read in every.values())
             raise InputError(
-                f"{' and '.join(none)} are not dates in one order of days and months", where=where,
+                f"{' and '.join(none)} are not dates in one order of days and months",
                 fix="export ISO stamps such as 2024-10-17 21:55:00",
-            )  # fmt: skip
+            )
         if len(found) > 1:
             found = _steadier(found, days, clocks)
         if len({tuple(read) for read in found.values()}) > 1:
             raise InputError(
                 f"{asked[0]} may begin with the day or with the month",
-                where=where,
                 fix=f"say which with --dates dmy or --dates mdy {OR_ROW}",
             )
         order, read = next(iter(found.items()))
         first = "day" if order is DateOrder.DAY else "month"
         return read, "" if self.order or not asked else f"dates are read with the {first} first"
 
-    def _offsets(self, of: NDArray[np.int16], where: str) -> tuple[NDArray[np.int64], str]:
+    def _offsets(self, of: NDArray[np.int64]) -> tuple[NDArray[np.int64], str]:
         """Return the µs that each zone is before UTC, and the one whose local time all are."""
         used = [text for text, place in self._zones.items() if (of == place).any()]
-        read = {text: _zone(text, where) for text in used}
+        read = {text: _zone(text) for text in used}
         named = {text: zone for text, zone in read.items() if isinstance(zone, str)}
         if len(used) > 1 and ("" in used or (named and len(set(read.values())) > 1)):
             raise InputError(
                 f"stamps bear several zones: {' and '.join(text or 'none' for text in used[:2])}",
-                where=where,
                 fix="export all of them in one, such as UTC",
             )
         offsets = np.zeros(len(self._zones), dtype=np.int64)
@@ -291,7 +281,7 @@ class Stamps:
 def is_stamp(cell: str) -> bool:
     """Return whether a cell is a date or a time of the day."""
     date, clock = _cut(cell.strip())
-    known = bool(date and _parts(date)) or (not date and ":" in clock)
+    known = bool(date and _date(date)) or (not date and ":" in clock)
     return known and _clock(clock) is not None
 
 
@@ -321,12 +311,8 @@ def _clock(text: str) -> tuple[int, str] | None:
     return 1_000_000 * (3600 * hours + 60 * minutes + seconds) + micros, found[6] or ""
 
 
-def _zone(text: str, where: str) -> int | str:
-    """Return how many microseconds a zone is before UTC, or its name where that changes.
-
-    Raises:
-        InputError: it is not known.
-    """
+def _zone(text: str) -> int | str:
+    """Return how many microseconds a zone is before UTC, or its name where that changes."""
     name = text.strip("[]() ")
     offset = _OFFSET.match(_OFFSETS.get(name.upper(), name or "+0"))
     if offset is not None:
@@ -337,30 +323,27 @@ def _zone(text: str, where: str) -> int | str:
     except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
         raise InputError(
             f"zone {name} of the stamps is unknown, or the name of several",
-            where=where,
             fix="write its offset, such as +02:00, or a name such as Europe/Berlin",
         ) from None
 
 
-def _parts(date: str) -> _Parts | None:
-    """Return the parts of a date; None when it is none."""
+def _date(date: str) -> _Date | None:
+    """Return what a date is; None when it is none."""
     found = _DATE.fullmatch(date)
     if found is None:
         return None
     a, mark, b, c = found.group(4, 5, 6, 7)
     if b.isdigit() and not a.isdigit():
         a, b = b, a
-    if len(a) > 2:
-        a, c = c, a
-    elif len(c) not in (2, 4):
+    a, c = (c, a) if len(a) > 2 else (a, c)
+    if len(c) not in (2, 4) or len(a) > 2 or not (a.isdigit() and c.isdigit()):
         return None
     month = int(b) if b.isdigit() else _month(b)
-    if len(c) == 3 or len(a) > 2 or not a.isdigit():
-        return None
     year = int(c) + (0 if len(c) > 2 else 2000 if int(c) < 70 else 1900)
     asked = b.isdigit() and len(found[4]) < 3 and not mark.startswith(".")
-    parts = _Parts(year, int(a), month, asked)
-    return parts if any(_day(parts, order) is not None for order in DateOrder) else None
+    first = _day(year, month, int(a))
+    other = _day(year, int(a), month) if asked else first
+    return None if first is None and other is None else _Date(first, other, asked)
 
 
 @functools.cache
@@ -372,26 +355,22 @@ def _month(word: str) -> int:
     return found.pop() if len(found) == 1 else 0
 
 
-def _day(parts: _Parts, order: DateOrder) -> int | None:
-    """Return the day since 1970 of a date in one order; None when it is none."""
-    day, month = parts.day, parts.month
-    if parts.asked and order is DateOrder.MONTH:
-        day, month = month, day
+def _day(year: int, month: int, day: int) -> int | None:
+    """Return the day since 1970; None when there is none."""
     try:
-        return (datetime.date(parts.year, month, day) - datetime.date(1970, 1, 1)).days
+        return (datetime.date(year, month, day) - datetime.date(1970, 1, 1)).days
     except ValueError:
         return None
 
 
 def _steadier(
-    found: dict[DateOrder, NDArray[np.int64]], days: NDArray[np.int32], clocks: NDArray[np.int64]
+    found: dict[DateOrder, NDArray[np.int64]], days: NDArray[np.int64], clocks: NDArray[np.int64]
 ) -> dict[DateOrder, NDArray[np.int64]]:
     """Return the one order in which time goes on evenly; all when that does not tell."""
     there = days >= 0
-    longest = {}
-    for order, read in found.items():
-        steps = np.abs(np.diff(DAY * read[days[there]] + clocks[there]))
-        longest[order] = int(steps.max()) if len(steps) else 0
+    longest = {
+        order: int(np.max(np.abs(np.diff(DAY * read[days[there]] + clocks[there])), initial=0))
+        for order, read in found.items()
+    }
     best = min(longest, key=lambda order: longest[order])
-    worst = max(longest.values())
-    return {best: found[best]} if 3 * longest[best] < worst else found
+    return {best: found[best]} if 3 * longest[best] < max(longest.values()) else found

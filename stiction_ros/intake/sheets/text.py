@@ -9,15 +9,29 @@ import io
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, cast
 
 import zstandard
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.storage.packed import ZSTD, unpacked
 
-GZIP, ZIP, OLD_EXCEL = b"\x1f\x8b", b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
-PARQUET, MARKUP = b"PAR1", (b"<htm", b"<HTM", b"<?xm", b"<!DO", b"<!do", b"<tab", b"<TAB")
+GZIP, ZIP, PARQUET = b"\x1f\x8b", b"PK\x03\x04", b"PAR1"
+
+REFUSED = (
+    (ZIP, "is a zip archive", "unpack it"),
+    (
+        (b"<htm", b"<HTM", b"<?xm", b"<!DO", b"<!do", b"<tab", b"<TAB"),
+        "is a page or XML, no table of text",
+        "open it in a spreadsheet program and save it as .xlsx or CSV",
+    ),
+    (
+        b"\xd0\xcf\x11\xe0",
+        "is an Excel workbook of the old kind, or one with a password",
+        "save it as .xlsx without a password, or as CSV",
+    ),
+)
+"""First bytes of files that are no text, what these are, and what helps."""
 
 HEAD = 4096
 """Bytes by which the encoding is told."""
@@ -40,19 +54,14 @@ codecs.register_error("stiction_western", _as_western)
 
 
 def magic(path: Path) -> bytes:
-    """Return the first bytes of a file.
-
-    Raises:
-        InputError: no such file, or it cannot be read.
-    """
-    where = str(path)
+    """Return the first bytes of a file; one that cannot be read is an :class:`InputError`."""
     try:
         with path.open("rb") as file:
             return file.read(4)
     except FileNotFoundError:
-        raise InputError("no such file", where=where, fix="check the path") from None
+        raise InputError("no such file", fix="check the path") from None
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", where=where) from None
+        raise InputError(f"cannot be read ({error.strerror})") from None
 
 
 @contextlib.contextmanager
@@ -66,45 +75,27 @@ def open_text(path: Path) -> Iterator[io.TextIOBase]:
         InputError: no such file, no text, an archive, or packed data that is cut off, also
             while it is read.
     """
-    where = str(path)
     first = magic(path)
-    if first.startswith(ZIP):
-        raise InputError("is a zip archive", where=where, fix="unpack it")
-    if first.startswith(MARKUP):
-        raise InputError(
-            "is a page or XML, no table of text",
-            where=where,
-            fix="open it in a spreadsheet program and save it as .xlsx or CSV",
-        )
-    if first.startswith(OLD_EXCEL):
-        raise InputError(
-            "is an Excel workbook of the old kind, or one with a password",
-            where=where,
-            fix="save it as .xlsx without a password, or as CSV",
-        )
+    for start, what, fix in REFUSED:
+        if first.startswith(start):
+            raise InputError(what, fix=fix)
     try:
-        with contextlib.ExitStack() as stack:
-            data = stack.enter_context(_unpacked(path, first))
-            buffered = io.BufferedReader(cast(io.RawIOBase, data), 1 << 20)
-            encoding = _encoding(buffered.peek(HEAD)[:HEAD], where)
-            text = io.TextIOWrapper(
+        with _unpacked(path, first) as data:
+            buffered = io.BufferedReader(data, 1 << 20)
+            encoding = _encoding(buffered.peek(HEAD)[:HEAD])
+            yield io.TextIOWrapper(
                 buffered, encoding=encoding, errors="stiction_western", newline=""
             )
-            yield text
+    except (EOFError, zlib.error, zstandard.ZstdError, gzip.BadGzipFile):
+        raise InputError("is cut off or damaged", fix="pack or copy it anew") from None
     except OSError as error:
-        if isinstance(error, gzip.BadGzipFile):
-            raise _damaged(where) from None
-        raise InputError(f"cannot be read ({error.strerror or error})", where=where) from None
-    except (EOFError, zlib.error, zstandard.ZstdError):
-        raise _damaged(where) from None
+        raise InputError(f"cannot be read ({error.strerror or error})") from None
 
 
-def _unpacked(path: Path, first: bytes) -> BinaryIO:
+def _unpacked(path: Path, first: bytes) -> io.RawIOBase:
     if first.startswith(GZIP):
-        return cast(BinaryIO, gzip.open(path, "rb"))
-    if first.startswith(ZSTD):
-        return cast(BinaryIO, _Zstd(path))
-    return path.open("rb")
+        return cast(io.RawIOBase, gzip.open(path, "rb"))
+    return _Zstd(path) if first.startswith(ZSTD) else path.open("rb", buffering=0)
 
 
 class _Zstd(io.RawIOBase):
@@ -120,10 +111,8 @@ class _Zstd(io.RawIOBase):
     def readinto(self, buffer: Any) -> int:
         while not self.ready and (block := next(self.blocks, None)) is not None:
             self.ready = block
-        view = memoryview(buffer)
-        count = min(len(view), len(self.ready))
-        view[:count] = self.ready[:count]
-        self.ready = self.ready[count:]
+        count = min(len(buffer), len(self.ready))
+        buffer[:count], self.ready = self.ready[:count], self.ready[count:]
         return count
 
     def close(self) -> None:
@@ -131,21 +120,16 @@ class _Zstd(io.RawIOBase):
         super().close()
 
 
-def _encoding(head: bytes, where: str) -> str:
+def _encoding(head: bytes) -> str:
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
-    if b"\0" in head and len(head) < SHORTEST:
-        raise InputError("is no text", where=where, fix="save it as CSV in UTF-8")
-    if b"\0" in head:
-        pairs = max(len(head) // 2, 1)
+    if b"\0" not in head:
+        return "utf-8-sig"
+    pairs = len(head) // 2
+    if len(head) >= SHORTEST:
         even, odd = head[0::2].count(0) / pairs, head[1::2].count(0) / pairs
         if odd > NULLS and even < 0.1 * odd:
             return "utf-16-le"
         if even > NULLS and odd < 0.1 * even:
             return "utf-16-be"
-        raise InputError("is no text", where=where, fix="save it as CSV in UTF-8")
-    return "utf-8-sig"
-
-
-def _damaged(where: str) -> InputError:
-    return InputError("is cut off or damaged", where=where, fix="pack or copy it anew")
+    raise InputError("is no text", fix="save it as CSV in UTF-8")

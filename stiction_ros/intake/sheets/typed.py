@@ -9,7 +9,7 @@ import re
 import warnings
 import weakref
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from stiction_ros.errors import InputError
 from stiction_ros.intake.sheets import text
 from stiction_ros.intake.sheets.cells import Cells
-from stiction_ros.intake.sheets.layout import BRACKETS, Layout
+from stiction_ros.intake.sheets.layout import named_columns
 from stiction_ros.intake.sheets.sheet import PIECE, Piece, RowSheet, Sheet, stem, text_sheet
 
 INSTALL = "install the extra: pip install 'stiction_ros[survey]'"
@@ -29,7 +29,7 @@ UNSTORED = re.compile(
 """A cell with a formula and no value."""
 
 
-def open_sheets(path: Path) -> list[Sheet]:
+def open_sheets(path: Path) -> Sequence[Sheet]:
     """Open the tables of a file, whatever kind it is; a workbook may hold several.
 
     Raises:
@@ -44,29 +44,20 @@ def open_sheets(path: Path) -> list[Sheet]:
 
 
 class ParquetSheet(Sheet):
-    """A Parquet file; numbers and stamps come as they are.
+    """A Parquet file; numbers and stamps come as they are."""
 
-    Raises:
-        InputError: pyarrow is missing, or the file is damaged.
-    """
+    row_word = "row"
 
     def __init__(self, path: Path) -> None:
         try:
             import pyarrow as arrow
             import pyarrow.parquet as parquet
         except ImportError:
-            raise InputError("needs pyarrow", where=str(path), fix=INSTALL) from None
+            raise InputError("needs pyarrow", fix=INSTALL) from None
         self.path, self.name, self._arrow, self._parquet = path, stem(path), arrow, parquet
         with self._open() as file:
-            names = tuple(" ".join(str(name).split()) for name in file.schema_arrow.names)
-        bare = tuple(BRACKETS.sub("", name) or name for name in names)
-        found = [BRACKETS.search(name) for name in names]
-        units = tuple(hit[1].strip() if hit else "" for hit in found)
-        self.layout = Layout(bare, names, units, 0, 0)
-
-    @property
-    def row_word(self) -> str:
-        return "row"
+            names = [" ".join(str(name).split()) for name in file.schema_arrow.names]
+        self.layout = named_columns(names)
 
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
         size = rows or max(PIECE // max(len(self.layout.header), 1), 256)
@@ -74,7 +65,7 @@ class ParquetSheet(Sheet):
         with self._open() as file:
             for batch in file.iter_batches(batch_size=size):
                 columns = [self._cells(column) for column in batch.columns]
-                yield Piece(columns, np.arange(first, first + batch.num_rows))
+                yield columns, np.arange(first, first + batch.num_rows)
                 first += batch.num_rows
 
     def _cells(self, column: Any) -> Cells:
@@ -95,8 +86,7 @@ class ParquetSheet(Sheet):
             with self._parquet.ParquetFile(self.path) as file:
                 yield file
         except (self._arrow.ArrowException, OSError) as error:
-            said = str(error).splitlines()[0][:80]
-            raise InputError(f"cannot be read ({said})", where=str(self.path)) from None
+            raise InputError(f"cannot be read ({str(error).splitlines()[0][:80]})") from None
 
 
 class _Book:
@@ -106,7 +96,7 @@ class _Book:
         try:
             import openpyxl
         except ImportError:
-            raise InputError("needs openpyxl", where=str(path), fix=INSTALL) from None
+            raise InputError("needs openpyxl", fix=INSTALL) from None
         self.path = path
         with self.damage_told(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and the like, which are not read
@@ -124,9 +114,8 @@ class _Book:
         except (zipfile.BadZipFile, KeyError, OSError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(
-                f"is no workbook ({error})", where=str(self.path), fix="save it as .xlsx or CSV"
-            ) from None
+            fix = "save it as .xlsx or CSV"
+            raise InputError(f"is no workbook ({error})", fix=fix) from None
 
     @contextlib.contextmanager
     def rows(self, title: str) -> Iterator[Iterator[tuple[int, list[str]]]]:
@@ -138,11 +127,7 @@ class _Book:
             )
 
     def refuse_unstored(self, title: str) -> None:
-        """Raise where a cell at the top has a formula and no value.
-
-        Raises:
-            InputError: it has, as programs that write workbooks leave it.
-        """
+        """Raise where a cell has a formula and no value, as programs leave it that write them."""
         with (
             self.damage_told(),
             zipfile.ZipFile(self.path) as archive,
@@ -152,7 +137,6 @@ class _Book:
         if found:
             raise InputError(
                 f"cell {found[1].decode()} of {title} is a formula without its value",
-                where=str(self.path),
                 fix="open it in a spreadsheet program and save it, as CSV or as .xlsx",
             )
 
@@ -167,23 +151,21 @@ def _holds_workbook(path: Path) -> bool:
     return inner or path.suffix.lower() in (".xlsx", ".xlsm")
 
 
-def _workbook(path: Path) -> list[Sheet]:
-    book = _Book(path)
-    titles = [sheet.title for sheet in book.book.worksheets]
-    found: list[Sheet] = []
-    refused: list[InputError] = []
-    for title in titles:
+def _workbook(path: Path) -> Sequence[Sheet]:
+    book, found = _Book(path), []
+    refused = InputError("has no sheet")
+    for title in reversed([sheet.title for sheet in book.book.worksheets]):
         try:
             book.refuse_unstored(title)
             rows = functools.partial(book.rows, title)
             found.append(RowSheet(path, f"{stem(path)}:{title}", rows, ""))
         except InputError as error:
-            refused.append(error)
+            refused = error
     if not found:
-        raise refused[0] if refused else InputError("has no sheet", where=str(path))
+        raise refused
     if len(found) == 1:
         found[0].name = stem(path)
-    return found
+    return found[::-1]
 
 
 def _text(value: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,39 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.intake.sheets.cells import Wrong
+from stiction_ros.intake.sheets.names import Tag
+from stiction_ros.intake.sheets.stamps import Clock, Times
 from stiction_ros.records.quality import QualityArray
 
 FlagArray = NDArray[np.bool_]
 
 
 class Key(NamedTuple):
-    """One signal of a loop.
-
-    Attributes:
-        signal: ``op``, ``pv``, ``sp``, ``stem`` or ``mode``.
-        tag: of its valve or output.
-    """
+    """One signal of a loop, ``op``, ``pv``, ``sp``, ``stem`` or ``mode``, of a valve or output."""
 
     signal: str
     tag: str
 
-
-class Clock(NamedTuple):
-    """What times are counted from.
-
-    Attributes:
-        start: the first time, seconds since 1970 in UTC when it is dated.
-        dated: whether it is a date.
-        zoned: whether its zone is known.
-        zone: whose local time it is, where that is not yet brought to UTC; else empty.
-        daily: whether it counts from midnight each day.
-    """
-
-    start: float
-    dated: bool
-    zoned: bool
-    zone: str = ""
-    daily: bool = False
+    @classmethod
+    def of(cls, tag: Tag) -> Key:
+        """Return the key of what a name says; a mode is of the whole loop."""
+        return cls(tag.signal, "" if tag.signal == "mode" else tag.loop)
 
 
 @dataclasses.dataclass
@@ -55,8 +40,7 @@ class Column:
         name: of its column or tag.
         values: shape (N,), NaN where there is no number; codes of words for a mode.
         blank: where nothing stood, shape (N,).
-        said: what the first cell that is no number is, empty for none.
-        row: of that cell.
+        wrong: the first cell that is no number.
         words: what stood in the place of numbers, with its count.
         unit: as the export says, empty when it does not.
         known: words of a mode, by their codes.
@@ -65,8 +49,7 @@ class Column:
     name: str
     values: FloatArray
     blank: FlagArray
-    said: str = ""
-    row: int = 0
+    wrong: Wrong | None = None
     words: Counter[str] = dataclasses.field(default_factory=Counter)
     unit: str = ""
     known: tuple[str, ...] = ()
@@ -98,15 +81,29 @@ class Block:
     clock: Clock
     time: FloatArray
     lines: NDArray[np.int64]
-    columns: Mapping[Key, Column]
+    columns: dict[Key, Column]
     mask: QualityArray | None = None
     notes: tuple[str, ...] = ()
     stray: str = ""
     mended: tuple[str, ...] = ()
 
-    def tags(self, signal: str) -> tuple[str, ...]:
-        """Return the tags of a signal, in their order."""
-        return tuple(key.tag for key in self.columns if key.signal == signal)
+    def of(self, *signals: str) -> dict[Key, Column]:
+        """Return the columns of some signals, in their order."""
+        return {key: column for key, column in self.columns.items() if key.signal in signals}
+
+    @property
+    def measured(self) -> dict[Key, Column]:
+        """The columns of all signals but the mode."""
+        return self.of("op", "pv", "sp", "stem")
+
+    def with_columns(self, columns: Mapping[Key, Column]) -> Block:
+        """Return the block with other columns in the place of those of the same signals."""
+        return dataclasses.replace(self, columns={**self.columns, **columns})
+
+    def has_times(self, times: Times) -> bool:
+        """Return whether its times are the given ones."""
+        alike = np.array_equal(self.time, times.seconds, equal_nan=True)
+        return self.clock == times.clock and alike
 
     def rows(self, chosen: NDArray[np.intp] | FlagArray) -> Block:
         """Return some of its rows."""
@@ -118,12 +115,16 @@ class Block:
             mask=None if self.mask is None else self.mask[chosen],
         )
 
+    def own_mask(self) -> QualityArray:
+        """Return the quality of each row, good where the file does not say it, to be changed."""
+        return np.zeros(len(self.time), dtype=np.uint8) if self.mask is None else self.mask.copy()
+
     def place(self, row: int) -> str:
         """Name a row for errors."""
         return f"{self.row_word} {self.lines[row]}"
 
 
-def joined(blocks: list[Block]) -> tuple[Block, dict[str, int]]:
+def joined(blocks: Sequence[Block]) -> tuple[Block, dict[str, int]]:
     """Return blocks of one loop on one clock: every stamp that one of them has is a row.
 
     Where two blocks give one signal at one stamp the later block counts; how often they differ
@@ -133,45 +134,25 @@ def joined(blocks: list[Block]) -> tuple[Block, dict[str, int]]:
         return blocks[0], {}
     differing: Counter[str] = Counter()
     start = min(block.clock.start for block in blocks)
-    moved = [block.time + (block.clock.start - start) for block in blocks]
-    everything = np.concatenate(moved)
-    axis = np.unique(np.round(everything[np.isfinite(everything)], 6))
+    moved = [np.round(block.time + (block.clock.start - start), 6) for block in blocks]
+    axis = np.unique(np.concatenate(moved))
     columns: dict[Key, Column] = {}
     for block, time in zip(blocks, moved, strict=True):
-        there = np.isfinite(time)
-        at = np.searchsorted(axis, np.round(time[there], 6))
         for key, column in block.columns.items():
             into = columns.get(key)
             if into is None:
-                into = dataclasses.replace(
-                    column,
-                    values=np.full(len(axis), np.nan),
-                    blank=np.ones(len(axis), dtype=np.bool_),
-                    words=Counter(),
-                    known=(),
-                )
-            given, known = column.values[there], into.known
-            if column.known:
-                known = tuple(dict.fromkeys((*known, *column.known)))
+                values, blank = np.full(len(axis), np.nan), np.ones(len(axis), dtype=np.bool_)
+                into = Column(column.name, values, blank, unit=column.unit)
+            known = tuple(dict.fromkeys((*into.known, *column.known)))
+            full = ~column.blank
+            rows, given = np.searchsorted(axis, time[full]), column.values[full]
+            if known:
                 codes = np.array([known.index(word) for word in column.known], dtype=np.float64)
                 given = codes[given.astype(np.intp)]
-            full = ~column.blank[there]
-            rows, given = at[full], given[full]
-            told, same = ~into.blank[rows], into.values[rows] == given
-            same |= np.isnan(into.values[rows]) & np.isnan(given)
-            differing[column.name] += int(np.count_nonzero(told & ~same))
+            old = into.values[rows]
+            same = into.blank[rows] | (old == given) | (np.isnan(old) & np.isnan(given))
+            differing[column.name] += int(np.count_nonzero(~same))
             into.values[rows], into.blank[rows] = given, False
-            columns[key] = dataclasses.replace(
-                into, known=known, words=into.words + column.words, said=into.said or column.said
-            )
-    whole = Block(
-        path=blocks[0].path,
-        row_word="sample",
-        clock=blocks[0].clock._replace(start=start),
-        time=axis,
-        lines=np.arange(len(axis)),
-        columns=columns,
-        notes=tuple(dict.fromkeys(note for block in blocks for note in block.notes)),
-        stray=next((block.stray for block in blocks if block.stray), ""),
-    )
-    return whole, dict(+differing)
+            columns[key] = dataclasses.replace(into, known=known, words=into.words + column.words)
+    clock, lines = blocks[0].clock._replace(start=start), np.arange(len(axis))
+    return Block(blocks[0].path, "sample", clock, axis, lines, columns), dict(+differing)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import SECONDS, IntakeOptions, TimeUnit, known_time_unit
+from stiction_ros.intake.sheets.cells import Cells
 from stiction_ros.intake.sheets.names import OR_ROW, TIME_NAMES
 from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.sheets.stamps import Times, is_stamp
-from stiction_ros.intake.tables.block import Clock
+from stiction_ros.intake.sheets.stamps import Clock, Times, is_stamp
+from stiction_ros.records.parts import DATES
 
-EPOCHS = {
-    TimeUnit.MILLISECONDS: (3e11, 4e12),
-    TimeUnit.MICROSECONDS: (3e14, 4e15),
-    TimeUnit.NANOSECONDS: (3e17, 4e18),
-}
-"""Numbers that are dates of 1980 to 2096 in a unit, and nothing that could be meant in s."""
+DATED = (DATES, 4e9)
+"""Seconds since 1970 that are taken for dates: 1979 to 2096."""
 
 SPREADSHEET = (25569.0, 73050.0)
 """Days since the last of 1899 in which spreadsheets count 1970 to 2099."""
@@ -34,17 +32,21 @@ DAY_LONG = 14400.0
 SHORT = 0.05
 """Step, as a number, below which times as large as a spreadsheet's days may be such days."""
 
+_MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
+
 
 class TimeColumn(NamedTuple):
-    """Where the times stand.
-
-    Attributes:
-        place: of the column.
-        beside: column of the time of day, when ``place`` has the date alone.
-    """
+    """Where the times stand; ``beside`` is the time of day, when ``place`` has the date alone."""
 
     place: int
     beside: int | None = None
+
+    def cells(self, columns: Sequence[Cells]) -> Cells:
+        """Return the stamps of a piece of the table."""
+        if self.beside is None:
+            return columns[self.place]
+        pairs = zip(columns[self.place], columns[self.beside], strict=True)
+        return [f"{_MIDNIGHT.sub('', str(date))} {clock}".strip() for date, clock in pairs]
 
 
 ROWS_APART = TimeColumn(-1)
@@ -59,75 +61,61 @@ def time_column(sheet: Sheet, name: str | None) -> TimeColumn:
     """
     if name is not None:
         return TimeColumn(sheet.column(name, "--time COLUMN"))
-    for date in ("date", "datum"):
-        for clock in ("time", "zeit", "uhrzeit"):
-            pair = sheet.find(date), sheet.find(clock)
-            if pair[0] is not None and pair[1] is not None:
-                return TimeColumn(pair[0], pair[1])
+    for date, clock in itertools.product(("date", "datum"), ("time", "zeit", "uhrzeit")):
+        place, beside = sheet.find(date), sheet.find(clock)
+        if place is not None and beside is not None:
+            return TimeColumn(place, beside)
     for usual in TIME_NAMES:
-        index = sheet.find(usual)
-        if index is not None:
-            return TimeColumn(index)
+        if (place := sheet.find(usual)) is not None:
+            return TimeColumn(place)
     for index, header in enumerate(sheet.layout.header):
         stem, _, unit = header.rpartition("_")
         if stem.casefold() in TIME_NAMES and known_time_unit(unit) is not None:
             return TimeColumn(index)
-    for index, cells in enumerate(next((piece.columns for piece in sheet.pieces(1)), ())):
+    for index, cells in enumerate(next((columns for columns, _ in sheet.pieces(1)), ())):
         dated = isinstance(cells, np.ndarray) and cells.dtype.kind == "M"
         if len(cells) and (dated or is_stamp(str(cells[0]))):
             return TimeColumn(index)
     return TimeColumn(sheet.column("t", "--time COLUMN"))
 
 
-def in_seconds(
-    times: Times, sheet: Sheet, index: int, options: IntakeOptions
-) -> tuple[FloatArray, Clock, str]:
-    """Return times in seconds since the first, their clock, and a note on the unit.
-
-    Args:
-        times: as read.
-        sheet: that they stand in.
-        index: of their column.
-        options: a unit that was given.
+def in_seconds(times: Times, sheet: Sheet, index: int, options: IntakeOptions) -> Times:
+    """Return times as they were read, from column ``index``, in seconds; a note tells their unit.
 
     Raises:
         InputError: numbers of which the unit cannot be told.
     """
-    clock = Clock(times.start, times.dated, times.zoned, times.zone, times.daily)
-    if times.dated or times.daily:
-        return times.seconds, clock, ""
-    name, said = sheet.layout.given[index], sheet.layout.units[index]
-    unit = options.time_unit or (TimeUnit.SECONDS if options.as_given else known_time_unit(said))
-    if unit is None:
-        unit = known_time_unit(re.split(r"[_ ]", sheet.layout.header[index])[-1])
-        unit = None if sheet.layout.header[index].casefold() in TIME_NAMES else unit
+    start = times.clock.start
+    if times.clock.dated or times.clock.daily:
+        return times
+    name, bare = sheet.layout.given[index], sheet.layout.header[index]
+    unit = options.time_unit or known_time_unit(sheet.layout.units[index])
+    if unit is None and bare.casefold() not in TIME_NAMES:
+        unit = known_time_unit(re.split(r"[_ ]", bare)[-1])
     if unit is not None:
         return _scaled(times, unit, "" if unit is TimeUnit.SECONDS else f"{name} is in {unit}")
-    for unit, (low, high) in EPOCHS.items():
-        if low <= times.start <= high:
+    for unit in (TimeUnit.MILLISECONDS, TimeUnit.MICROSECONDS, TimeUnit.NANOSECONDS):
+        if DATED[0] <= start * SECONDS[unit] <= DATED[1]:
             return _scaled(times, unit, f"{name} is taken as {unit} since 1970")
     steps = np.diff(times.seconds[np.isfinite(times.seconds)])
     step = float(np.median(steps)) if len(steps) else 1.0
-    if SPREADSHEET[0] <= times.start <= SPREADSHEET[1] and 0.0 < step < SHORT:
+    if SPREADSHEET[0] <= start <= SPREADSHEET[1] and 0.0 < step < SHORT:
         return _scaled(times, TimeUnit.DAYS, f"{name} is taken as days of a spreadsheet")
     rounded = abs(step - 100.0 * round(step / 100.0)) < 1e-6 * step and step % 60.0 > 1e-6
     if (step >= LONG and rounded) or step >= DAY_LONG:
         raise InputError(
             f"samples are {step:g} apart in {name}, which may be milliseconds or seconds",
-            where=str(sheet.path),
             fix=f"say which with --time-unit ms or --time-unit s {OR_ROW}",
         )
-    dated = 3e8 <= times.start <= 4e9
-    return times.seconds, clock._replace(dated=dated, zoned=dated), ""
+    return _scaled(times, TimeUnit.SECONDS, "")
 
 
-def _scaled(times: Times, unit: TimeUnit, note: str) -> tuple[FloatArray, Clock, str]:
-    factor, start = SECONDS[unit], times.start
-    if unit is TimeUnit.DAYS and SPREADSHEET[0] <= start <= SPREADSHEET[1]:
-        start -= SPREADSHEET[0]
-    seconds = times.seconds * factor
+def _scaled(times: Times, unit: TimeUnit, note: str) -> Times:
+    start, seconds = times.clock.start, times.seconds * SECONDS[unit]
     if unit is TimeUnit.DAYS:
         seconds = np.round(seconds, 3)  # a day's fraction is good for a tenth of a millisecond
-    start *= factor
-    dated = 3e8 <= start <= 4e9
-    return seconds, Clock(start, dated, dated and unit is not TimeUnit.DAYS), note
+        start -= SPREADSHEET[0] * (SPREADSHEET[0] <= start <= SPREADSHEET[1])
+    start *= SECONDS[unit]
+    dated = DATED[0] <= start <= DATED[1]
+    clock = Clock(start, dated, dated and unit is not TimeUnit.DAYS)
+    return times._replace(seconds=seconds, clock=clock, note=note)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import re
+from collections import Counter
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from stiction_ros.intake.sheets.cells import BAD_WORDS, Words, number
-from stiction_ros.intake.sheets.names import quality_kind
+from stiction_ros.intake.sheets.cells import BAD_WORDS, Cells, Words, number
+from stiction_ros.intake.sheets.names import folded, quality_kind, read_tag, without_quality
+from stiction_ros.intake.tables.kinds import kind_of, repeats
 from stiction_ros.intake.words import WORDS, pattern_of
 
 _BAD, _GOOD = tuple(WORDS["bad_beginnings"]), pattern_of("good_words")
@@ -17,9 +20,7 @@ _YES, _NO = tuple(WORDS["yes_words"]), tuple(WORDS["no_words"])
 def bad_qualities(read: Words, name: str) -> tuple[set[str], str]:
     """Return which words of a column of qualities tell of bad values, and a note on others.
 
-    Args:
-        read: the column.
-        name: of it, which tells what a number or a yes means.
+    Its ``name`` tells what a number or a yes means.
     """
     kind = quality_kind(name) or "code"
     told = {word: word.strip().casefold() for word in read.known if word.strip()}
@@ -36,9 +37,54 @@ def bad_qualities(read: Words, name: str) -> tuple[set[str], str]:
     return bad, note if strange else ""
 
 
-def all_of_quality(words: Collection[str]) -> bool:
+def qualities_of(
+    header: Sequence[str], top: Sequence[Cells], signals: set[int], taken: Collection[int | None]
+) -> tuple[dict[int, tuple[int, ...]], tuple[int, ...]]:
+    """Return columns of qualities: those of each signal, and those of whole rows.
+
+    One that names a signal is its; of several with one name each is of the signal before it. What
+    stands at the ``top`` of columns tells it, too, but for ``signals`` and what is ``taken``.
+    """
+    places = quality_places(header, top, {*signals, *taken})
+    plain = [re.sub(r"[\s._]*\d+$", "", name).casefold() for name in header]
+    names = Counter(plain[k] for k in places)
+    signal = {tag: k for k in signals if (tag := read_tag(header[k])) is not None}
+    beside: dict[int, tuple[int, ...]] = {}
+    whole: list[int] = []
+    names_at = {folded(name): k for k, name in enumerate(header) if k not in places}
+    for place in places:
+        named, of = read_tag(header[place]), names_at.get(folded(without_quality(header[place])))
+        if named is not None:
+            of = signal.get(named._replace(quality=False), of)
+        if of not in signals and (of is not None or (named is not None and named.loop)):
+            continue  # of a signal that is none of these
+        if of is None and (names[plain[place]] > 1 or len(signals) == 1):
+            of = max((k for k in signals if k < place), default=None)
+        if of is None:
+            whole.append(place)
+        else:
+            beside[of] = (*beside.get(of, ()), place)
+    return beside, tuple(whole)
+
+
+def quality_places(
+    header: Sequence[str], top: Sequence[Cells], taken: Collection[int | None] = ()
+) -> list[int]:
+    """Return the columns that tell of qualities by their words, or by name and few values."""
+    found = []
+    for index, (name, cells) in enumerate(zip(header, top, strict=True)):
+        few = kind_of(cells) in ("text", "") or repeats(cells)
+        named = quality_kind(name) is not None and few
+        if index not in taken and (named or _all_of_quality(cells)):
+            found.append(index)
+    return found
+
+
+def _all_of_quality(cells: Cells) -> bool:
     """Return whether all words of a column tell of qualities, and one of them of a good one."""
-    told = {word.strip().casefold() for word in words} - {""}
+    if isinstance(cells, np.ndarray):
+        return False
+    told = {word.strip().casefold() for word in set(cells)} - {""}
     known = all(_GOOD.fullmatch(t) or t.startswith(_BAD) or BAD_WORDS.fullmatch(t) for t in told)
     return known and any(map(_GOOD.fullmatch, told))
 

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import re
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.errors import InputError
 from stiction_ros.intake.intake_options import IntakeOptions
-from stiction_ros.intake.sheets.cells import Cells, Numbers, Words
+from stiction_ros.intake.sheets.cells import Cells, Numbers, Words, Wrong
 from stiction_ros.intake.sheets.names import read_tag, unit_in
 from stiction_ros.intake.sheets.sheet import Sheet
-from stiction_ros.intake.sheets.stamps import Stamps
-from stiction_ros.intake.tables.block import Block, Clock, Column, FlagArray, Key
+from stiction_ros.intake.sheets.stamps import Clock, Stamps, Times
+from stiction_ros.intake.tables.block import Block, Column, FlagArray, Key
 from stiction_ros.intake.tables.clock import ROWS_APART, TimeColumn, in_seconds
-from stiction_ros.intake.tables.plan import Plan, Shape
+from stiction_ros.intake.tables.one_value import OneValue
+from stiction_ros.intake.tables.plan import Plan
 from stiction_ros.intake.tables.qualities import bad_qualities
 from stiction_ros.intake.tables.tags import TagList
 from stiction_ros.records.csv_names import QUALITY
 from stiction_ros.records.quality import QUALITY_WORDS, QualityArray
 
-_MIDNIGHT = re.compile(r"[T ]0?0:00(:00(\.0+)?)?$")
+Reader = tuple[int, Numbers] | tuple[int, Words]
 
 
 def blocks_of(
@@ -36,13 +36,13 @@ def blocks_of(
     Raises:
         InputError: times that cannot be read, or the file is damaged.
     """
-    if plan.shape is Shape.LONG:
-        return _long(sheet, plan, options, tags)
+    if plan.long is not None:
+        return _long(sheet, plan, plan.long, options, tags)
     return _beside(sheet, plan, options)
 
 
 def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[Block]]:
-    """Read a table with one row a stamp."""
+    """Read a table with one row a stamp: a block for each clock of a loop."""
     numbers: dict[int, Numbers] = {}
     words: dict[int, Words] = {}
     for signals in plan.loops.values():
@@ -53,260 +53,185 @@ def _beside(sheet: Sheet, plan: Plan, options: IntakeOptions) -> dict[str, list[
                 numbers[index] = Numbers(sheet.decimal_comma)
     for quality in itertools.chain(plan.whole_quality, *plan.quality.values()):
         words[quality] = Words()
-    stamps = {
-        clock: Stamps(sheet.decimal_comma, options.dates)
-        for clock in (plan.time, *plan.own.values())
-    }
-    lines: list[NDArray[np.int64]] = []
-    for piece in sheet.pieces():
-        for clock, cells in stamps.items():
-            if clock != ROWS_APART:
-                cells.add(_stamp_cells(piece.columns, clock))
-        for accumulated in (numbers, words):
-            for index, column in accumulated.items():
-                column.add(piece.columns[index])
-        lines.append(piece.lines)
-    count = sum(map(len, lines))
-    if count < 2:
-        raise InputError(
-            f"has {count} row{'s' * (count != 1)} of data",
-            where=str(sheet.path),
-            fix="a record needs two at least",
-        )
-    place = np.concatenate(lines)
-    timed = {clock: _times(sheet, clock, read, options, place) for clock, read in stamps.items()}
+    clocks = dict.fromkeys((plan.time, *plan.own.values()))
+    lines, times = _read(sheet, [*numbers.items(), *words.items()], clocks, options, least=2)
     mask, whole_bad, told = _whole_quality(sheet, plan, words)
-    notes = [*plan.notes, *(time.note for time in timed.values()), *told]
+    notes = [*plan.notes, *(time.note for time in times.values()), *told]
     found: dict[str, list[Block]] = {}
     for name, signals in plan.loops.items():
-        columns: dict[int, dict[Key, Column]] = {}
-        clocks: list[_Timed] = []
-        own: list[str] = []
+        blocks: list[Block] = []
+        said = list(notes)
         for key, index in signals.items():
-            time = timed[plan.own.get(index, plan.time)]
-            same = next((k for k, other in enumerate(clocks) if other.same(time)), len(clocks))
-            clocks += [time] if same == len(clocks) else []
+            time = times[plan.own.get(index, plan.time)]
+            given = sheet.layout.given[index]
             if key.signal == "mode":
-                its = _mode(sheet, index, words[index])
+                column = _mode(given, words[index])
             else:
-                bad = whole_bad
-                for beside in plan.quality.get(index, ()):
-                    judged, note = bad_qualities(words[beside], sheet.layout.given[beside])
-                    own.append(note)
-                    bad = words[beside].where(judged) | (False if bad is None else bad)
-                its = _numbers(sheet, index, numbers[index], bad)
-            columns.setdefault(same, {})[key] = its
-        found[name] = [
-            _filled_rows(
-                Block(
-                    path=sheet.path,
-                    row_word=sheet.row_word,
-                    clock=clocks[k].clock,
-                    time=clocks[k].seconds,
-                    lines=place,
-                    columns=there,
-                    mask=mask,
-                    notes=tuple(dict.fromkeys(n for n in (*notes, *own) if n)),
-                    stray=clocks[k].stray,
-                    mended=tuple(sheet.mended),
-                ),
-                alone=not plan.own,
-            )
-            for k, there in columns.items()
-        ]
+                beside = {k: words[k] for k in plan.quality.get(index, ())}
+                bad, own = _bad_rows(sheet, beside, whole_bad)
+                said += own
+                unit = sheet.layout.units[index] or unit_in(given)
+                read = numbers[index]
+                column = Column(given, read.values(), read.blank(), read.wrong, read.words, unit)
+                column = _without_bad(column, bad)
+            same = next((k for k, other in enumerate(blocks) if other.has_times(time)), None)
+            if same is None:
+                blocks.append(_block(sheet, time, lines, {key: column}))
+            else:
+                blocks[same].columns[key] = column
+        for block in blocks:
+            block.mask, block.notes = mask, tuple(dict.fromkeys(filter(None, said)))
+        found[name] = list(map(_filled_rows, blocks)) if plan.own else blocks
     return found
 
 
-class _Timed(NamedTuple):
-    """Times of a table, as :class:`Block` has them."""
+def _long(
+    sheet: Sheet, plan: Plan, long: OneValue, options: IntakeOptions, tags: TagList | None
+) -> dict[str, list[Block]]:
+    """Read a table with one value a row: one block a tag."""
+    names, units, values, text = Words(), Words(), Numbers(sheet.decimal_comma), _OnlyWords()
+    quality = {index: Words() for index in plan.whole_quality}
+    readers: list[Reader] = [(long.tag, names), (long.value, values), (long.value, text)]
+    readers += quality.items()
+    if long.unit is not None:
+        readers.append((long.unit, units))
+    lines, times = _read(sheet, readers, [plan.time], options, least=1)
+    time, numbers, blank = times[plan.time], values.values(), values.blank()
+    bad, notes = _bad_rows(sheet, quality)
+    tag_codes, codes, shown = names.codes(), text.codes(), list(text.known)
+    unit_of = dict(zip(tag_codes.tolist(), units.codes().tolist(), strict=False))
+    unit_words = list(units.known)
+    order = np.argsort(tag_codes, kind="stable")
+    edges = np.searchsorted(tag_codes[order], np.arange(len(names.known) + 1))
+    found: dict[str, list[Block]] = {}
+    for code, name in enumerate(names.known):
+        tag = tags.read(name) if tags is not None else read_tag(name)
+        if tag is None or not tag.loop or tag.quality:
+            continue
+        rows = order[edges[code] : edges[code + 1]]
+        said = [shown[c] for c in codes[rows].tolist()]
+        if tag.signal == "mode":
+            modes, told = Words(), zip(said, numbers[rows].tolist(), strict=True)
+            modes.add([word or ("" if value != value else f"{value:g}") for word, value in told])
+            column = _mode(name, modes)
+        else:
+            column = Column(name, numbers[rows], blank[rows], words=Counter(filter(None, said)))
+            if column.words or column.blank.any():
+                row = int(np.argmax(~np.isfinite(column.values)))
+                column.wrong = Wrong(row, f"is {said[row]!r}, not a number")
+            column = _without_bad(column, None if bad is None else bad[rows])
+        unit = unit_words[unit_of[code]].strip() if code in unit_of else ""
+        column.unit = unit or unit_in(name)
+        own = time._replace(seconds=time.seconds[rows])
+        block = _block(sheet, own, lines[rows], {Key.of(tag): column})
+        block.notes = tuple(filter(None, (time.note, *notes)))
+        found.setdefault(tag.loop, []).append(block)
+    return found
 
-    seconds: NDArray[np.float64]
-    clock: Clock
-    stray: str
-    note: str
 
-    def same(self, other: _Timed) -> bool:
-        """Tell whether other times are these."""
-        equal = np.array_equal(self.seconds, other.seconds, equal_nan=True)
-        return self is other or (self.clock == other.clock and equal)
+class _OnlyWords(Words):
+    """A column of numbers and words; numbers count as empty, so that few different are left."""
+
+    def add(self, cells: Cells) -> None:
+        if isinstance(cells, np.ndarray):
+            cells = [""] * len(cells)
+        super().add(["" if cell[-1:].isdigit() else cell.strip() for cell in cells])
 
 
-def _filled_rows(block: Block, *, alone: bool) -> Block:
+def _read(
+    sheet: Sheet,
+    readers: Sequence[Reader],
+    clocks: Iterable[TimeColumn],
+    options: IntakeOptions,
+    *,
+    least: int,
+) -> tuple[NDArray[np.int64], Mapping[TimeColumn, Times]]:
+    """Read columns; return the lines of their rows, shape (N,), and the times of each clock."""
+    stamps = {clock: Stamps(sheet.decimal_comma, options.dates) for clock in clocks}
+    lines: list[NDArray[np.int64]] = []
+    for columns, place in sheet.pieces():
+        for clock, read in stamps.items():
+            if clock != ROWS_APART:
+                read.add(clock.cells(columns))
+        for index, reader in readers:
+            reader.add(columns[index])
+        lines.append(place)
+    count = sum(map(len, lines))
+    if count < least:
+        said = f"has {count} row{'s' * (count != 1)} of data"
+        raise InputError(said, fix="a record needs two at least")
+    place, times = np.concatenate(lines), {}
+    for clock, read in stamps.items():
+        if clock == ROWS_APART:
+            apart = (options.sample_time or 1.0) * np.arange(count, dtype=np.float64)
+            times[clock] = Times(apart, Clock(0.0))
+            continue
+        found = in_seconds(read.times(), sheet, clock.place, options)
+        if found.wrong is not None:
+            name, row = sheet.layout.given[clock.place], found.wrong.row
+            said = f"column {name} {found.wrong.said} in {sheet.row_word} {place[row]}"
+            found = found._replace(wrong=Wrong(row, said))
+        times[clock] = found
+    return place, times
+
+
+def _block(
+    sheet: Sheet, times: Times, lines: NDArray[np.int64], columns: dict[Key, Column]
+) -> Block:
+    return Block(
+        path=sheet.path,
+        row_word=sheet.row_word,
+        clock=times.clock,
+        time=times.seconds,
+        lines=lines,
+        columns=columns,
+        stray="" if times.wrong is None else times.wrong.said,
+        mended=tuple(sheet.mended),
+    )
+
+
+def _filled_rows(block: Block) -> Block:
     """Return the rows of signals with times of their own that hold a time or a value."""
     blank = np.all([column.blank for column in block.columns.values()], axis=0)
-    there = np.isfinite(block.time) | ~blank
-    if alone or there.all():
-        return block
-    stray = "" if np.isfinite(block.time[there]).all() else block.stray
-    return dataclasses.replace(block.rows(there), stray=stray)
+    return block.rows(np.isfinite(block.time) | ~blank)
 
 
-def _stamp_cells(columns: Sequence[Cells], time: TimeColumn) -> Cells:
-    date = columns[time.place]
-    if time.beside is None:
-        return date
-    clock = columns[time.beside]
-    return [f"{_MIDNIGHT.sub('', str(d))} {c}".strip() for d, c in zip(date, clock, strict=True)]
-
-
-def _times(
-    sheet: Sheet,
-    place: TimeColumn,
-    stamps: Stamps,
-    options: IntakeOptions,
-    lines: NDArray[np.int64],
-) -> _Timed:
-    index = place.place
-    if place == ROWS_APART:
-        apart = (options.sample_time or 1.0) * np.arange(len(lines), dtype=np.float64)
-        return _Timed(apart, Clock(0.0, dated=False, zoned=False), "", "")
-    times = stamps.times(str(sheet.path))
-    seconds, clock, note = in_seconds(times, sheet, index, options)
-    stray = ""
-    if times.wrong is not None:
-        line = f"{sheet.row_word} {lines[times.wrong.row]}"
-        stray = f"column {sheet.layout.given[index]} {times.wrong.said} in {line}"
-    return _Timed(seconds, clock, stray, " and ".join(n for n in (times.note, note) if n))
-
-
-def _numbers(sheet: Sheet, index: int, read: Numbers, bad: FlagArray | None) -> Column:
-    values, words = read.values(), read.words
-    if bad is not None and bad.any():
-        words = words.copy()
-        words["of bad quality"] += int(np.count_nonzero(bad & np.isfinite(values)))
-        values = np.where(bad, np.nan, values)
-    wrong = read.wrong
-    return Column(
-        name=sheet.layout.given[index],
-        values=values,
-        blank=read.blank(),
-        said="" if wrong is None else wrong.said,
-        row=0 if wrong is None else wrong.row,
-        words=words,
-        unit=sheet.layout.units[index] or unit_in(sheet.layout.given[index]),
-    )
-
-
-def _mode(sheet: Sheet, index: int, read: Words) -> Column:
-    codes = read.codes()
+def _mode(name: str, read: Words) -> Column:
+    known = tuple(word.strip() for word in read.known)
     blank = read.where({word for word in read.known if not word.strip()})
-    return Column(
-        name=sheet.layout.given[index],
-        values=codes.astype(np.float64),
-        blank=blank,
-        known=tuple(word.strip() for word in read.known),
-    )
+    return Column(name, read.codes().astype(np.float64), blank, known=known)
+
+
+def _without_bad(column: Column, bad: FlagArray | None) -> Column:
+    """Return a column without the values of rows of bad quality, which its words count."""
+    if bad is None or not bad.any():
+        return column
+    words = column.words.copy()
+    words["of bad quality"] += int(np.count_nonzero(bad & np.isfinite(column.values)))
+    return dataclasses.replace(column, values=np.where(bad, np.nan, column.values), words=words)
 
 
 def _whole_quality(
-    sheet: Sheet, plan: Plan, words: dict[int, Words]
+    sheet: Sheet, plan: Plan, words: Mapping[int, Words]
 ) -> tuple[QualityArray | None, FlagArray | None, list[str]]:
     """Return the mask of a record's own file, or which rows are of bad quality, and notes."""
-    if len(plan.whole_quality) == 1:
-        read = words[plan.whole_quality[0]]
-        own = {word: word.strip() for word in read.known}
-        if sheet.layout.given[plan.whole_quality[0]] == QUALITY and QUALITY_WORDS.keys() >= set(
-            own.values()
-        ):
-            table = np.array([QUALITY_WORDS[own[word]] for word in read.known], dtype=np.uint8)
-            return table[read.codes()], None, []
-    return None, *_bad_rows(sheet, {index: words[index] for index in plan.whole_quality})
+    read = {index: words[index] for index in plan.whole_quality}
+    if [sheet.layout.given[index] for index in read] == [QUALITY]:
+        (own,) = read.values()
+        known = [word.strip() for word in own.known]
+        if QUALITY_WORDS.keys() >= set(known):
+            table = np.array([QUALITY_WORDS[word] for word in known], dtype=np.uint8)
+            return table[own.codes()], None, []
+    return None, *_bad_rows(sheet, read)
 
 
-def _bad_rows(sheet: Sheet, read: dict[int, Words]) -> tuple[FlagArray | None, list[str]]:
-    """Return which rows one of the columns of qualities calls bad, and what is not known."""
-    bad: FlagArray | None = None
+def _bad_rows(
+    sheet: Sheet, read: Mapping[int, Words], bad: FlagArray | None = None
+) -> tuple[FlagArray | None, list[str]]:
+    """Return which rows are bad or one of the columns says so, and notes on what is not known."""
     notes: list[str] = []
     for index, words in read.items():
         judged, note = bad_qualities(words, sheet.layout.given[index])
         bad = words.where(judged) | (False if bad is None else bad)
         notes += [note] if note else []
     return bad, notes
-
-
-def _long(
-    sheet: Sheet, plan: Plan, options: IntakeOptions, tags: TagList | None
-) -> dict[str, list[Block]]:
-    """Read a table with one value a row: one block a tag."""
-    names, values = Words(), Numbers(sheet.decimal_comma)
-    text = Words()
-    quality = {index: Words() for index in plan.whole_quality}
-    units: dict[str, str] = {}
-    stamps = Stamps(sheet.decimal_comma, options.dates)
-    lines: list[NDArray[np.int64]] = []
-    for piece in sheet.pieces():
-        stamps.add(_stamp_cells(piece.columns, plan.time))
-        names.add(piece.columns[plan.tag])
-        values.add(piece.columns[plan.value])
-        text.add(_only_words(piece.columns[plan.value]))
-        for index, told in quality.items():
-            told.add(piece.columns[index])
-        if plan.unit is not None:
-            units.update(zip(piece.columns[plan.tag], piece.columns[plan.unit], strict=True))
-        lines.append(piece.lines)
-    if not lines:
-        raise InputError("has 0 rows of data", where=str(sheet.path))
-    place = np.concatenate(lines)
-    time, clock, stray, note = _times(sheet, plan.time, stamps, options, place)
-    numbers, blank = values.values(), values.blank()
-    bad, notes = _bad_rows(sheet, quality)
-    order = np.argsort(names.codes(), kind="stable")
-    edges = np.searchsorted(names.codes()[order], np.arange(len(names.known) + 1))
-    found: dict[str, list[Block]] = {}
-    shown, codes = tuple(text.known), text.codes()
-    for code, name in enumerate(names.known):
-        tag = tags.read(name) if tags is not None else read_tag(name)
-        if tag is None or not tag.loop or tag.quality:
-            continue
-        rows = order[edges[code] : edges[code + 1]]
-        key = Key(tag.signal, "" if tag.signal == "mode" else tag.loop)
-        if tag.signal == "mode":
-            column = _mode_of(name, numbers[rows], codes[rows], shown)
-        else:
-            read = Numbers(sheet.decimal_comma)
-            read.words.update(shown[c] for c in codes[rows].tolist() if shown[c])
-            column = Column(name, numbers[rows], blank[rows], words=read.words)
-            if column.words or blank[rows].any():
-                row = int(np.argmax(~np.isfinite(column.values)))
-                column.row, column.said = row, f"is {shown[codes[rows[row]]]!r}, not a number"
-            if bad is not None and bad[rows].any():
-                column.words["of bad quality"] += int(
-                    np.count_nonzero(bad[rows] & np.isfinite(column.values))
-                )
-                column.values = np.where(bad[rows], np.nan, column.values)
-        column.unit = units.get(name, "").strip() or unit_in(name)
-        found.setdefault(tag.loop, []).append(
-            Block(
-                path=sheet.path,
-                row_word=sheet.row_word,
-                clock=clock,
-                time=time[rows],
-                lines=place[rows],
-                columns={key: column},
-                notes=tuple(n for n in (note, *notes) if n),
-                stray="" if np.isfinite(time[rows]).all() else stray,
-                mended=tuple(sheet.mended),
-            )
-        )
-    return found
-
-
-def _only_words(cells: Cells) -> Cells:
-    """Return cells with numbers left empty, so that only few different ones are left."""
-    if isinstance(cells, np.ndarray):
-        return [""] * len(cells)
-    return ["" if cell[-1:].isdigit() else cell.strip() for cell in cells]
-
-
-def _mode_of(
-    name: str, numbers: NDArray[np.float64], codes: NDArray[np.int32], shown: Sequence[str]
-) -> Column:
-    words = [
-        shown[code] if shown[code] else ("" if value != value else f"{value:g}")
-        for code, value in zip(codes.tolist(), numbers.tolist(), strict=True)
-    ]
-    known = tuple(dict.fromkeys(words))
-    place = {word: k for k, word in enumerate(known)}
-    values = np.array([place[word] for word in words], dtype=np.float64)
-    blank = np.array([not word for word in words], dtype=np.bool_)
-    return Column(name, values, blank, known=known)

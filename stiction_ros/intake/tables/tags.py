@@ -1,15 +1,39 @@
-"""A list that says which tags make up which loop."""
+"""A list that says which tags make up which loop, and how single files are read."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from stiction_ros.errors import InputError
-from stiction_ros.intake.intake_options import OpUnit
-from stiction_ros.intake.sheets.names import Tag
+from stiction_ros.errors import InputError, foreign
+from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit
+from stiction_ros.intake.sheets.names import Tag, folded
 from stiction_ros.intake.tables.tag_rows import TagRow, read_rows
+
+
+@dataclasses.dataclass(frozen=True)
+class FileWay:
+    """How one file is read: what a tag list says of it before what is said of all.
+
+    Without ``tags`` its loops are found by their names; ``units`` are those of their OP.
+    """
+
+    options: IntakeOptions
+    tags: TagList | None = None
+    units: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)
+
+    def op_unit(self, loop: str, *, single: bool) -> OpUnit | None:
+        """Return the unit of OP that is said of a loop; None takes it from the export.
+
+        Of a loop that is ``single`` in its file a row tells whatever name it has.
+        """
+        own = self.units.get(loop)
+        if own is None and single and len(self.units) == 1:
+            (own,) = self.units.values()
+        listed = None if self.tags is None else self.tags.units.get(loop)
+        return own or self.options.op_unit or listed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,37 +48,46 @@ class TagList:
     """
 
     loops: Mapping[str, Tag]
-    units: Mapping[str, OpUnit] = dataclasses.field(default_factory=dict)
+    units: Mapping[str, OpUnit]
     rows: Mapping[str, Sequence[TagRow]] = dataclasses.field(default_factory=dict)
     own: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def read(self, name: str) -> Tag | None:
         """Return what a tag is, None when the list does not have it."""
-        return self.loops.get(_key(name))
+        return self.loops.get(folded(name))
 
-    def of_file(self, path: Path) -> TagList | None:
-        """Return the list for one file, its own rows first; None when nothing is in it.
+    def way_of(self, path: Path, options: IntakeOptions) -> FileWay:
+        """Return how a file is read.
 
         Raises:
-            InputError: its rows have a tag twice.
+            InputError: its rows contradict each other, or have a tag twice.
         """
         rows = self.rows_of(path)
-        if not rows and self.loops:
-            return self
-        own = {_key(tag): tag for row in rows for _, tag in row.tags}
-        loops = {**self.loops, **_by_tag(rows)}
-        return TagList(loops, self.units, own=own) if loops or self.units else None
+        said: dict[str, Any] = {}
+        for row in rows:
+            for key, value in row.options.items():
+                if said.setdefault(key, value) != value:
+                    raise InputError(
+                        f"{key} of {row.file} is {value} here and {said[key]} above",
+                        where=row.where,
+                        fix="say one of them",
+                    )
+        own = {folded(tag): tag for row in rows for _, tag in row.tags}
+        columns = CsvColumns() if own else options.columns
+        columns = dataclasses.replace(columns, time=said.pop("time", options.columns.time))
+        options = dataclasses.replace(options, columns=columns, **said)
+        units = {row.loop: row.unit for row in rows if row.loop and row.unit is not None}
+        tags = self
+        if rows:
+            tags = TagList({**self.loops, **_by_tag(rows)}, self.units, own=own)
+        return FileWay(options, tags if tags.loops or tags.units else None, units)
 
     def rows_of(self, path: Path) -> list[TagRow]:
         """Return the rows that count for one file alone."""
         return [row for row in self.rows.get(path.name, ()) if row.names(path)]
 
     def refuse_ambiguous(self, files: Sequence[Path]) -> None:
-        """Raise where a row names several files.
-
-        Raises:
-            InputError: it does, and its line.
-        """
+        """Raise an :class:`InputError` where a row names several files."""
         taken: dict[str, Path] = {}
         for file in files:
             for row in self.rows_of(file):
@@ -82,29 +115,23 @@ def read_tag_list(path: Path) -> TagList:
     Raises:
         InputError: it cannot be read, has other columns, or a tag twice.
     """
-    rows = read_rows(path)
+    with foreign(path):
+        rows = read_rows(path)
     general = [row for row in rows if not row.file]
     of_files: dict[str, list[TagRow]] = {}
     for row in rows:
         if row.file:
             of_files.setdefault(row.file_name, []).append(row)
-    return TagList(
-        _by_tag(general),
-        {row.loop: row.unit for row in general if row.unit is not None},
-        of_files,
-    )
+    units = {row.loop: row.unit for row in general if row.unit is not None}
+    return TagList(_by_tag(general), units, of_files)
 
 
 def _by_tag(rows: Sequence[TagRow]) -> dict[str, Tag]:
     found: dict[str, Tag] = {}
     for row in rows:
         for signal, tag in row.tags:
-            key, told = _key(tag), Tag(row.loop, signal)
-            if found.setdefault(key, told) != told:
+            told = Tag(row.loop, signal)
+            if found.setdefault(folded(tag), told) != told:
                 fix = "list it once" if row.file else "list it once, or with the file of each"
                 raise InputError(f"tag {tag} is there twice", where=row.where, fix=fix)
     return found
-
-
-def _key(name: str) -> str:
-    return " ".join(name.split()).casefold()

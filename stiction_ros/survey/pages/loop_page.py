@@ -96,7 +96,7 @@ def _answers(found: Identification, op_unit: str) -> list[str]:
     """Return what ``identify`` says of each valve: why, how much it matters, what to do next."""
     told = []
     for j, valve in enumerate(found.valves):
-        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
+        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j, asked=True)}")
         told.append(in_op_unit(" ".join(filter(None, said)), op_unit))
     return told
 
@@ -105,9 +105,10 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
     """Return what would help as a table; nothing where it was not simulated."""
     if gain is None:
         return ""
-    head = ("", "amplitude", "mean |PV−SP|", "travel/h", "moves/h", "reversals/h", "")
+    head = ("", "amplitude", "period, s", "mean |PV−SP|", "travel/h", "moves/h", "reversals/h", "")
     keys = (
         "amplitude",
+        "period",
         "iae_per_hour",
         "travel_per_hour",
         "moves_per_hour",
@@ -121,7 +122,7 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
         rows.append(_gain_row(name, option, head, keys, option["note"] + between))
     titles = "".join(f"<th>{text(title)}</th>" for title in head)
     return (
-        f"<h2>What would help, simulated</h2><p class='soft'>Amplitude and mean |PV−SP| in "
+        f"<h2>What would help</h2><p class='soft'>Amplitude and mean |PV−SP| in "
         f"{unit_mark(unit)}, travel in {text(op_unit)}.</p><table class='list'><thead><tr>"
         f"{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )

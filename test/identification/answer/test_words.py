@@ -99,7 +99,7 @@ def test_a_valve_that_its_loop_acquits_is_said_to_move_nothing() -> None:
 @pytest.mark.parametrize(
     ("verdict", "kind", "said"),
     [
-        (STICKY, CauseKind.VALVE, "Have V1 serviced (packing and positioner first); what a"),
+        (STICKY, CauseKind.VALVE, "Have V1 serviced (packing and positioner first); ask"),
         (BACKLASH, CauseKind.VALVE, "Have V1 serviced (linkage and positioner first"),
         (STICKY, CauseKind.TUNING, "First retune the controller: it rings with the process; then"),
         (STICKY, CauseKind.NONE, "The friction makes no cycle: have V1 serviced"),
@@ -111,7 +111,12 @@ def test_a_valve_that_its_loop_acquits_is_said_to_move_nothing() -> None:
     ],
 )
 def test_what_to_do_next(verdict: VerdictKind, kind: CauseKind | None, said: str) -> None:
-    assert next_step(found(verdict, kind), 0).startswith(said)
+    step = next_step(found(verdict, kind), 0)
+    assert step.startswith(said)
+    assert (
+        next_step(found(verdict, kind), 0, asked=True)
+        == step.partition("; ask")[0].rstrip(".") + "."
+    )
 
 
 def test_of_several_outputs_the_one_that_the_valve_makes_cycle_counts() -> None:
