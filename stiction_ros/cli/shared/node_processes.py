@@ -21,7 +21,7 @@ from stiction_ros.orphans import DIE_WITH_PARENT
 
 ENDED = ("plant", "opcua", "controller", "estimator", "recorder")  # who has readers goes first
 PATIENCE = 60.0  # s for a node to end before it is killed
-GOODBYE = 5.0  # s from the end of a node that follows the plant to that of the plant
+GOODBYE = 60.0  # s from the plant's goodbye to its end, on a machine that is busy
 SILENCE = 180.0  # s without progress before the run is given up
 _PROGRESS = re.compile(r"sample (\d+) of (\d+)")
 
