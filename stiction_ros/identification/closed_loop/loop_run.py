@@ -209,10 +209,8 @@ def run_loops(
                         goes_on = memory[j, 2, lane] * (command[j, lane] - memory[j, 1, lane]) > 0.0
                         if not goes_on:
                             memory[j, 2, lane] = 0.0 if still else np.sign(apart)
-                        still, slip = (
-                            still and not goes_on,
-                            -memory[j, 2, lane] * friction[j, 1, lane],
-                        )
+                        still = still and not goes_on
+                        slip = -memory[j, 2, lane] * friction[j, 1, lane]
                         memory[j, 1, lane] = command[j, lane]
                     slipped = command[j, lane] + slip
                     if factor != 1.0 and friction[j, 0, lane] > 0.0:

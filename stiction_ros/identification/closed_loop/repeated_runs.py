@@ -19,7 +19,6 @@ from stiction_ros.identification.closed_loop.oscillation import (
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
-from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 
@@ -70,9 +69,8 @@ def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
     law = find_law(valve.law)
     if isinstance(law.switching, MovingCells):
         return (1.0, 0.0, 1.0) if law.switching.rules is FollowingRules else (0.0, 1.0, 1.0)
-    if isinstance(law.switching, SlipPolygons):
-        return 0.0, 0.0, (tuple(valve.further.values()) or first_values(law))[0]
-    return 0.0, 0.0, 1.0
+    slips = isinstance(law.switching, SlipPolygons)
+    return 0.0, 0.0, valve.further_values[0] if slips else 1.0
 
 
 @dataclasses.dataclass(frozen=True)
