@@ -247,8 +247,8 @@ class RecordedLoop:
         stems = np.repeat(self.loop.stem[whole].T[None], number, axis=0)
         op = self.loop.op[whole, j] * self.op_scale + mean
         start = float(self.loop.stem[self.begin, j]) * self.op_scale + mean
-        further = tuple(self.estimate.further.values())
-        moved = simulate(find_law(self.estimate.law), frictions, op, start, further).T
+        law, further = find_law(self.estimate.law), self.estimate.further_values
+        moved = simulate(law, frictions, op, start, further).T
         moved[frictions[:, 0] <= 0.0] = op
         stems[:, j] = (moved - mean) / self.op_scale
         return stems

@@ -246,7 +246,10 @@ def _of_rounded(given: FloatArray) -> IntArray | None:
     spoiled = 2.0 * SLIGHT  # a missing row stands within a distance and makes two of it
     if len(even) < 2 or np.mean(even) < 1.0 - spoiled or np.abs(turns - whole).max() > WHOLE:
         return None
-    share = 1.0 / float(np.diff(long)[even].mean())
+    apart = float(np.diff(long)[even].mean())
+    if max(long[0], len(steps) - long[-1]) > 2.0 * apart + 1.0:  # they come in one place only
+        return None
+    share = 1.0 / apart
     scan = 1.0 + share
     drift = 0.25 * share**2  # from one long step to the next a quarter of what they tell apart
     low, high, behind = -0.5, 0.5, 0.0

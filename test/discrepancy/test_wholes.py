@@ -50,6 +50,7 @@ def test_a_model_that_is_right_is_not_changed() -> None:
     assert answer.process_changes == ()
 
 
+@pytest.mark.trial
 def test_friction_is_named_although_the_model_is_off() -> None:
     recorded = record(loop().with_effect("valve:V1", HeStiction(4.0, 1.5)), seed=2)
     answer = find_discrepancy(off(1.07, 1), [recorded], QUICK)

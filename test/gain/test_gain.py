@@ -157,6 +157,7 @@ def test_the_embedding_takes_over_and_does_not_rest_off_its_place(
     assert interval[1] < 0.6 * gain.now.iae_per_hour
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("what", [What.SERVICE, What.EMBEDDING, What.RETUNE])
 def test_what_drawn_loops_do_not_agree_on_has_no_figures(
     record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch, what: What
@@ -234,6 +235,7 @@ def test_backlash_is_planned_without_a_least_jump(found: Identification) -> None
     assert static == dynamic == 0.5 * (valve.static_friction + valve.dynamic_friction)
 
 
+@pytest.mark.trial
 def test_the_same_record_gives_the_same_answer(
     gain: Gain, record: Record, found: Identification
 ) -> None:

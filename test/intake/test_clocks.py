@@ -285,6 +285,10 @@ def test_the_beginning_of_two_months_is_none() -> None:
     assert _month("jui") == 0
 
 
+def test_words_and_a_number_are_no_date() -> None:
+    assert not is_stamp("sample-and-12")
+
+
 HALVES = [
     ("AM", "PM"),
     ("a. m.", "p. m."),

@@ -22,7 +22,7 @@ from stiction_ros.nodes.shared.managed import SIGNAL_QOS
 from stiction_ros.nodes.shared.messages import joint_state
 from stiction_studies.as_given import read_csv_parts
 
-LOOPS, SAMPLES, SECOND, BUDGET = 5, 99, 1_000_000_000, 60.0
+LOOPS, SAMPLES, SECOND, BUDGET = 5, 99, 1_000_000_000, 600.0
 
 UNTIL_ALL_HAS_COME = f"""
 import sys

@@ -20,8 +20,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.orphans import DIE_WITH_PARENT
 
 ENDED = ("plant", "opcua", "controller", "estimator", "recorder")  # who has readers goes first
-PATIENCE = 60.0  # s for a node to end before it is killed
-GOODBYE = 5.0  # s from the end of a node that follows the plant to that of the plant
+PATIENCE = 60.0  # s for a node to end: one that was told to, and the plant after its goodbye
 SILENCE = 180.0  # s without progress before the run is given up
 _PROGRESS = re.compile(r"sample (\d+) of (\d+)")
 
@@ -103,7 +102,7 @@ class NodeProcesses:
         try:
             if code != 0:
                 raise NodeError(self._describe(name, code))
-            self._processes["plant"].wait(GOODBYE)
+            self._processes["plant"].wait(PATIENCE)
         except subprocess.TimeoutExpired:
             raise NodeError(self._describe(name, code)) from None
 

@@ -23,9 +23,6 @@ IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 BEYOND = 1e6
 """Times the size of a start from which on a run is taken as gone."""
 
-FOLLOWS, SLOPES = 1, 2
-"""Rules of stems that go on while OP does, Kano's and Choudhury's; 0 is He's, times a factor."""
-
 LANES = 8
 """Runs that go side by side: as many as a vector of the processor or two hold."""
 
@@ -72,7 +69,8 @@ class Runs(NamedTuple):
         pv: before the first sample, oldest first, shape (R, H, p).
         stem: before the first sample, oldest first, shape (R, H, m).
         op: the last one before the first sample, shape (R, m).
-        laws: per valve, the rules that move its stem and the factor of a slip, shape (m, 2).
+        laws: per valve, whether Kano's or Choudhury's rules move its stem in place of He's law (4),
+            and by which factor a slip is longer than He's, shape (m, 3).
     """
 
     friction: FloatArray
@@ -199,28 +197,26 @@ def run_loops(
                         command[j, lane] = high if moved > high else moved
                         error[j, 1, lane] = before
                         error[j, 0, lane] = e
-                rule, factor = runs.laws[j, 0], runs.laws[j, 1]
-                if rule == SLOPES:
+                follows, slopes, factor = runs.laws[j, 0], runs.laws[j, 1], runs.laws[j, 2]
+                if slopes:
                     slope_step(memory[j], command[j], friction[j, 1], ends[j])
                 for lane in range(LANES):
                     op[k, j, lane] = command[j, lane]
                     apart = command[j, lane] - stem[k - 1, j, lane]
                     still = abs(apart) <= friction[j, 0, lane]
                     slip = -friction[j, 1, lane] if apart > 0.0 else friction[j, 1, lane]
-                    if rule == FOLLOWS:
+                    if follows:
                         goes_on = memory[j, 2, lane] * (command[j, lane] - memory[j, 1, lane]) > 0.0
                         if not goes_on:
                             memory[j, 2, lane] = 0.0 if still else np.sign(apart)
-                        still, slip = (
-                            still and not goes_on,
-                            -memory[j, 2, lane] * friction[j, 1, lane],
-                        )
+                        still = still and not goes_on
+                        slip = -memory[j, 2, lane] * friction[j, 1, lane]
                         memory[j, 1, lane] = command[j, lane]
                     slipped = command[j, lane] + slip
                     if factor != 1.0 and friction[j, 0, lane] > 0.0:
                         slipped = stem[k - 1, j, lane] + factor * (apart + slip)
                     stem[k, j, lane] = stem[k - 1, j, lane] if still else slipped
-                    if rule == SLOPES and friction[j, 0, lane] > 0.0:
+                    if slopes and friction[j, 0, lane] > 0.0:
                         stem[k, j, lane] = memory[j, 0, lane]
         for lane in range(min(LANES, number - first)):
             until = whole if gone[lane] == 0 else gone[lane] + 1

@@ -10,14 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.switching import MovingCells, SlipPolygons
-from stiction_ros.identification.closed_loop.loop_run import (
-    FOLLOWS,
-    SLOPES,
-    Controllers,
-    Process,
-    Runs,
-    run_loops,
-)
+from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
 from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
 from stiction_ros.identification.closed_loop.oscillation import (
     REGULAR,
@@ -26,7 +19,6 @@ from stiction_ros.identification.closed_loop.oscillation import (
 )
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
-from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 
@@ -72,14 +64,13 @@ def controllers_of(pairs: Pairs) -> Controllers:
     )
 
 
-def law_of(valve: ValveEstimate) -> tuple[float, float]:
+def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
     """Return what the runs are told of a valve's law; of one without switching patterns, He's."""
     law = find_law(valve.law)
     if isinstance(law.switching, MovingCells):
-        return (FOLLOWS if law.switching.rules is FollowingRules else SLOPES), 1.0
-    if isinstance(law.switching, SlipPolygons):
-        return 0.0, (tuple(valve.further.values()) or first_values(law))[0]
-    return 0.0, 1.0
+        return (1.0, 0.0, 1.0) if law.switching.rules is FollowingRules else (0.0, 1.0, 1.0)
+    slips = isinstance(law.switching, SlipPolygons)
+    return 0.0, 0.0, valve.further_values[0] if slips else 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +81,7 @@ class Repeated:
         loop: the signals.
         process: equation (9).
         frictions: per valve the (f_S, f_D) tried, the estimate first, shape (m, F, 2).
-        laws: per valve, :func:`law_of`, shape (m, 2).
+        laws: per valve, :func:`law_of`, shape (m, 3).
         pairs: per valve the output of its controller, −1 for none, and the controller.
         periods: of OP of each valve, samples.
         simulated: PV of the process driven by the estimated stems, shape (N, p).

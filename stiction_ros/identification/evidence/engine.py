@@ -28,7 +28,6 @@ from stiction_ros.identification.evidence.rates import (
     looks,
 )
 from stiction_ros.identification.evidence.unseen import Unseen
-from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.conclusion import Findings, conclude
@@ -246,9 +245,8 @@ def _stems(data: Data, valves: tuple[ValveEstimate, ...], starts: FloatArray) ->
     stems = data.u.copy()
     for j, valve in enumerate(valves):
         if valve.static_friction > 0.0:
-            law = find_law(valve.law)
-            further = (tuple(valve.further.values()) or first_values(law),) * len(stems)
-            own = dataclasses.replace(data, law=law, further=further)
+            further = (valve.further_values,) * len(stems)
+            own = dataclasses.replace(data, law=find_law(valve.law), further=further)
             friction = np.array([valve.static_friction, valve.dynamic_friction])
             stems[j] = stem_of(own, j, friction, float(starts[j]))
     return stems

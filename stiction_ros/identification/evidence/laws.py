@@ -34,7 +34,6 @@ Law = type[FrictionLaw]
 Looks = tuple[Look, ...]
 RIVALS = ("kano", "choudhury")  # compiled laws of f_S and f_D alone, the simpler first
 NAMED = (*RIVALS, "xch")  # which gives Kano's stems
-SAME = 1e-9  # of the standard deviation of OP: stems that differ by less are the same
 
 
 def with_own_laws(seen: Looks, options: IdentificationOptions) -> tuple[Looks, tuple[str, ...]]:
@@ -98,7 +97,7 @@ def _alike(look: Look, valve: int, law: Law, best: Candidate) -> bool:
     """Tell whether a law gives the very stem of a valve that is best under another one."""
     friction, start = best.friction[valve][None, :], best.starts[valve]
     stems = look.problem.under(valve, law).stems(valve, friction, start)
-    return bool(np.abs(stems[0] - best.stems[valve]).max() < SAME)
+    return bool(np.allclose(stems[0], best.stems[valve]))
 
 
 def _under(

@@ -11,6 +11,7 @@ import numpy as np
 
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
+from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.judgement.verdict_kind import VerdictKind
@@ -96,6 +97,11 @@ class ValveEstimate:
             return self.band_interval
         static, dynamic = self.static_interval, self.dynamic_interval
         return static[0] + dynamic[0], static[1] + dynamic[1]
+
+    @property
+    def further_values(self) -> tuple[float, ...]:
+        """Further parameters in the order of the law; where none is told, where it begins."""
+        return tuple(self.further.values()) or first_values(find_law(self.law))
 
     def with_frictions(self, static: float, dynamic: float) -> Self:
         """Return the estimate with another f_S and f_D, %, further parameters kept."""

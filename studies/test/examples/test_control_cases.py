@@ -31,6 +31,7 @@ def test_the_embedding_is_about_as_good_as_without_stiction(
     assert np.all(embedding.offset <= [0.008, 0.03])
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("mode", ["embedding", "unaware"])
 def test_a_soft_bound_of_c_stops_the_loop_short_of_a_set_point_beyond_it(
     mode: str,

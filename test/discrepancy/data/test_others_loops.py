@@ -53,6 +53,7 @@ def test_a_recorded_stem_tells_a_lag_of_the_valve_from_those_behind_it() -> None
     assert ("process:PV1", "pole") in {(untold.place, untold.effect), *untold.alternatives}
 
 
+@pytest.mark.trial
 def test_a_named_effect_of_the_process_is_no_correction_of_the_model() -> None:
     answer = answered(638)  # one sample more of dead time
     assert names(answer) == [("process:PV1", "delay")]
@@ -60,6 +61,7 @@ def test_a_named_effect_of_the_process_is_no_correction_of_the_model() -> None:
     assert answer.process_changes == ()
 
 
+@pytest.mark.trial
 def test_a_model_that_is_off_is_mended_before_steps_are_seen_in_it() -> None:
     answer = answered(240, given="off")  # an open loop that begins the wrong way, little noise
     assert names(answer) == [("valve:V1", "characteristic")]
@@ -77,6 +79,7 @@ def test_no_noise_is_named_that_explains_less_than_a_wave_in_doubt() -> None:
     assert ("load:V1", "triangle") in answer.alternatives
 
 
+@pytest.mark.trial
 def test_fine_rounding_beside_noise_of_the_equation_is_no_noise_of_its_own() -> None:
     assert names(answered(700)) == [("disturbance:PV1", "triangle")]
 
@@ -118,6 +121,7 @@ def test_a_gain_that_a_curve_explains_as_well_is_no_correction_of_the_model() ->
     assert answer.process_changes == ()
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("seed", [141, 700099])
 def test_a_curve_that_is_no_exponential_is_one_effect(seed: int) -> None:
     answer = answered(seed)  # a quadratic characteristic
@@ -127,6 +131,7 @@ def test_a_curve_that_is_no_exponential_is_one_effect(seed: int) -> None:
     assert answer.effects[0].parameters["bend"] == pytest.approx(true, rel=0.1)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("seed", [700100, 710249, 710281])
 def test_a_lag_that_moves_on_between_samples_is_told_from_another_process(seed: int) -> None:
     answer = answered(seed)
@@ -142,6 +147,7 @@ def test_a_curve_is_stepped_with_the_process_that_stands_in_for_it() -> None:
     assert not any(noise.memory for noise in answer.noise)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("seed", [875, 193])  # in closed loop, and moved by hand
 def test_a_rounded_op_in_a_healthy_loop_is_no_coloured_noise(seed: int) -> None:
     answer = answered(seed)
@@ -149,6 +155,7 @@ def test_a_rounded_op_in_a_healthy_loop_is_no_coloured_noise(seed: int) -> None:
     assert names(answer) == []
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(
     ("seed", "effect"),
     [
@@ -162,6 +169,7 @@ def test_a_walk_is_named_where_there_is_one(seed: int, effect: tuple[str, str]) 
     assert answer.effects[0].verdict is GapVerdict.NAMED
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(
     ("seed", "effect"),
     [
@@ -177,6 +185,7 @@ def test_what_stands_out_under_noise_of_the_equation_is_found(
     assert answer.effects[0].closed > 0.9
 
 
+@pytest.mark.trial
 def test_a_jump_that_is_next_to_nothing_leaves_backlash_in_doubt() -> None:
     (found,) = answered(172).effects
     assert {found.effect, *(effect for _, effect in found.alternatives)} == {
@@ -192,6 +201,7 @@ def test_a_tuning_is_told_from_rounded_values() -> None:
     assert found.parameters["integral_time"] == pytest.approx(tuning["integral_time"], rel=0.02)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(("seed", "what"), [(319, "delay"), (356, "delay")])
 def test_a_model_that_is_off_is_mended_under_the_walk_that_is_there(seed: int, what: str) -> None:
     answer = answered(seed, given="off")
@@ -202,6 +212,7 @@ def test_a_model_that_is_off_is_mended_under_the_walk_that_is_there(seed: int, w
     assert low <= loop.base.plant.dead_time - loop.known.dead_time <= high
 
 
+@pytest.mark.trial
 def test_a_step_closes_what_it_closes_at_its_moment() -> None:
     (found,) = answered(378, given="off").effects  # noise of the equation, a fitted block
     assert (found.place, found.effect) == ("disturbance:PV1", "step")
@@ -248,18 +259,22 @@ def test_a_sine_is_found_beside_what_was_found_first(seed: int, first: str) -> N
     assert places == {"disturbance:PV1", "load:V1"}
 
 
+@pytest.mark.trial
 def test_a_step_that_held_out_rows_refuse_does_not_take_in_one_at_another_place() -> None:
     assert names(answered(101)) == [("valve:V1", "stiction")]
 
 
+@pytest.mark.trial
 def test_a_slew_of_a_stem_that_was_late_at_the_start_is_one_effect() -> None:
     assert names(answered(61)) == [("valve:V1", "slew")]
 
 
+@pytest.mark.trial
 def test_the_rate_of_a_slew_is_no_slope_of_its_signal() -> None:
     assert names(answered(596)) == [("valve:V1", "slew")]
 
 
+@pytest.mark.trial
 def test_how_late_within_a_sample_a_stem_slips_is_no_dead_time() -> None:
     answer = answered(313, family="physics")
     assert names(answer) == [("valve:V1", "stiction")]
@@ -294,6 +309,7 @@ def test_a_noise_that_is_not_said_stands_against_no_effect() -> None:
     assert ("load:V1", "step") in names(answer)
 
 
+@pytest.mark.trial
 def test_a_needle_is_looked_for_over_the_whole_length_of_its_valley() -> None:
     answer = answered(561)  # the lattice and the boxes around its best points led to a walk
     (found,) = answer.effects
@@ -321,11 +337,13 @@ def test_values_between_kept_ones_are_no_evidence() -> None:
     assert answered(828).verdict is GapVerdict.NONE  # healthy
 
 
+@pytest.mark.trial
 def test_a_step_is_fitted_wherever_it_happens() -> None:
     answer = answered(510002, family="two")  # a step of the load among rows that are kept back
     assert names(answer) == [("valve:V1", "characteristic"), ("load:V1", "step")]
 
 
+@pytest.mark.trial
 def test_a_step_of_a_level_is_one_innovation_and_is_fitted() -> None:
     (found,) = answered(700005).effects
     true = hidden_loop(700005).hidden[0].figures

@@ -26,7 +26,10 @@ def controllers(lag: int = 0) -> Controllers:
 
 
 def runs(
-    friction: tuple[float, float], gain: float, reset: float, law: tuple[float, float] = (0.0, 1.0)
+    friction: tuple[float, float],
+    gain: float,
+    reset: float,
+    law: tuple[float, float, float] = (0.0, 0.0, 1.0),
 ) -> Runs:
     return Runs(
         np.array([[friction]]),

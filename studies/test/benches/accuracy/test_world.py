@@ -73,6 +73,7 @@ def test_benchmarks_that_cannot_be_run_are_refused(changes: dict[str, object]) -
         WorldBench(**changes)  # type: ignore[arg-type]
 
 
+@pytest.mark.trial
 def test_physics_is_of_this_world_alone(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -58,6 +58,7 @@ def test_a_loop_stays_in_its_range(family: str, seed: int) -> None:
     assert np.all(record.pv.std(axis=0) > 0.0)
 
 
+@pytest.mark.trial
 def test_many_seeds_bring_every_cause_and_healthy_loops() -> None:
     causes = [blind_loop(seed)[1].cause for seed in range(600, 625)]
     assert 0.0 < causes.count("none") / len(causes) < 0.4

@@ -34,6 +34,7 @@ def residual(noise: Noise) -> np.ndarray:
     return np.asarray(values[lead:])
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(
     "noise", [Noise(0.5), Noise(0.0, equation=0.2), Noise(0.3, coloured=0.8, memory=12.0)]
 )
