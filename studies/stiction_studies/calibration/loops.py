@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping
 
 from stiction_ros.records.record import Record
@@ -23,8 +24,8 @@ class KnownLoop:
     friction: bool | None
 
 
-def _plain(seed: int) -> KnownLoop:
-    loop = plain_loop(seed)
+def _plain(seed: int, quiet: bool = False) -> KnownLoop:
+    loop = plain_loop(seed, quiet=quiet)
     return KnownLoop(loop.record, loop.friction)
 
 
@@ -37,4 +38,8 @@ def _field(seed: int) -> KnownLoop:
     return KnownLoop(loop.record, True if loop.judged_slips >= MANY else None)
 
 
-WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {"field": _field, "plain": _plain}
+WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {
+    "field": _field,
+    "plain": _plain,
+    "quiet": functools.partial(_plain, quiet=True),
+}

@@ -21,7 +21,7 @@ SENSORS = ("plain", "stale", "wireless", "exception", "rounded")
 LOADS = ("walk", "coloured", "steps", "sine", "square", "triangle", "drifting_cycle")
 CYCLES = LOADS[3:]
 SUBSTEPS = 40  # of the stem's mechanics in a sample
-QUIET = 0.3  # share of loops on which little acts: a sticky valve makes a plain limit cycle
+HUSH, LITTLE = 0.2, 0.1  # of noise and load on a quiet loop: a valve makes a plain limit cycle
 MANY = 6  # slips from which a record shows friction
 MATTERS = 0.1  # band over the range of OP, least of a friction that matters
 
@@ -58,15 +58,18 @@ class PlainLoop:
         return True if shown else None
 
 
-def plain_loop(seed: int, law: str | None = None, sensor: str | None = None) -> PlainLoop:
+def plain_loop(
+    seed: int, law: str | None = None, sensor: str | None = None, quiet: bool = False
+) -> PlainLoop:
     """Return the loop of a seed.
 
     Args:
         seed: 0 or more.
         law: of the valve, of :data:`LAWS`, ``none`` or ``stuck``; drawn where None.
         sensor: of :data:`SENSORS`; drawn where None.
+        quiet: whether little but the valve moves the loop.
     """
-    random = np.random.default_rng([seed, 4711])
+    random = np.random.default_rng([seed, 4711, int(quiet)])
     drawn = random.choice(["none", "stuck", *LAWS], p=[0.47, 0.03, 0.14, 0.1, 0.1, 0.1, 0.06])
     law = law or str(drawn)
     kept = str(random.choice(SENSORS, p=[0.5, 0.14, 0.12, 0.12, 0.12]))
@@ -75,7 +78,7 @@ def plain_loop(seed: int, law: str | None = None, sensor: str | None = None) -> 
     kind = str(random.choice(["first", "second", "level"], p=[0.4, 0.35, 0.25]))
     lag, delay = _log(random, 3.0, 25.0), int(random.integers(0, 7))
     gain = _log(random, 0.3, 3.0) * float(random.choice([-1.0, 1.0]))
-    patience = _log(random, 0.7, 3.0)  # closed-loop time over the dead time
+    patience = _log(random, 0.7, 12.0)  # closed-loop time over the dead time: brisk to sluggish
     controller = "ringing" if law == "none" and random.random() < 0.12 else "calm"
     controller = "gap" if kind == "level" and random.random() < 0.15 else controller
     band = _log(random, 1.0, 10.0) if law in LAWS else 0.0
@@ -84,24 +87,17 @@ def plain_loop(seed: int, law: str | None = None, sensor: str | None = None) -> 
     outside = _load(random, load, count, lag + delay)
     size = band * random.uniform(0.1, 0.6) if band else _log(random, 0.3, 4.0)
     loop = _Loop(kind, lag, delay, gain, patience, controller, law, static, band - static)
-    if np.random.default_rng([seed, 4712]).random() < QUIET:
-        size, hush = 0.1 * size, 0.2
-    else:
-        hush = 1.0
-    noise = (
-        hush
-        * _noise(random, count)
-        * abs(gain)
-        * (0.05 * max(band, 1.0))
-        * random.uniform(0.2, 1.0)
-    )
+    hush = HUSH if quiet else 1.0
+    size = LITTLE * size if quiet else size
+    noise = _noise(random, count) * abs(gain) * 0.05 * max(band, 1.0)
+    noise *= hush * random.uniform(0.2, 1.0)
     moves = _set_points(random, count, abs(gain) * max(band, 2.0))
     push = np.zeros(count)
     push[:50] = 2.0 * band  # sets a cycle going
     op, stem, pv = loop.run(size * outside + push, noise, moves, Sensor(sensor, random, gain))
     span = float(np.subtract(*np.percentile(op, [98.0, 2.0])))
     record = Record(
-        name=f"plain{seed:05d}",
+        name=f"{'quiet' if quiet else 'plain'}{seed:05d}",
         sample_time=1.0,
         valves=("V1",),
         outputs=("PV1",),
