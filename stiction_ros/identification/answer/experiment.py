@@ -53,6 +53,11 @@ def experiment_for(record: Record, found: Identification, valve: int) -> str:
 
 def _reason(estimate: ValveEstimate, span: float) -> str:
     """Return why nothing was decided: the figure that speaks most against what is likelier."""
+    if not estimate.responds:
+        return (
+            f"PV does not answer OP of {estimate.name}: the stem is stuck, the valve is bypassed, "
+            "a tag is the wrong one, or OP moves too little beside the loads on PV."
+        )
     size = f"f_S {estimate.static_friction:.2g} %"
     high = estimate.static_interval[1]
     open_up_to = (

@@ -16,7 +16,7 @@ from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.laws import with_own_laws
-from stiction_ros.identification.evidence.measured_figures import figures_of
+from stiction_ros.identification.evidence.measured_figures import figures_of, responds
 from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
@@ -106,6 +106,9 @@ def concluded(
     found = _identification(record, data, part, options, best)
     closed = close_loop(record, found)
     told = [figures_of(seen, one, j, closed) for j, one in enumerate(agreed)]
+    best = tuple(
+        dataclasses.replace(one, responds=responds(seen, j)) for j, one in enumerate(best)
+    )
     judged = tuple(
         _judged(estimate, figures, partial(_stability, seen, one, j, record.sample_time))
         for j, (estimate, figures, one) in enumerate(zip(best, told, agreed, strict=True))

@@ -15,6 +15,7 @@ from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.output_fit import fit_output
 from stiction_ros.identification.evidence.rates import Agreement, Look
 from stiction_ros.identification.judgement.figures import Figures
+from stiction_ros.identification.judgement.probability import SURE
 
 ENDLESS = 100.0  # ratio that stands for a movement that grows without end
 FEW = 2.0
@@ -62,6 +63,22 @@ def _gain(look: Look, valve: int) -> float:
     """Return the nats by which friction beats an ideal valve and a PV that does not answer."""
     unanswered = _unanswered(look.problem, look.found.best, valve) - look.found.best.loss
     return 0.5 * min(look.accepted[valve].gain, unanswered)
+
+
+def responds(seen: Sequence[Look], valve: int) -> bool:
+    """Return whether PV answers a valve: at some rate more than no answer can be told.
+
+    Either friction gains its price over a PV that does not answer, or an ideal valve is as many
+    times as likely as a verdict asks.
+    """
+    least = -2.0 * math.log(1.0 - SURE)
+    for look in seen:
+        unanswered = _unanswered(look.problem, look.found.best, valve)
+        if unanswered - look.found.best.loss > look.price:
+            return True
+        if unanswered - look.found.without[valve].loss > least:
+            return True
+    return False
 
 
 def _unanswered(problem: Problem, best: Candidate, valve: int) -> float:

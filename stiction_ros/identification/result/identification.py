@@ -60,6 +60,7 @@ class ValveEstimate:
         further_intervals: values of each that the record does not reject.
         probability: of friction that matters, 0 to 1; None where a method does not tell.
         figures: what the probability is computed from.
+        responds: whether PV answers this valve at all, as far as the record shows.
         band_interval: values of f_S + f_D that the record does not reject, %; None where a method
             does not look at the sum: see :attr:`sum_interval`.
     """
@@ -84,6 +85,7 @@ class ValveEstimate:
     band_interval: tuple[float, float] | None = None
     probability: float | None = None
     figures: Figures | None = None
+    responds: bool = True
 
     @property
     def is_likely(self) -> bool:
@@ -129,6 +131,7 @@ class ValveEstimate:
             "name": self.name,
             "verdict": self.verdict.value,
             "probability": self.probability,
+            "responds": self.responds,
             "band_share": self.band_share,
             "stability": None if self.stability is None else self.stability.to_json(),
             "law": self.law,
