@@ -9,12 +9,15 @@ from functools import partial
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.exact.further_fit import begun, settled, with_further_estimates
-from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
-from stiction_ros.identification.exact.one_step_best import one_step_best, seen
-from stiction_ros.identification.exact.search import SearchOutcome, improve, search
+from stiction_ros.identification.evidence.fit_problem import Problem
+from stiction_ros.identification.evidence.further import settled as settled_further
+from stiction_ros.identification.evidence.rates import liveliest
+from stiction_ros.identification.evidence.search import GAIN, search
+from stiction_ros.identification.exact.further_fit import settled, with_further_estimates
+from stiction_ros.identification.exact.long_records import carried_over
+from stiction_ros.identification.exact.neighbourhood import REJECTED
+from stiction_ros.identification.exact.polygon_search import refine_near
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
@@ -27,6 +30,7 @@ from stiction_ros.identification.problem.models import (
     linear_model,
     refit,
     settle_delays,
+    stem_of,
 )
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, windows
@@ -36,10 +40,8 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
-from stiction_ros.identification.switching.patterns import has_cells
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -67,27 +69,22 @@ def identify_exact(
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    part = liveliest_part(data) if has_cells(data.law) else data
-    part, orders, linear, outcome, table = choose(part, options)
+    lively = liveliest(record)
+    part = data if lively is record else prepare(lively, options)
+    part, orders, linear, model, table, rivals = choose(lively, part, options)
     data = dataclasses.replace(data, further=part.further)
-    model = outcome.model
     report(0.4)
-    if part is not data:
+    if lively is not record:
         linear = linear_model(data, orders)
         model = carried_over(data, linear, model, orders)
     report(0.5)
     data, model = settled(data, model, orders)
     model, delays = settle_delays(data, model, orders)
-    (valves, final), one_step = at_once(
-        lambda: judged_valves(record, data, model, linear, orders, options),
-        lambda: least_one_step(record, data, model, orders, options),
-    )
-    if one_step is not None and (final.friction[:, 0] == 0.0).any():
-        one_step = also_from(one_step, record, data, (model, final), orders)
+    valves, final = judged_valves(record, data, model, linear, orders, options)
     valves = with_further_estimates(data, final, orders, valves, options.confidence)
     report(1.0)
-    told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
-    findings = Findings(final, valves, table, told, one_step)
+    told = (*ambiguities(record, delays, rivals), *certificates(valves))
+    findings = Findings(final, valves, table, told)
     answer = explained(record, conclude(record, data, findings, 0.0))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
@@ -134,53 +131,40 @@ def judged_valves(
     return valves, model
 
 
-def least_one_step(
-    record: Record, data: Data, model: Model, orders: Orders, options: IdentificationOptions
-) -> SearchLog | None:
-    """Return the least one-step SE, where it is asked for and the law has it."""
-    if not options.one_step_best or data.law is not HeStiction:
-        return None
-    return one_step_best(record, data, model, orders)
-
-
-def also_from(
-    found: SearchLog, record: Record, data: Data, models: tuple[Model, Model], orders: Orders
-) -> SearchLog:
-    """Return the lesser of the SE found from the first model and that from the second.
-
-    The second has no friction where the first is doubted. Where neither has any, the same
-    would be found again.
-    """
-    if np.array_equal(seen(data, models[0]), seen(data, models[1])):
-        return found
-    again = one_step_best(record, data, models[1], orders)
-    return min(found, again, key=lambda log: log.squared_error)
-
-
 def choose(
-    data: Data, options: IdentificationOptions
-) -> tuple[Data, Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
-    """Return data, orders, friction-free model, the one with friction and all orders tried.
+    record: Record, data: Data, options: IdentificationOptions
+) -> tuple[Data, Orders, Model, Model, tuple[OrderRow, ...], list[tuple[int, int]]]:
+    """Return data, orders, friction-free model, the one with friction, all orders tried, rivals.
 
-    The data hold the law's further parameters where they begin.
+    A rival is a pair of valves: the friction in the second explains the record as well as that in
+    the first.
+
+    Friction is searched under any smooth process (:mod:`.evidence.search`), which needs neither
+    orders nor delays; these are chosen for the stems that it gives.
     """
+    problem = Problem.of(record, options)
+    problem = dataclasses.replace(problem, further=settled_further(problem))
+    found = search(problem)
+    best, spans = found.best, problem.span
+    data = dataclasses.replace(data, further=problem.further)
+    friction, starts = best.friction * spans[:, None], best.starts * spans
+    stems = np.array([stem_of(data, j, friction[j], float(starts[j])) for j in range(len(starts))])
+    base = Model(friction, starts, stems, ((data.delay[0],) * len(starts),) * len(data.y), ())
     orders_list = windows(options)
-    start = orders_list[len(orders_list) // 2]
-    linear = linear_model(data, start)
-    data = begun(data, linear, start)
-    found = search(data, linear, start)
-    if len(orders_list) == 1:
-        return data, start, linear, found, (order_row(start, found.model),)
-    models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
+    models = together(*(partial(linear_model, data, n, base) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
-    table = tuple(order_row(*rival) for rival in rivals)
-    orders, best = min(rivals, key=lambda rival: rival[1].bic)
-    if orders != start:
-        linear = linear_model(data, orders)
-        found = search(data, linear, orders, growing=False)
-        best = improve(data, best, orders)
-    better = min(best, found.model, key=lambda candidate: candidate.loss)
-    return data, orders, linear, dataclasses.replace(found, model=better), table
+    orders, model = min(rivals, key=lambda rival: rival[1].bic)
+    linear = linear_model(data, orders)
+    for valve in np.flatnonzero(model.friction[:, 0]).tolist():
+        model, _ = refine_near(data, model, orders, valve, REJECTED)
+    model = min(linear, model, key=lambda one: one.loss)
+    alike = [
+        (j, k)
+        for j, other in enumerate(found.without)
+        for k in np.flatnonzero(other.friction[:, 0] > best.friction[:, 0]).tolist()
+        if other.loss < best.loss + GAIN
+    ]
+    return data, orders, linear, model, tuple(order_row(*rival) for rival in rivals), alike
 
 
 def order_row(orders: Orders, model: Model) -> OrderRow:
@@ -192,7 +176,7 @@ def order_row(orders: Orders, model: Model) -> OrderRow:
 def ambiguities(
     record: Record,
     delays: list[list[tuple[int, ...]]],
-    valves: tuple[tuple[int, int], ...],
+    valves: list[tuple[int, int]],
 ) -> tuple[str, ...]:
     """Return sentences on what explains the record equally well."""
     told = [

@@ -145,7 +145,7 @@ class _Heard:
         model, table = _process(self.small, self.options, valves, self.part)
         if self.part is not self.record:
             valves, model = _over_all(self.record, self.data, valves, model)
-        findings = Findings(model, valves, table, (), None)
+        findings = Findings(model, valves, table, ())
         concluded = conclude(self.record, self.data, findings, 0.0)
         return explained(self.record, dataclasses.replace(concluded, method="evidence"))
 
