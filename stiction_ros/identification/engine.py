@@ -10,14 +10,14 @@ from functools import partial
 import numpy as np
 
 from stiction_ros.identification.closed_loop.explanation import explained
+from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled as settled_further
 from stiction_ros.identification.evidence.rates import liveliest
-from stiction_ros.identification.evidence.search import GAIN, search
+from stiction_ros.identification.evidence.search import GAIN, HEADS, NEAR, Parts, heads, search
 from stiction_ros.identification.exact.further_fit import settled, with_further_estimates
 from stiction_ros.identification.exact.long_records import carried_over
-from stiction_ros.identification.exact.neighbourhood import REJECTED
-from stiction_ros.identification.exact.polygon_search import refine_near
+from stiction_ros.identification.exact.polish import polished
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.certificate import certificates
 from stiction_ros.identification.inference.conclusion import Findings, conclude
@@ -144,27 +144,34 @@ def choose(
     """
     problem = Problem.of(record, options)
     problem = dataclasses.replace(problem, further=settled_further(problem))
-    found = search(problem)
-    best, spans = found.best, problem.span
+    found = search(problem, Parts(polish=False))  # the exact polish is closer
     data = dataclasses.replace(data, further=problem.further)
-    friction, starts = best.friction * spans[:, None], best.starts * spans
-    stems = np.array([stem_of(data, j, friction[j], float(starts[j])) for j in range(len(starts))])
-    base = Model(friction, starts, stems, ((data.delay[0],) * len(starts),) * len(data.y), ())
+    sticky = np.flatnonzero(found.best.friction[:, 0]).tolist()
+    near = [one for j in sticky for one in heads(found, j, HEADS, NEAR)]
+    near = sorted({id(one): one for one in near}.values(), key=lambda one: one.loss)
+    first, *others = [_begun(data, problem, one) for one in near[:HEADS] or [found.best]]
     orders_list = windows(options)
-    models = together(*(partial(linear_model, data, n, base) for n in orders_list))
+    models = together(*(partial(linear_model, data, n, first) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
     orders, model = min(rivals, key=lambda rival: rival[1].bic)
     linear = linear_model(data, orders)
-    for valve in np.flatnonzero(model.friction[:, 0]).tolist():
-        model, _ = refine_near(data, model, orders, valve, REJECTED)
-    model = min(linear, model, key=lambda one: one.loss)
+    models = [model, *(linear_model(data, orders, other) for other in others)]
+    model = min(linear, polished(data, orders, models), key=lambda one: one.loss)
     alike = [
         (j, k)
         for j, other in enumerate(found.without)
-        for k in np.flatnonzero(other.friction[:, 0] > best.friction[:, 0]).tolist()
-        if other.loss < best.loss + GAIN
+        for k in np.flatnonzero(other.friction[:, 0] > found.best.friction[:, 0]).tolist()
+        if other.loss < found.best.loss + GAIN
     ]
     return data, orders, linear, model, tuple(order_row(*rival) for rival in rivals), alike
+
+
+def _begun(data: Data, problem: Problem, found: Candidate) -> Model:
+    """Return a model, not yet fitted, with the stems of what a search met."""
+    friction, starts = found.friction * problem.span[:, None], found.starts * problem.span
+    stems = [stem_of(data, j, friction[j], float(starts[j])) for j in range(len(starts))]
+    delays = ((data.delay[0],) * len(starts),) * len(data.y)
+    return Model(friction, starts, np.array(stems), delays, ())
 
 
 def order_row(orders: Orders, model: Model) -> OrderRow:

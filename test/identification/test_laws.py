@@ -16,9 +16,7 @@ MOVING = ("kano", "choudhury", "xch")
 
 
 def options(law: str) -> IdentificationOptions:
-    return IdentificationOptions(
-        "exact", output_order=3, input_order=3, law=law, one_step_best=False
-    )
+    return IdentificationOptions("exact", output_order=3, input_order=3, law=law)
 
 
 @pytest.fixture(scope="module")

@@ -60,12 +60,14 @@ class Parts:
         triangle: seeds from a grid at slower rates.
         waves: all once more beside a wave from outside, where one may be there.
         tuning: what the controller tells of the process it was tuned for.
+        polish: closer and closer looks round what seeds have shown.
     """
 
     growing: bool = True
     triangle: bool = True
     waves: bool = True
     tuning: bool = True
+    polish: bool = True
 
 
 ALL = Parts()
@@ -242,8 +244,9 @@ def search_valve(
         looked.look(drifting)
     if looked.met:
         looked.settle(anew=True)
-        looked.polish()
-        looked.settle()
+        if parts.polish:
+            looked.polish()
+            looked.settle()
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 
