@@ -48,6 +48,7 @@ def told_by(code: str) -> str:
     ).stdout
 
 
+@pytest.mark.trial
 def test_another_process_compiles_what_an_identification_needs() -> None:
     assert told_by(NEEDED).split() == ["1", "1", "1", "1", "1", "1"]
 

@@ -43,6 +43,7 @@ def tank_gains(model: LoopModel, samples: int, order: int, seeds: range) -> np.n
     return np.array([fit.gain for fit in fits])
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("order", [2, 5])
 def test_gains_of_the_paper_are_one_draw_of_a_short_experiment(order: int) -> None:
     gains = tank_gains(TANK, 300, order, range(40)).reshape(40, 4)
@@ -52,6 +53,7 @@ def test_gains_of_the_paper_are_one_draw_of_a_short_experiment(order: int) -> No
     assert paper @ centred @ paper < np.max(distances)
 
 
+@pytest.mark.trial
 def test_long_experiments_give_the_gains_of_the_tank() -> None:
     gains = tank_gains(TANK, 3000, 2, range(6))
     truth = TANK.process.linear(60.0).gain
@@ -154,6 +156,7 @@ def test_bias_of_the_json_is_in_absolute_units() -> None:
     assert right == pytest.approx(y[k], abs=1e-6)
 
 
+@pytest.mark.trial
 def test_state_space_takes_the_delay_of_the_valve() -> None:
     random = np.random.default_rng(3)
     a, b = (-1.5, 0.7), ((0.05, 0.03),)
