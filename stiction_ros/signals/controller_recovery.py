@@ -31,6 +31,7 @@ from stiction_ros.signals.recovered_controller import (
     RecoveredController,
     Stretches,
 )
+from stiction_ros.signals.velocity_form import terms
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
@@ -82,7 +83,7 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
     scales = (_spread(op[rows]), _spread(set_point[rows] - pv[rows]))
     if len(rows) < LEAST_ROWS or min(scales) <= 0.0:
         reason = "OP or the error does not move in automatic"
-        return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
+        return RecoveredController(ControllerStatus.NO_MOVES, reason, set_point, limits)
     error = (set_point - pv) / scales[1]
     command = (op - float(op[rows].mean())) / scales[0]
     filtered = {
@@ -98,7 +99,7 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
     fits = {span: fit for span, fit in textbook.items() if fit is not None}
     if not fits:
         reason = f"fewer than {LEAST_ROWS} samples in automatic"
-        return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
+        return RecoveredController(ControllerStatus.NO_MOVES, reason, set_point, limits)
     top = max(fit.r_squared for fit in fits.values())
     span = next(span for span, fit in fits.items() if fit.r_squared >= top - NEARLY)
     kinds = itertools.product(LAGS, FILTERS, (False, True))
@@ -156,8 +157,7 @@ def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
         if last - start <= h:
             continue
         error = filtered[1 : last - first - form.lag]
-        sums = np.concatenate([[0.0], np.cumsum(error)])
-        columns = [error[h:] - error[:-h], (sums[h:] - sums[:-h])[1:]]
+        columns = [terms(error, h)]
         if form.derivative:
             change = error - filtered[: len(error)]
             columns.append(change[h:] - change[:-h])
@@ -167,8 +167,6 @@ def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
         kept = free[h:] & free[:-h]
         rows.append(np.column_stack(columns)[kept])
         moves.append((command[h:] - command[:-h])[kept])
-    if not rows:
-        return np.empty((0, 2)), np.empty(0)
     return np.vstack(rows), np.concatenate(moves)
 
 
@@ -291,22 +289,14 @@ def _told(
     return RecoveredController(
         status,
         reason,
+        set_point,
+        limits,
         coefficients,
         covariance,
         form.lag,
         form.smoothing,
         form.span,
         fit.r_squared,
-        set_point,
-        limits,
-    )
-
-
-def _failed(
-    status: ControllerStatus, reason: str, set_point: FloatArray, limits: tuple[float, float]
-) -> RecoveredController:
-    return RecoveredController(
-        status, reason, np.zeros(3), np.zeros((3, 3)), 0, 0.0, 1, 0.0, set_point, limits
     )
 
 

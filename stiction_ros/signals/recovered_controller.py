@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import enum
 
+import numpy as np
+
 from stiction_ros.effects.behaviour import FloatArray
 
 Stretches = list[tuple[int, int]]
@@ -25,6 +27,9 @@ class RecoveredController:
     Attributes:
         status: ok, or why there is none.
         reason: one sentence; empty when ok.
+        set_point: as recorded or found, shape (N,).
+        limits: where OP was seen to rest while the controller would have gone on; infinite
+            where it was not.
         coefficients: (K, K_i, K_d), OP per unit of PV and sample, signed for e = SP − PV,
             shape (3,).
         covariance: of the coefficients from a jackknife over blocks, shape (3, 3).
@@ -32,21 +37,18 @@ class RecoveredController:
         smoothing: share of the last value in the filter of the error.
         span: h, samples.
         r_squared: share of the moves of OP over h samples that is explained.
-        set_point: as recorded or found, shape (N,).
-        limits: where OP was seen to rest while the controller would have gone on; infinite
-            where it was not.
     """
 
     status: ControllerStatus
     reason: str
-    coefficients: FloatArray
-    covariance: FloatArray
-    lag: int
-    smoothing: float
-    span: int
-    r_squared: float
     set_point: FloatArray
     limits: tuple[float, float]
+    coefficients: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
+    covariance: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((3, 3)))
+    lag: int = 0
+    smoothing: float = 0.0
+    span: int = 1
+    r_squared: float = 0.0
 
     @property
     def gain(self) -> float:
