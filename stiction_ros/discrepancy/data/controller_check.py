@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
-from stiction_ros.discrepancy.data.op_steps import OpSteps, law_terms, other_tuning
+from stiction_ros.discrepancy.data.op_steps import OpSteps, errors_of, law_terms, other_tuning
 from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
@@ -293,7 +293,7 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
     """
     low, high = model.limits[0]
     moves, columns = [], []
-    errors = runs.errors(model.outputs[0], shift)
+    errors = errors_of(model, runs, shift)
     for record, rows, error in zip(runs.records, runs.slices, errors, strict=True):
         op, count = runs.op[rows, 0], len(error)
         if count < 2:

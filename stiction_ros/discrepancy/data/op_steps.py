@@ -39,7 +39,7 @@ class OpSteps:
         """Return those of records in which SP is recorded."""
         parts = [
             (runs.op[rows, 0], law_terms(error, runs.sample_time))
-            for rows, error in zip(runs.slices, runs.errors(model.outputs[0]), strict=True)
+            for rows, error in zip(runs.slices, errors_of(model, runs), strict=True)
         ]
         low, high = model.limits[0].tolist()
         quantum = quantum_of(runs.op[:, 0])
@@ -89,6 +89,16 @@ def other_tuning(steps: OpSteps, recorded: PiTuning) -> PiTuning | None:
     best = np.nonzero(out == out.min())
     gain, time = (float(np.exp(np.log(FACTORS[index]).mean())) for index in best)
     return PiTuning(recorded.gain * gain, recorded.integral_time * time)
+
+
+def errors_of(model: LoopModel, runs: Runs, shift: int = 0) -> list[FloatArray]:
+    """Return SP − PV of each record, shape (n − shift,), where PV is ``shift`` samples late."""
+    found = []
+    for record, rows in zip(runs.records, runs.slices, strict=True):
+        assert record.sp is not None
+        late = runs.pv[rows, 0][shift:]
+        found.append(record.sp[: len(late), record.outputs.index(model.outputs[0])] - late)
+    return found
 
 
 def law_terms(error: FloatArray, sample_time: float) -> FloatArray:

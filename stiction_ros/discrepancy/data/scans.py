@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.data.op_steps import errors_of
 from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray
@@ -107,7 +108,7 @@ def _parts(model: LoopModel, runs: Runs) -> list[_Part]:
     low, high = model.limits[0].tolist()
     return [
         _Part.of(runs.op[rows, 0], error, (low, high))
-        for rows, error in zip(runs.slices, runs.errors(model.outputs[0]), strict=True)
+        for rows, error in zip(runs.slices, errors_of(model, runs), strict=True)
     ]
 
 

@@ -108,20 +108,6 @@ class Runs:
         """Rows of the longest record."""
         return max(self.slices, key=lambda rows: rows.stop - rows.start)
 
-    def errors(self, output: str, shift: int = 0) -> list[FloatArray]:
-        """Return SP − PV of each record of a loop of one output, shape (n − shift,).
-
-        Args:
-            output: its tag.
-            shift: samples by which PV is late.
-        """
-        found = []
-        for record, rows in zip(self.records, self.slices, strict=True):
-            assert record.sp is not None
-            late = self.pv[rows, 0][shift:]
-            found.append(record.sp[: len(late), record.outputs.index(output)] - late)
-        return found
-
     def __len__(self) -> int:
         return len(self.op)
 
