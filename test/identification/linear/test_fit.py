@@ -18,13 +18,14 @@ from stiction_ros.identification.linear.data import (
     nrmse_fit,
     prepare_linear,
 )
-from stiction_ros.identification.linear.fit import LinearOptions, controller_share, fit_linear
+from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
 from stiction_ros.identification.linear.result import LinearIdentification
 from stiction_ros.identification.linear.subspace import SubspaceOptions, fit_state_space
 from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
 from stiction_ros.loop import LoopModel, prbs_experiment
 from stiction_ros.processes import ArxProcess, StateSpaceProcess
 from stiction_ros.records.record import Record
+from stiction_ros.signals.velocity_form import explained
 
 TANK = LoopModel.load(find_config("tank.loop.yaml")).with_ideal_valves()
 LINEAR_TANK = LoopModel.load(find_config("tank_linear.loop.yaml"))
@@ -193,7 +194,7 @@ def test_record_that_only_shows_its_controller_is_named(excitation: float, said:
     record = Record("PI", 1.0, ("V1",), ("PV1",), op[:, None], pv[:, None])
     notes = fit_linear(record, LinearOptions(kind=LinearKind.ARX, output_order=1)).notes
     assert any("PI law" in note for note in notes) is said
-    assert bool(controller_share(record.op, record.pv)[0] > 0.999) is said
+    assert (explained(record.op[:, 0], record.pv) > 0.999) is said
 
 
 def test_unstable_model_makes_no_loop() -> None:
