@@ -35,6 +35,7 @@ REASONS: dict[str, dict[str, str]] = {
     IDENTIFY: {
         "records": "a record tells of itself: how long it is, what it is good for, its parts",
         "effects": "which laws there are, their parameters, and grids of frictions at once",
+        "signals": "a recovered controller tells its gain and its integral time",
         "base": "what SciPy has in packages that load slowly is called where it is loaded late; "
         "how many threads there are is nobody's floor",
     },

@@ -1,0 +1,1 @@
+"""What recorded signals say by themselves, before any model of a loop."""
