@@ -14,8 +14,9 @@ from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled as settled_further
 from stiction_ros.identification.evidence.rates import liveliest
-from stiction_ros.identification.evidence.search import GAIN, HEADS, NEAR, Parts, heads, search
+from stiction_ros.identification.evidence.search import HEADS, NEAR, Parts, heads, search
 from stiction_ros.identification.exact.further_fit import settled, with_further_estimates
+from stiction_ros.identification.exact.growing_swarm import growing_swarm
 from stiction_ros.identification.exact.long_records import carried_over
 from stiction_ros.identification.exact.polish import polished
 from stiction_ros.identification.identification_options import IdentificationOptions
@@ -42,6 +43,7 @@ from stiction_ros.identification.result.identification import (
 )
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
+from stiction_ros.identification.switching.patterns import has_cells
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -71,7 +73,7 @@ def identify_exact(
     report(0.02)
     lively = liveliest(record)
     part = data if lively is record else prepare(lively, options)
-    part, orders, linear, model, table, rivals = choose(lively, part, options)
+    part, orders, linear, model, table = choose(lively, part, options)
     data = dataclasses.replace(data, further=part.further)
     report(0.4)
     if lively is not record:
@@ -83,7 +85,7 @@ def identify_exact(
     valves, final = judged_valves(record, data, model, linear, orders, options)
     valves = with_further_estimates(data, final, orders, valves, options.confidence)
     report(1.0)
-    told = (*ambiguities(record, delays, rivals), *certificates(valves))
+    told = (*ambiguities(record, delays), *certificates(valves))
     findings = Findings(final, valves, table, told)
     answer = explained(record, conclude(record, data, findings, 0.0))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
@@ -133,11 +135,8 @@ def judged_valves(
 
 def choose(
     record: Record, data: Data, options: IdentificationOptions
-) -> tuple[Data, Orders, Model, Model, tuple[OrderRow, ...], list[tuple[int, int]]]:
-    """Return data, orders, friction-free model, the one with friction, all orders tried, rivals.
-
-    A rival is a pair of valves: the friction in the second explains the record as well as that in
-    the first.
+) -> tuple[Data, Orders, Model, Model, tuple[OrderRow, ...]]:
+    """Return data, orders, friction-free model, the one with friction and all orders tried.
 
     Friction is searched under any smooth process (:mod:`.evidence.search`), which needs neither
     orders nor delays; these are chosen for the stems that it gives.
@@ -146,8 +145,7 @@ def choose(
     problem = dataclasses.replace(problem, further=settled_further(problem))
     found = search(problem, Parts(polish=False))  # the exact polish is closer
     data = dataclasses.replace(data, further=problem.further)
-    sticky = np.flatnonzero(found.best.friction[:, 0]).tolist()
-    near = [one for j in sticky for one in heads(found, j, HEADS, NEAR)]
+    near = [one for j in range(len(data.u)) for one in heads(found, j, HEADS, NEAR)]
     near = sorted({id(one): one for one in near}.values(), key=lambda one: one.loss)
     first, *others = [_begun(data, problem, one) for one in near[:HEADS] or [found.best]]
     orders_list = windows(options)
@@ -157,13 +155,15 @@ def choose(
     linear = linear_model(data, orders)
     models = [model, *(linear_model(data, orders, other) for other in others)]
     model = min(linear, polished(data, orders, models), key=lambda one: one.loss)
-    alike = [
-        (j, k)
-        for j, other in enumerate(found.without)
-        for k in np.flatnonzero(other.friction[:, 0] > found.best.friction[:, 0]).tolist()
-        if other.loss < found.best.loss + GAIN
-    ]
-    return data, orders, linear, model, tuple(order_row(*rival) for rival in rivals), alike
+    if not has_cells(data.law):
+        model = _grown(data, orders, linear, model)
+    return data, orders, linear, model, tuple(order_row(*rival) for rival in rivals)
+
+
+def _grown(data: Data, orders: Orders, linear: Model, model: Model) -> Model:
+    """Return the better of a model and those that swarms on growing windows end at."""
+    grown = [growing_swarm(data, linear, orders, j) for j in range(len(data.u))]
+    return min([model, *filter(None, grown)], key=lambda one: one.loss)
 
 
 def _begun(data: Data, problem: Problem, found: Candidate) -> Model:
@@ -180,24 +180,14 @@ def order_row(orders: Orders, model: Model) -> OrderRow:
     return OrderRow(orders.output, orders.input, model.loss + 2.0 * parameters, model.bic)
 
 
-def ambiguities(
-    record: Record,
-    delays: list[list[tuple[int, ...]]],
-    valves: list[tuple[int, int]],
-) -> tuple[str, ...]:
-    """Return sentences on what explains the record equally well."""
-    told = [
+def ambiguities(record: Record, delays: list[list[tuple[int, ...]]]) -> tuple[str, ...]:
+    """Return sentences on delays that explain the record equally well."""
+    return tuple(
         f"delays {', '.join(map(str, near))} of {valve} to {output} explain the record equally well"
         for output, row in zip(record.outputs, delays, strict=True)
         for valve, near in zip(record.valves, row, strict=True)
         if len(near) > 1
-    ]
-    told += [
-        f"friction in {record.valves[other]} explains the record as well as in "
-        f"{record.valves[chosen]}"
-        for chosen, other in valves
-    ]
-    return tuple(told)
+    )
 
 
 def linear_rivals(

@@ -11,8 +11,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.identification.exact.neighbourhood import REJECTED
-from stiction_ros.identification.exact.polygon_search import refine_near
+from stiction_ros.identification.exact.polish import look_round
 from stiction_ros.identification.problem.models import Data, Model, refit, stem_of
 from stiction_ros.identification.problem.output_error import Orders
 
@@ -25,8 +24,7 @@ def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Mod
         found: the part's model; its friction and delays are taken.
     """
     stems = linear.stems.copy()
-    sticky = [int(j) for j in np.flatnonzero(found.friction[:, 0])]
-    for j in sticky:
+    for j in np.flatnonzero(found.friction[:, 0]).tolist():
         stems[j] = stem_of(data, j, found.friction[j], 0.0)
     model = dataclasses.replace(
         linear,
@@ -36,6 +34,4 @@ def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Mod
         delays=found.delays,
     )
     model = refit(data, model, orders, warm=False)
-    for j in sticky:
-        model, _ = refine_near(data, model, orders, j, REJECTED)
-    return min(linear, model, key=lambda candidate: candidate.loss)
+    return min(linear, look_round(data, model, orders), key=lambda candidate: candidate.loss)

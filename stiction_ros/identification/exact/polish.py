@@ -52,11 +52,12 @@ def polished(data: Data, orders: Orders, heads: Sequence[Model]) -> Model:
         orders: of the process.
         heads: one model for each friction, fitted.
     """
-    near = [_looked_round(data, head, orders) for head in heads]
+    near = [look_round(data, head, orders) for head in heads]
     return improve(data, min(near, key=lambda model: model.loss), orders)
 
 
-def _looked_round(data: Data, model: Model, orders: Orders) -> Model:
+def look_round(data: Data, model: Model, orders: Orders) -> Model:
+    """Return the best model close round the friction of each valve."""
     for valve in np.flatnonzero(model.friction[:, 0]).tolist():
         parents, ranges = model.friction[valve][None, :], nearby_delays(data, model, valve)
         model = descend(data, model, orders, valve, parents, ranges)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.exact.growing_swarm import swarm_round
 from stiction_ros.identification.exact.neighbourhood import PatternMap
 from stiction_ros.identification.exact.pattern_search import (
     PatternSearch,
@@ -17,7 +18,6 @@ from stiction_ros.identification.exact.pattern_search import (
     points_of,
 )
 from stiction_ros.identification.exact.polygon_search import PolygonMap, refine_near
-from stiction_ros.identification.exact.swarm import swarm_round
 from stiction_ros.identification.friction.grid import coarse_grid, finer_grid
 from stiction_ros.identification.problem.models import (
     Data,

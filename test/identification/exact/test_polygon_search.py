@@ -1,14 +1,16 @@
 """Near the truth the polygons are closed, and no point of their region beats the best."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import simulated_loops as loops
 
 from stiction_ros.effects import SemiPhysicalStiction
 from stiction_ros.identification import IdentificationOptions
+from stiction_ros.identification.exact.growing_swarm import growing_swarm, swarm_round
 from stiction_ros.identification.exact.pattern_search import nearby_delays
 from stiction_ros.identification.exact.polygon_search import polygon_neighbourhood, refine_near
-from stiction_ros.identification.exact.swarm import swarm_round
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -63,6 +65,22 @@ def test_valve_without_friction_has_no_polygons(at_truth: tuple[Data, Model, Ord
     data, _, orders = at_truth
     linear = linear_model(data, orders)
     assert refine_near(data, linear, orders, 0, 8.0) == (linear, None)
+
+
+def test_growing_windows_end_at_the_truth(at_truth: tuple[Data, Model, Orders]) -> None:
+    data, model, orders = at_truth
+    found = growing_swarm(data, linear_model(data, orders), orders, 0)
+    assert found is not None
+    assert found.friction[0] == pytest.approx(TRUTH, abs=0.05)
+    assert found.loss < model.loss + 20.0
+
+
+def test_a_record_shorter_than_the_first_window_is_given_up(
+    at_truth: tuple[Data, Model, Orders],
+) -> None:
+    data, _, orders = at_truth
+    short = dataclasses.replace(data, y=data.y[:, :60], u=data.u[:, :60])
+    assert growing_swarm(short, linear_model(short, orders), orders, 0) is None
 
 
 def test_swarm_stays_in_the_triangle(at_truth: tuple[Data, Model, Orders]) -> None:
