@@ -23,7 +23,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
+from stiction_ros.signals.outside_line import LEAST_PER_HARMONIC
 
 LAGS = 30
 """n, at most."""

@@ -22,14 +22,15 @@ from stiction_ros.gain.retuning import (
     most_helpful,
     peak,
 )
-from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import Controller, PiController, simulate_closed_loop
 from stiction_ros.loop.model import PiTuning
 from stiction_ros.loop.plant import Measurement
-from stiction_ros.loop.set_points import SetPoints, holds
+from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.processes.process import NoiseEntry
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import oscillation
 
 SAMPLES = 2000
 """Samples that are simulated."""

@@ -31,7 +31,6 @@ from stiction_ros.gain.loop_runs import Control, Equations, Laws, RecoveredContr
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
 from stiction_ros.identification.closed_loop.closed_loop import output_oscillation, paired
 from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.closed_loop.oscillation import NEEDED_CYCLES, oscillation
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.repeated_runs import controllers_of, period_of
 from stiction_ros.identification.closed_loop.scaled_loop import (
@@ -51,8 +50,9 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import NEEDED_CYCLES, oscillation
 
 MOST = 4000
 """Samples that are run again, the last ones: hundreds of cycles say no more."""

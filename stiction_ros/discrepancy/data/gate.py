@@ -9,13 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.data.filled import OFTEN, drawn, held
-from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, BoolArray, autoregression, whiten
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
-from stiction_ros.effects.behaviour import IntArray
+from stiction_ros.effects.behaviour import BoolArray, IntArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-from stiction_ros.records.parts import stretches
+from stiction_ros.signals.autoregression import best_autoregression, whiten
+from stiction_ros.signals.holds import stretches
 
 SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
@@ -321,7 +322,7 @@ def _surprise(runs: Runs, output: int) -> float:
         rows[part.start : part.start + MAX_ORDER] = False
     if not rows.any():
         return math.inf
-    return float(np.std(whiten(values, autoregression(values, rows))[rows]))
+    return float(np.std(whiten(values, best_autoregression(values, rows, MAX_ORDER)[0])[rows]))
 
 
 def _again(values: FloatArray, quantum: float, usable: BoolArray) -> BoolArray:

@@ -13,8 +13,7 @@ from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import Block, Law
 from stiction_ros.discrepancy.gap.noise_score import best_figures, score_of, shown_of
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 PLAYS = (0.1, 0.25, 0.5)  # of the span of OP: bands whose strain is asked for
 RESTS = 0.1  # of the samples, in which a stem has to rest for its moves to be told from all others

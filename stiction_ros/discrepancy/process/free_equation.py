@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.deferred import lfilter
-from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, fit_noise, whiten
+from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, fit_noise
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.kernels.polynomials import stabilised
+from stiction_ros.signals.autoregression import whiten
+from stiction_ros.signals.polynomials import stabilised
 
 RADIUS = 0.9995
 LARGEST_START = 0.995

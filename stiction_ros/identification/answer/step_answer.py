@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.polynomials import filtered
 from stiction_ros.identification.result.identification import OutputModel
+from stiction_ros.signals.polynomials import filtered
 
 RISEN = 0.632
 """Share of the whole answer that a first-order process has given after one lag."""

@@ -17,18 +17,6 @@ import numpy as np
 from stiction_ros.identification.closed_loop.damping import LinearController, Ringing, ringing
 from stiction_ros.identification.closed_loop.loop_run import Process
 from stiction_ros.identification.closed_loop.movement import STILL, Movement, compare
-from stiction_ros.identification.closed_loop.oscillation import (
-    Oscillation,
-    amplitude,
-    oscillation,
-)
-from stiction_ros.identification.closed_loop.outside_line import (
-    NO_LINE,
-    OutsideLine,
-    Predicted,
-    beside,
-    outside_line,
-)
 from stiction_ros.identification.closed_loop.recovered_controller import (
     ControllerStatus,
     LoopSignals,
@@ -48,8 +36,20 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
 )
 from stiction_ros.identification.side_by_side import at_once
-from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import (
+    Oscillation,
+    amplitude,
+    oscillation,
+)
+from stiction_ros.signals.outside_line import (
+    NO_LINE,
+    OutsideLine,
+    Predicted,
+    beside,
+    outside_line,
+)
 
 UNSEEN_CYCLES = 10
 """Cycles that a record without an oscillation is taken to have room for."""

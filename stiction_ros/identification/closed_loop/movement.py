@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.oscillation import slow_mean
+from stiction_ros.signals.oscillation import slow_mean
 
 ALIKE = (0.5, 1.7)
 """Movement of OP over the recorded one that is the same cycle."""

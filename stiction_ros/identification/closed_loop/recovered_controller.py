@@ -25,8 +25,8 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.polynomials import recursion
-from stiction_ros.records.parts import stretches
+from stiction_ros.signals.holds import stretches
+from stiction_ros.signals.polynomials import recursion
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 Stretches = list[tuple[int, int]]

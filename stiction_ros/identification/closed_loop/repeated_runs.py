@@ -12,15 +12,15 @@ from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.switching import MovingCells, SlipPolygons
 from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
 from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
-from stiction_ros.identification.closed_loop.oscillation import (
-    REGULAR,
-    Oscillation,
-    oscillation,
-)
 from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.signals.oscillation import (
+    REGULAR,
+    Oscillation,
+    oscillation,
+)
 
 STARTS = (0.2, 0.5, 0.8)
 """Shares of the longest stretch at which runs begin as recorded."""

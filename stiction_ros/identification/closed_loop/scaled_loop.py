@@ -12,9 +12,9 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.result.identification import OutputModel
 from stiction_ros.records.record import Record
+from stiction_ros.signals.polynomials import recursion
 
 DIGITS = 7
 """Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bits of

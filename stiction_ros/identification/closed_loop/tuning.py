@@ -21,11 +21,11 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.closed_loop.closed_loop import UNSEEN_CYCLES, paired
-from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.identification.closed_loop.repeated_runs import period_of
 from stiction_ros.identification.closed_loop.scaled_loop import scaled
 from stiction_ros.identification.linear.response_prior import Reach
 from stiction_ros.records.record import Record
+from stiction_ros.signals.oscillation import oscillation
 
 RESETS = 3.0  # reset times after which the answer is looked at
 LEAST_FIT = 0.5  # R² of a controller whose gain is believed: rounded and held PV make it too small

@@ -20,13 +20,13 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import LINE
-from stiction_ros.identification.closed_loop.outside_line import (
+from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
+from stiction_ros.identification.kernels.lags import with_past
+from stiction_ros.signals.outside_line import (
     LEAST_PER_HARMONIC,
     independent,
     waves_of,
 )
-from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
-from stiction_ros.identification.kernels.lags import with_past
 
 HARMONICS = 25  # H, at most: corners of a square wave
 LEAST_CYCLES = 4.0  # of a wave, in a record

@@ -18,7 +18,7 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.exact.growing_windows import (
     beginning_of_data,
     beginning_of_model,
@@ -28,7 +28,6 @@ from stiction_ros.identification.exact.growing_windows import (
 )
 from stiction_ros.identification.exact.pattern_search import PatternSearch, points_of
 from stiction_ros.identification.friction.grid import even_grid
-from stiction_ros.identification.kernels.step import IntArray
 from stiction_ros.identification.problem.models import Criterion, Data, Model, with_valve
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.switching.patterns import Beginning, cells_at

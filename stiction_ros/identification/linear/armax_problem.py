@@ -16,7 +16,7 @@ import numpy as np
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels import polynomials
+from stiction_ros.signals import polynomials
 
 MAX_RADIUS = 0.9995
 INSIDE = 0.98

@@ -17,13 +17,12 @@ import numpy as np
 from scipy.linalg import lstsq
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.kernels.polynomials import recursion, stabilised
 from stiction_ros.records.record import Record
+from stiction_ros.signals.polynomials import recursion, stabilised
 
 RANK_TOLERANCE = 1e-12
-BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 Delays = tuple[tuple[int, ...], ...]
 
 

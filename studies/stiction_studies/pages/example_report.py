@@ -10,7 +10,6 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
-from stiction_ros.loop.set_points import set_point_moves
 from stiction_ros.processes import StirredTank
 from stiction_ros.report.drawing import (
     BLUE,
@@ -35,6 +34,7 @@ from stiction_ros.report.shapes import (
     fitted_start,
     free_run,
 )
+from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import finite
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison
 from stiction_studies.examples.example import Example

@@ -8,7 +8,7 @@ from known_loops import DELAY, Kind, known
 
 from stiction_ros.identification.closed_loop.damping import LinearController, ringing
 from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.closed_loop.outside_line import (
+from stiction_ros.signals.outside_line import (
     NO_LINE,
     Predicted,
     beside,

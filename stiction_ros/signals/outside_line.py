@@ -19,8 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.step import IntArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 ORDER = 5
 """n, samples of the past: enough to leave white noise of what loops are sampled at."""

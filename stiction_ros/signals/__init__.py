@@ -1,0 +1,1 @@
+"""What a signal says of itself: noise, lines, cycles, stretches, filters; one of each."""
