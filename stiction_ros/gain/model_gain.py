@@ -209,8 +209,5 @@ class _Mpc:
 def _push(model: LoopModel, friction: Friction | None) -> float:
     """Return by how much PV moves when the stem moves by some bands, within a hundred samples."""
     band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
-    linear = model.process.linear(model.sample_time)
-    state = np.zeros(linear.order)
-    for _ in range(100):
-        state = linear.a @ state + linear.b[:, 0]
-    return float(linear.c[0] @ state) * max(PUSHED * band, LEAST_PUSH)
+    last = model.process.linear(model.sample_time).step_responses(101)[-1, 0, 0]
+    return float(last) * max(PUSHED * band, LEAST_PUSH)

@@ -13,6 +13,7 @@ import numpy as np
 from stiction_ros.compiled import compiled, compiled_fused
 from stiction_ros.deferred import lfilter
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
+from stiction_ros.signals.arx import lagged
 
 LOAD = 1e-8  # of the noise's variance, that keeps its equations regular
 TINY = 1e-300
@@ -153,7 +154,7 @@ def whitened(noise: FloatArray, signal: FloatArray, before: float) -> FloatArray
 
 def noise_of(values: FloatArray, order: int) -> FloatArray:
     """Return the monic polynomial D of a signal, (N,), by least squares, shape (order + 1,)."""
-    past = np.array([values[order - 1 - i : len(values) - 1 - i] for i in range(order)])
+    past = np.array(lagged(values, range(1, order + 1), order))
     gram = past @ past.T + LOAD * float(values @ values) * np.eye(order)
     return np.append(1.0, -np.linalg.solve(gram, past @ values[order:]))
 
@@ -163,15 +164,24 @@ def innovations(noise: FloatArray, values: FloatArray) -> FloatArray:
     return whitened(noise, values, float(values[0]))
 
 
+def companion(ar: FloatArray) -> FloatArray:
+    """Return the states of an autoregression, the first of which is seen, shape (p, p)."""
+    states = np.zeros((len(ar), len(ar)))
+    if len(ar):
+        states[:, 0] = ar
+        states[:-1, 1:] += np.eye(len(ar) - 1)
+    return states
+
+
 def gain_of_noise(ar: FloatArray) -> float:
     """Return the variance of an autoregressive process of unit innovations."""
     order = len(ar)
     if not order:
         return 1.0
-    companion = np.vstack([ar, np.eye(order)[:-1]])
-    if np.abs(np.linalg.eigvals(companion)).max() >= 1.0 - 1e-9:
+    states = companion(ar)
+    if np.abs(np.linalg.eigvals(states)).max() >= 1.0 - 1e-9:
         return math.inf
     start = np.zeros((order, order))
     start[0, 0] = 1.0
-    flat = np.linalg.solve(np.eye(order**2) - np.kron(companion, companion), start.ravel())
+    flat = np.linalg.solve(np.eye(order**2) - np.kron(states.T, states.T), start.ravel())
     return float(flat[0])

@@ -15,6 +15,7 @@ from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisati
 from stiction_ros.effects.behaviour import BoolArray, IntArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
+from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.signals.autoregression import best_autoregression, whiten
 from stiction_ros.signals.holds import stretches
 
@@ -150,7 +151,7 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
         tuple(quanta),
         tuple(rounding),
         _moves(model, runs),
-        tuple(_reversals(runs, j) for j in range(len(model.valves))),
+        tuple(_reversals(runs, op) for op in runs.op.T),
         tuple(dict.fromkeys(notes)),
         tuple(lonely),
     )
@@ -366,10 +367,5 @@ def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:
     return tuple(moves.tolist())
 
 
-def _reversals(runs: Runs, valve: int) -> int:
-    count = 0
-    for rows in runs.slices:
-        signs = np.sign(np.diff(runs.op[rows, valve]))
-        signs = signs[signs != 0.0]
-        count += int((signs[1:] != signs[:-1]).sum())
-    return count
+def _reversals(runs: Runs, op: FloatArray) -> int:
+    return round(sum(ValveWork.of(op[rows]).reversals for rows in runs.slices))

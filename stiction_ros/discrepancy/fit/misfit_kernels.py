@@ -7,11 +7,10 @@ import numpy as np
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.likelihood.kernels import whitened_block
 from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
-from stiction_ros.signals.autoregression import inner_product
+from stiction_ros.signals.autoregression import TINY, inner_product
 
 _RIDGE = 1e-10
 _ROUNDING = 1e-14
-_TINY = 1e-300
 
 
 @compiled
@@ -95,7 +94,7 @@ def taken_by_sizes(
         for s in range(count):
             for c in range(rank):
                 inside[s, c] = inner_product(white[s], basis[c])
-        ridge = _TINY
+        ridge = TINY
         for s in range(count):
             cross[s] = inner_product(white[s], target)
             for t in range(s + 1):

@@ -22,9 +22,8 @@ from stiction_ros.discrepancy.likelihood.noise import (
     whitened_columns,
 )
 from stiction_ros.effects import FloatArray
-from stiction_ros.signals.autoregression import coloured, whiten
+from stiction_ros.signals.autoregression import TINY, coloured, whiten
 
-TINY = 1e-300
 AROUND = 16  # points of an ellipse
 BLOCK = 25
 DRAWS = 200

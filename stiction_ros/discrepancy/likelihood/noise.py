@@ -18,6 +18,7 @@ from stiction_ros.discrepancy.likelihood.kernels import (
 )
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.signals.autoregression import (
+    TINY,
     best_autoregression,
     gain_of_noise,
     whiten,
@@ -29,7 +30,6 @@ NOISE_FIT_ROUNDS = 4
 SURPRISE = 5.0  # standard deviations that one held-out row may count
 ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
 VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
-_TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,7 +184,7 @@ def _result(
 ) -> NoiseFit:
     """Return what a fit left; its φ cost something where they are its own."""
     rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
-    variance = max(inside / max(rows, 1), _TINY)
+    variance = max(inside / max(rows, 1), TINY)
     log = math.log(2.0 * math.pi * variance)
     return NoiseFit(
         ar,

@@ -21,6 +21,7 @@ from stiction_ros.signals.oscillation import (
     Oscillation,
     oscillation,
 )
+from stiction_ros.signals.spectral_lines import fitted_lines
 
 STARTS = (0.2, 0.5, 0.8)
 """Shares of the longest stretch at which runs begin as recorded."""
@@ -357,13 +358,7 @@ def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:
 
 def without_lines(values: FloatArray, period: float) -> FloatArray:
     """Return ``values``, shape (N,), without sine and cosine at the period and its harmonics."""
-    angle = 2 * np.pi / period * np.arange(len(values))
-    columns = [np.ones(len(values))]
-    for k in range(1, LINES + 1):
-        columns += [np.cos(k * angle), np.sin(k * angle)]
-    basis = np.column_stack(columns)
-    mean = float(values.mean())
-    return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0] + mean)
+    return values - fitted_lines(values, period, LINES)[1] + float(values.mean())
 
 
 def tried_frictions(valve: ValveEstimate) -> FloatArray:

@@ -31,7 +31,6 @@ from stiction_ros.report.shapes import (
     draw_curves,
     draw_responses,
     draw_valve,
-    fitted_start,
     free_run,
 )
 from stiction_ros.signals.holds import set_point_moves
@@ -183,8 +182,7 @@ def _draw_estimates(
     i = record.outputs.index(output.name)
     measured = record.pv[:, i]
     stems = {name: found.stem[:, j] for j, name in enumerate(record.valves)}
-    model = output.to_json()
-    run = free_run(model, stems, fitted_start(model, stems, measured))[part]
+    run = free_run(output, stems, measured)[part]
     one_step = one_step_estimate(record, found.stem, output)[part]
     axis.plot(at, measured[part], color=SKY, linewidth=3.0, alpha=0.6, label="PV, measured")
     if record.sp is not None:
