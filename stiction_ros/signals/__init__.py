@@ -1,1 +1,1 @@
-"""What a signal says of itself: noise, lines, cycles, stretches, filters; one of each."""
+"""What recorded signals say by themselves: noise, lines, cycles, stretches, the controller."""

@@ -126,7 +126,7 @@ def test_a_process_filters_deviations_from_the_first_stem(points: int) -> None:
 
 def test_a_valve_of_the_tank_that_does_not_reach_an_output_leaves_it() -> None:
     model = LoopModel.load(find_config("tank.loop.yaml"))
-    recorded = simulate_open_loop(model, 50.0 + drawn(10, COUNT, 2), 0)
+    recorded = simulate_open_loop(model, 50.0 + drawn(10, COUNT, 2), 0).record
     run = FreeRun(model, join_records(model, [recorded]))
     moved = run.stems[:, 1:] + 10.0 * drawn(9, COUNT, 2)
     reached = [np.ptp(run.drive(i, 1, moved) - run.forced[:, i : i + 1]) > 0.0 for i in range(2)]

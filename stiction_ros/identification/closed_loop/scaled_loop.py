@@ -11,8 +11,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.loop_run import Process
 from stiction_ros.identification.result.identification import OutputModel
+from stiction_ros.loop.linear_loops import Pairs, Process
 from stiction_ros.records.record import Record
 from stiction_ros.signals.free_run import driven
 from stiction_ros.signals.polynomials import recursion
@@ -111,6 +111,15 @@ def scaled_process(
         b[i] *= loop.op_scale[:, None] / loop.pv_scale[i]
         bias[i] /= loop.pv_scale[i]
     return Process(a, np.round(b, loop.digits + 3), delay, np.round(bias, loop.digits))
+
+
+def set_points_of(loop: ScaledLoop, pairs: Pairs) -> FloatArray:
+    """Return set-points, recorded or found with the controllers, shape (N, p)."""
+    found = np.zeros_like(loop.pv) if loop.sp is None else loop.sp.copy()
+    for i, law in pairs:
+        if i >= 0:
+            found[:, i] = law.set_point
+    return found
 
 
 def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray:

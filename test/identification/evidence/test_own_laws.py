@@ -55,6 +55,7 @@ def test_each_valve_of_a_problem_has_its_own_law() -> None:
         assert np.array_equal(*stems) is same
 
 
+@pytest.mark.trial
 def test_he_is_kept_where_no_other_law_is_better_by_more_than_chance() -> None:
     record = pi_loop(3.0, 1.0)
     own, he = (identify(record, IdentificationOptions(law=law)) for law in ("auto", "he"))
