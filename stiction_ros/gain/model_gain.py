@@ -22,14 +22,15 @@ from stiction_ros.gain.retuning import (
     most_helpful,
     peak,
 )
-from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.closed_loop import Controller, own_controller, simulate_closed_loop
 from stiction_ros.loop.model import PiTuning
 from stiction_ros.loop.plant import Measurement
-from stiction_ros.loop.set_points import SetPoints, holds
+from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.processes.process import NoiseEntry
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import oscillation
 
 SAMPLES = 2000
 """Samples that are simulated."""
@@ -196,8 +197,5 @@ class _Mpc:
 def _push(model: LoopModel, friction: Friction | None) -> float:
     """Return by how much PV moves when the stem moves by some bands, within a hundred samples."""
     band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
-    linear = model.process.linear(model.sample_time)
-    state = np.zeros(linear.order)
-    for _ in range(100):
-        state = linear.a @ state + linear.b[:, 0]
-    return float(linear.c[0] @ state) * max(PUSHED * band, LEAST_PUSH)
+    last = model.process.linear(model.sample_time).step_responses(101)[-1, 0, 0]
+    return float(last) * max(PUSHED * band, LEAST_PUSH)

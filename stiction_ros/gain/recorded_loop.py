@@ -33,7 +33,6 @@ from stiction_ros.identification.closed_loop.closed_loop import (
     output_oscillation,
     paired,
 )
-from stiction_ros.identification.closed_loop.oscillation import NEEDED_CYCLES
 from stiction_ros.identification.closed_loop.scaled_loop import (
     EXACT,
     ScaledLoop,
@@ -61,8 +60,9 @@ from stiction_ros.loop.repeated_loops import (
     Stems,
     run_again,
 )
-from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import NEEDED_CYCLES
 from stiction_ros.signals.recovered_controller import RecoveredController
 
 MOST = 4000

@@ -1,1 +1,1 @@
-"""What recorded signals say by themselves, before any model of a loop."""
+"""What recorded signals say by themselves: noise, lines, cycles, stretches, the controller."""

@@ -24,7 +24,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.records.parts import stretches
+from stiction_ros.signals.holds import stretches
 from stiction_ros.signals.recovered_controller import (
     ControllerStatus,
     LoopSignals,

@@ -13,7 +13,6 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.gain import gain_of
 from stiction_ros.identification import Identification, identify
-from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.intake.loop import Loop
 from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
@@ -21,6 +20,7 @@ from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
 from stiction_ros.signals.controller_recovery import resting_limits
+from stiction_ros.signals.oscillation import REGULAR
 from stiction_ros.survey.beats import beats
 from stiction_ros.survey.entry import Cycling, Entry, Status
 from stiction_ros.survey.pages.loop_page import loop_page

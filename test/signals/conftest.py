@@ -1,7 +1,6 @@
-"""Make the known loops of the closed loop importable."""
+"""Make the known loops importable."""
 
 import pathlib
 import sys
 
-folder = pathlib.Path(__file__).parents[1] / "identification" / "closed_loop"
-sys.path.insert(0, str(folder))
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "identification" / "closed_loop"))

@@ -16,18 +16,6 @@ import numpy as np
 
 from stiction_ros.identification.closed_loop.damping import Ringing, ringing
 from stiction_ros.identification.closed_loop.movement import STILL, Movement, compare
-from stiction_ros.identification.closed_loop.oscillation import (
-    Oscillation,
-    amplitude,
-    oscillation,
-)
-from stiction_ros.identification.closed_loop.outside_line import (
-    NO_LINE,
-    OutsideLine,
-    Predicted,
-    beside,
-    outside_line,
-)
 from stiction_ros.identification.closed_loop.repeated_runs import (
     MOST,
     Repeated,
@@ -41,9 +29,21 @@ from stiction_ros.identification.result.identification import (
 )
 from stiction_ros.identification.side_by_side import at_once
 from stiction_ros.loop.linear_loops import Process
-from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 from stiction_ros.signals.controller_recovery import recover
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import (
+    Oscillation,
+    amplitude,
+    oscillation,
+)
+from stiction_ros.signals.outside_line import (
+    NO_LINE,
+    OutsideLine,
+    Predicted,
+    beside,
+    outside_line,
+)
 from stiction_ros.signals.recovered_controller import (
     ControllerStatus,
     LoopSignals,

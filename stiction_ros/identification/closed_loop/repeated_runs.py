@@ -11,15 +11,16 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.switching import MovingCells, SlipPolygons
 from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
-from stiction_ros.identification.closed_loop.oscillation import (
-    REGULAR,
-    oscillation,
-)
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
+from stiction_ros.signals.oscillation import (
+    REGULAR,
+    oscillation,
+)
 from stiction_ros.signals.recovered_controller import RecoveredController
+from stiction_ros.signals.spectral_lines import fitted_lines
 
 STARTS = (0.2, 0.5, 0.8)
 """Shares of the longest stretch at which runs begin as recorded."""
@@ -331,13 +332,7 @@ def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:
 
 def without_lines(values: FloatArray, period: float) -> FloatArray:
     """Return ``values``, shape (N,), without sine and cosine at the period and its harmonics."""
-    angle = 2 * np.pi / period * np.arange(len(values))
-    columns = [np.ones(len(values))]
-    for k in range(1, LINES + 1):
-        columns += [np.cos(k * angle), np.sin(k * angle)]
-    basis = np.column_stack(columns)
-    mean = float(values.mean())
-    return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0] + mean)
+    return values - fitted_lines(values, period, LINES)[1] + float(values.mean())
 
 
 def tried_frictions(valve: ValveEstimate) -> FloatArray:

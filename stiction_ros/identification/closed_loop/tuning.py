@@ -24,6 +24,7 @@ from stiction_ros.identification.closed_loop.closed_loop import op_cycles, paire
 from stiction_ros.identification.closed_loop.scaled_loop import scaled
 from stiction_ros.identification.linear.response_prior import Reach
 from stiction_ros.records.record import Record
+from stiction_ros.signals.polynomials import largest_root
 
 RESETS = 3.0  # reset times after which the answer is looked at
 LEAST_FIT = 0.5  # R² of a controller whose gain is believed: rounded and held PV make it too small
@@ -72,7 +73,7 @@ class Tuning:
         law = self.gain * pv_shrunk * np.array([1.0 + 1.0 / resets, -1.0])
         poles = np.convolve(law, np.append(0.0, taps))
         poles[:2] += [1.0, -1.0]
-        return bool(np.abs(np.roots(poles)).max(initial=0.0) < 1.0)
+        return largest_root(poles) < 1.0
 
 
 def tunings(record: Record) -> tuple[Tuning | None, ...]:

@@ -42,7 +42,6 @@ from stiction_ros.identification.inference.verdict import (
     half_gains,
     is_deadband,
 )
-from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -61,6 +60,7 @@ from stiction_ros.identification.result.identification import (
 from stiction_ros.identification.result.stability import Look as View
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.records.record import Record
+from stiction_ros.signals.autoregression import whitened
 
 Progress = Callable[[float], None]
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.loop.set_points import holds
 from stiction_ros.online.session import Scenario
+from stiction_ros.signals.holds import holds
 from stiction_studies.examples.wear_floor import LONGEST, floor_of, least_iae, least_iae_beside
 from stiction_studies.examples.wear_study import schedule_of
 

@@ -16,7 +16,7 @@ from stiction_ros.discrepancy.likelihood.declared_noise import (
     declared_noise,
     rounded,
 )
-from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms, whiten
+from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms
 from stiction_ros.effects import (
     Behaviour,
     ColouredDisturbance,
@@ -25,6 +25,7 @@ from stiction_ros.effects import (
     RandomWalkDisturbance,
 )
 from stiction_ros.loop import LoopModel
+from stiction_ros.signals.autoregression import whiten
 
 QUICK = GapOptions(quick=True)
 

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from known_loops import DELAY, Kind, known
 
 from stiction_ros.identification.closed_loop.damping import ringing
-from stiction_ros.identification.closed_loop.outside_line import (
+from stiction_ros.loop.linear_loops import Process
+from stiction_ros.signals.outside_line import (
     NO_LINE,
     Predicted,
     beside,
     outside_line,
 )
-from stiction_ros.loop.linear_loops import Process
 
 COUNT = 900
 
