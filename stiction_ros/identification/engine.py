@@ -14,14 +14,14 @@ from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled as settled_further
 from stiction_ros.identification.evidence.rates import liveliest
-from stiction_ros.identification.evidence.search import HEADS, NEAR, Parts, heads, search
+from stiction_ros.identification.evidence.search import NEAR, SEEDS, Parts, heads, search
 from stiction_ros.identification.exact.further_fit import settled, with_further_estimates
 from stiction_ros.identification.exact.growing_swarm import growing_swarm
 from stiction_ros.identification.exact.long_records import carried_over
 from stiction_ros.identification.exact.polish import polished
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.certificate import certificates
-from stiction_ros.identification.inference.conclusion import Findings, conclude
+from stiction_ros.identification.inference.conclusion import Findings, conclude, order_row
 from stiction_ros.identification.inference.intervals import friction_intervals
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
 from stiction_ros.identification.problem.models import (
@@ -145,15 +145,16 @@ def choose(
     problem = dataclasses.replace(problem, further=settled_further(problem))
     found = search(problem, Parts(polish=False))  # the exact polish is closer
     data = dataclasses.replace(data, further=problem.further)
-    near = [one for j in range(len(data.u)) for one in heads(found, j, HEADS, NEAR)]
+    near = [one for j in range(len(data.u)) for one in heads(found, j, SEEDS, NEAR)]
     near = sorted({id(one): one for one in near}.values(), key=lambda one: one.loss)
-    first, *others = [_begun(data, problem, one) for one in near[:HEADS] or [found.best]]
+    first, *others = [_begun(data, problem, one) for one in near[:SEEDS] or [found.best]]
     orders_list = windows(options)
     models = together(*(partial(linear_model, data, n, first) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
     orders, model = min(rivals, key=lambda rival: rival[1].bic)
     linear = linear_model(data, orders)
-    models = [model, *(linear_model(data, orders, other) for other in others)]
+    starts = [dataclasses.replace(other, delays=model.delays) for other in others]
+    models = [model, *together(*(partial(refit, data, one, orders, warm=False) for one in starts))]
     model = min(linear, polished(data, orders, models), key=lambda one: one.loss)
     if not has_cells(data.law):
         model = _grown(data, orders, linear, model)
@@ -172,12 +173,6 @@ def _begun(data: Data, problem: Problem, found: Candidate) -> Model:
     stems = [stem_of(data, j, friction[j], float(starts[j])) for j in range(len(starts))]
     delays = ((data.delay[0],) * len(starts),) * len(data.y)
     return Model(friction, starts, np.array(stems), delays, ())
-
-
-def order_row(orders: Orders, model: Model) -> OrderRow:
-    """Return the criteria of a model by which orders are compared."""
-    parameters = sum(fit.parameters for fit in model.fits)
-    return OrderRow(orders.output, orders.input, model.loss + 2.0 * parameters, model.bic)
 
 
 def ambiguities(record: Record, delays: list[list[tuple[int, ...]]]) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.echoes import echo
@@ -37,7 +36,7 @@ from stiction_ros.identification.evidence.verdict import (
 )
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.conclusion import Findings, conclude
+from stiction_ros.identification.inference.conclusion import Findings, conclude, order_row
 from stiction_ros.identification.inference.verdict import (
     half_gains,
     is_deadband,

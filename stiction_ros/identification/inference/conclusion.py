@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction_ros.identification.linear.data import nrmse_fit
 from stiction_ros.identification.problem.models import Data, Model
-from stiction_ros.identification.problem.output_error import OutputFit
+from stiction_ros.identification.problem.output_error import Orders, OutputFit
 from stiction_ros.identification.result.identification import (
     FitStatus,
     Identification,
@@ -66,6 +66,12 @@ def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Ide
         notes=tuple(notes),
         orders=found.orders,
     )
+
+
+def order_row(orders: Orders, model: Model) -> OrderRow:
+    """Return the criteria of a model by which orders are compared."""
+    parameters = sum(fit.parameters for fit in model.fits)
+    return OrderRow(orders.output, orders.input, model.loss + 2.0 * parameters, model.bic)
 
 
 def output_model(record: Record, i: int, fit: OutputFit, data: Data) -> OutputModel:
