@@ -56,6 +56,7 @@ def codes(folder: Path) -> list[str]:
     return sorted(path.parent.parent.name for path in folder.rglob("caller.more*.nbc"))
 
 
+@pytest.mark.trial
 def test_machine_code_is_made_anew_when_a_function_that_it_calls_changes(package: Path) -> None:
     assert result(package) == 7.0
     kept = codes(package)

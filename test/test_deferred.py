@@ -8,7 +8,7 @@ from scipy import signal, stats
 from scipy.stats import qmc
 
 from stiction_ros.deferred import chi2_quantile, halton_sequence, lfilter
-from stiction_ros.identification.kernels.polynomials import filtered, recursion
+from stiction_ros.signals.polynomials import filtered, recursion
 
 ORDERS = [(1, 1), (1, 3), (2, 2), (3, 1), (5, 2), (4, 9)]
 

@@ -17,6 +17,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "examples"
 FILES = sorted(FOLDER.glob("*.py"))
 USERS = ("control engineers", "maintenance planners", "researchers", "ROS engineers")
 SCREEN = 72  # lines
+LONG = ("04_rank_many_loops", "09_bags", "10_add_a_friction_law")
 
 # What it is called with here, and what its output must hold.
 SMALL: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
@@ -100,7 +101,11 @@ def test_it_uses_the_public_face(path: Path) -> None:
     assert not below
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=pytest.mark.trial if path.stem in LONG else []) for path in FILES],
+    ids=lambda path: path.stem,
+)
 def test_it_runs_and_says_what_it_promises(
     path: Path,
     tmp_path: Path,

@@ -35,6 +35,7 @@ REASONS: dict[str, dict[str, str]] = {
     IDENTIFY: {
         "records": "a record tells of itself: how long it is, what it is good for, its parts",
         "effects": "which laws there are, their parameters, and grids of frictions at once",
+        "signals": "what is computed of one signal is a function each: noise, lines, cycles, runs",
         "base": "what SciPy has in packages that load slowly is called where it is loaded late; "
         "how many threads there are is nobody's floor",
     },
@@ -42,6 +43,7 @@ REASONS: dict[str, dict[str, str]] = {
         "records": "a record tells of itself: how long it is, which of its samples were measured",
         "loop": "a loop model tells its tags and limits, and takes in the effect that is named",
         "processes": "the process as a linear model, and made anew with each effect taken in",
+        "signals": "what is computed of one signal is a function each: noise, stretches",
         "effects": "what a search asks of an effect is said in the file of the effect alone: axes, "
         "sizes, waves, whole grids, YAML",
         "base": "what SciPy has in packages that load slowly is called where it is loaded late; "

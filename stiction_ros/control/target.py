@@ -11,6 +11,7 @@ from scipy.linalg import null_space
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.processes import LinearModel
+from stiction_ros.signals.holds import set_point_moves
 
 # With more valves than outputs the curvature is as good as singular: proximal steps then
 # find the same optimum where one plain solve gives up.
@@ -79,8 +80,7 @@ class TargetSelector:
         ``reachable`` and ``miss`` are those of now. None when a state on the way is not
         feasible.
         """
-        changes = np.flatnonzero(np.any(np.diff(preview, axis=0) != 0.0, axis=1)) + 1
-        starts = [0, *changes.tolist()]
+        starts = [0, *set_point_moves(preview).tolist()]
         targets = [self.select(preview[i], disturbance, dv) for i in starts]
         found = [target for target in targets if target is not None]
         if len(found) < len(targets):

@@ -21,6 +21,7 @@ from stiction_ros.effects.seen import FloatArray as FloatArray
 from stiction_ros.errors import InputError
 
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 Memory = float | tuple[float, ...]
 NO_SAMPLE = -1.0  # in a memory that holds the time of the last sample: there was none
 

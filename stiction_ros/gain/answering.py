@@ -23,7 +23,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
+from stiction_ros.signals.arx import arx_columns
+from stiction_ros.signals.spectral_lines import LEAST_PER_HARMONIC
 
 LAGS = 30
 """n, at most."""
@@ -156,13 +157,10 @@ class Answering:
         return out
 
     def _products(self, stems: FloatArray) -> _Products:
-        rows = np.arange(self.past, len(self.pv))
-        columns = [self.pv[rows - lag] for lag in range(1, self.lags + 1)]
-        for stem, late in zip(stems.T, self.delay.tolist(), strict=True):
-            columns += [stem[rows - lag - late] for lag in range(1, self.lags + 1)]
-        table = np.column_stack([*columns, np.ones(len(rows)), self.wave[rows]])
-        seen = self.pv[rows]
-        return _Products(table.T @ table, table.T @ seen, float(seen @ seen), len(rows))
+        past, orders, seen = self.past, (self.lags, self.lags), self.pv[self.past :]
+        columns = arx_columns(self.pv, stems.T, self.delay.tolist(), orders, past)
+        table = np.column_stack([*columns, np.ones(len(seen)), self.wave[past:]])
+        return _Products(table.T @ table, table.T @ seen, float(seen @ seen), len(seen))
 
     def _tuned(self, stems: FloatArray) -> tuple[float, Answering]:
         """Return −2 log of the likelihood of the best prior, downhill, and that prior in use."""

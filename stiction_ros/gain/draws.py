@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.gain.loop_runs import Equations
-from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.result.identification import ValveEstimate, VerdictKind
+from stiction_ros.loop.repeated_loops import Equations
+from stiction_ros.signals.recovered_controller import RecoveredController
 
 DRAWS = 20
 """Loops drawn, the estimate itself among them."""

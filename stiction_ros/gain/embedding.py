@@ -268,11 +268,7 @@ def embedded(loop: RecordedLoop, design: EmbeddingDesign, draws: Draws) -> list[
 def _response(model: LoopModel) -> tuple[FloatArray, int]:
     """Return the response to a step of the stem and the sample at which g is read."""
     linear = model.process.linear(model.sample_time)
-    state = np.zeros(linear.order)
-    response = np.empty(4 * LONGEST)
-    for k in range(len(response)):
-        response[k] = float(linear.c[0] @ state)
-        state = linear.a @ state + linear.b[:, 0]
+    response = linear.step_responses(4 * LONGEST)[:, 0, 0]
     moved = np.abs(response) > STARTED * np.abs(response[:LONGEST]).max()
     first = int(np.argmax(moved)) if moved.any() else 0
     return response[first : first + LONGEST + 1], ANSWERED

@@ -1,7 +1,7 @@
 """What a loop is measured by: now, and under each thing that could be done about it.
 
 - *Amplitude* and *period* of the dominant line of PV − SP, each run its own: see
-  :mod:`stiction_ros.identification.closed_loop.oscillation`.
+  :mod:`stiction_ros.signals.oscillation`.
 - *IAE per hour*: ∫|PV − SP| dt per hour with time in hours, which is the mean |PV − SP|.
 - *Travel*, *moves* and *reversals* of the stem, an hour: :mod:`stiction_ros.records.valve_work`.
 """
@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.oscillation import (
+from stiction_ros.records.valve_work import ValveWork
+from stiction_ros.signals.oscillation import (
     LEAST_LINE,
     REGULAR,
     Oscillation,
@@ -22,7 +23,6 @@ from stiction_ros.identification.closed_loop.oscillation import (
     oscillation,
     pieces,
 )
-from stiction_ros.records.valve_work import ValveWork
 
 
 @dataclasses.dataclass(frozen=True)

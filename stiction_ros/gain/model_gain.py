@@ -22,14 +22,15 @@ from stiction_ros.gain.retuning import (
     most_helpful,
     peak,
 )
-from stiction_ros.identification.closed_loop.oscillation import oscillation
 from stiction_ros.loop import LoopModel
-from stiction_ros.loop.closed_loop import Controller, PiController, simulate_closed_loop
+from stiction_ros.loop.closed_loop import Controller, own_controller, simulate_closed_loop
 from stiction_ros.loop.model import PiTuning
 from stiction_ros.loop.plant import Measurement
-from stiction_ros.loop.set_points import SetPoints, holds
+from stiction_ros.loop.set_points import SetPoints
 from stiction_ros.processes.process import NoiseEntry
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import oscillation
 
 SAMPLES = 2000
 """Samples that are simulated."""
@@ -82,18 +83,7 @@ class ModelLoop:
         Raises:
             InputError: no controller, or more than one valve or output.
         """
-        if model.controller is None:
-            raise InputError(
-                "has no controller, so there is nothing to compare with",
-                where=model.name,
-                fix="add controller: {kind: pi, gain: K, integral_time: T}",
-            )
-        if len(model.valves) != 1 or len(model.outputs) != 1:
-            raise InputError(
-                f"has {len(model.valves)} valves and {len(model.outputs)} outputs",
-                where=model.name,
-                fix="give the model of one loop with one valve",
-            )
+        tuning = own_controller(model).tuning
         laws = [effect for effect in model.valves[0].effects if isinstance(effect, Friction)]
         friction = laws[0] if laws else None
         push = _push(model, friction)
@@ -101,7 +91,7 @@ class ModelLoop:
             start = float(model.pv0[0])
             moves = np.array([[start], [start + push]])
             set_points = SetPoints(model.outputs, np.array([0.0, 20.0 * model.sample_time]), moves)
-        return cls(model, model.controller, friction, set_points, samples)
+        return cls(model, tuning, friction, set_points, samples)
 
     def run(self, model: LoopModel, control: Callable[[], Controller]) -> list[Record]:
         """Return one run for each seed, each under a new controller."""
@@ -115,9 +105,8 @@ class ModelLoop:
         changed = PiTuning(
             self.tuning.gain * tuning.gain, self.tuning.integral_time * tuning.integral_time
         )
-        low, high = self.model.limits[0]
-        start = float(self.model.stem_start[0])
-        return lambda: PiController(changed, self.model.sample_time, start, (low, high))
+        model = dataclasses.replace(self.model, controller=changed)
+        return lambda: own_controller(model)
 
     def sensitivity(self, tuning: Tuning) -> float:
         """Return the peak of the sensitivity of the loop without friction."""
@@ -208,8 +197,5 @@ class _Mpc:
 def _push(model: LoopModel, friction: Friction | None) -> float:
     """Return by how much PV moves when the stem moves by some bands, within a hundred samples."""
     band = 0.0 if friction is None else friction.static_friction + friction.dynamic_friction
-    linear = model.process.linear(model.sample_time)
-    state = np.zeros(linear.order)
-    for _ in range(100):
-        state = linear.a @ state + linear.b[:, 0]
-    return float(linear.c[0] @ state) * max(PUSHED * band, LEAST_PUSH)
+    last = model.process.linear(model.sample_time).step_responses(101)[-1, 0, 0]
+    return float(last) * max(PUSHED * band, LEAST_PUSH)

@@ -27,19 +27,19 @@ from stiction_ros.gain.draws import (
     possible_frictions,
     resampled,
 )
-from stiction_ros.gain.loop_runs import Control, Equations, Laws, RecoveredControl, Stems, run_again
 from stiction_ros.gain.measures import Measures, Yardstick, cycle_period
-from stiction_ros.identification.closed_loop.closed_loop import output_oscillation, paired
-from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.closed_loop.oscillation import NEEDED_CYCLES, oscillation
-from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.closed_loop.repeated_runs import controllers_of, period_of
+from stiction_ros.identification.closed_loop.closed_loop import (
+    op_cycles,
+    output_oscillation,
+    paired,
+)
 from stiction_ros.identification.closed_loop.scaled_loop import (
     EXACT,
     ScaledLoop,
     free_run,
     scaled,
     scaled_process,
+    set_points_of,
 )
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.outside_waves import outside_wave
@@ -51,14 +51,22 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.loop.set_points import holds
+from stiction_ros.loop.linear_loops import Controllers, Process
+from stiction_ros.loop.repeated_loops import (
+    Control,
+    Equations,
+    Laws,
+    RecoveredControl,
+    Stems,
+    run_again,
+)
 from stiction_ros.records.record import Record
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import NEEDED_CYCLES
+from stiction_ros.signals.recovered_controller import RecoveredController
 
 MOST = 4000
 """Samples that are run again, the last ones: hundreds of cycles say no more."""
-
-UNSEEN_CYCLES = 10
-"""Cycles that a record without an oscillation is taken to have room for."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,9 +111,7 @@ class RecordedLoop:
         if loop is None:
             raise InputError("OP or PV does not move in automatic", where=record.name)
         chosen = _chosen(found, valve, record)
-        swings = [oscillation(loop.op[:, j], loop.stretches) for j in range(len(record.valves))]
-        periods = [period_of(swing, loop, UNSEEN_CYCLES) for swing in swings]
-        pairs = tuple(paired(loop, periods))
+        pairs = tuple(paired(loop, op_cycles(loop)[1]))
         output, law = pairs[chosen]
         if output < 0:
             raise InputError(
@@ -167,11 +173,7 @@ class RecordedLoop:
     @property
     def set_points(self) -> FloatArray:
         """Set-points of the record, recorded or found, shape (N, p)."""
-        found = np.zeros_like(self.loop.pv) if self.loop.sp is None else self.loop.sp.copy()
-        for i, law in self.pairs:
-            if i >= 0:
-                found[:, i] = law.set_point
-        return found
+        return set_points_of(self.loop, self.pairs)
 
     def now(self) -> Measures:
         """Return the measures of the record itself."""
@@ -276,7 +278,7 @@ class RecordedLoop:
         tuning = np.repeat(own[None], len(draws), axis=0)
         tuning[:, self.valve] = draws.tunings if tunings is None else tunings
         sp, pv = self.set_points[self.begin : self.rows[1]], self.loop.pv[self.begin : self.rows[0]]
-        control = RecoveredControl(controllers_of(self.pairs), tuning, sp, pv)
+        control = RecoveredControl(Controllers.of(self.pairs), tuning, sp, pv)
         return self.under(control, draws, serviced=serviced)
 
     def under(
@@ -285,12 +287,14 @@ class RecordedLoop:
         """Return the measures of drawn loops under a controller, as :meth:`run` does."""
         whole, past = slice(self.begin, self.rows[1]), slice(self.begin, self.rows[0])
         laws = self._laws(0.0 * draws.frictions if serviced else draws.frictions)
+        op, units = self.loop.op, (self.loop.op_mean, self.loop.op_scale)
+        stem, sample_time = self.loop.stem[self.begin], self.record.sample_time
         pv, stems = run_again(
             draws.equations,
             draws.stems[:, :, : past.stop - past.start],
-            Stems(laws, self.loop, past, self.record.sample_time),
+            Stems(laws, op[past], stem, units, sample_time),
             control,
-            (self.loop.op[whole], self.loop.pv[whole]),
+            (op[whole], self.loop.pv[whole]),
         )
         errors = pv[:, :, self.output] - self.set_points[slice(*self.rows), self.output]
         return [

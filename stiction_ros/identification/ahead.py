@@ -14,9 +14,9 @@ import threading
 import numpy as np
 
 from stiction_ros.compiled import at_next_compilation
-from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
 from stiction_ros.identification.problem.output_error import Orders, fit_output
 from stiction_ros.identification.side_by_side import CORES, may_help
+from stiction_ros.loop.linear_loops import Controllers, Process, Runs, run_loops
 from stiction_ros.orphans import die_with_parent
 
 SAMPLES = 120

@@ -9,9 +9,9 @@ import numpy as np
 from stiction_ros.effects import HeStiction
 from stiction_ros.identification.ahead import ask
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.methods import METHODS, identify
 from stiction_ros.records.record import Record
+from stiction_ros.signals.polynomials import recursion
 
 SAMPLES = 240
 

@@ -15,6 +15,7 @@ from stiction_ros.intake.intake_options import TO_PERCENT, OpUnit, known_op_unit
 from stiction_ros.intake.sheets.names import OR_ROW
 from stiction_ros.intake.tables.block import Block, Column
 from stiction_ros.intake.words import WORDS
+from stiction_ros.signals.velocity_form import explained
 
 PERCENT = (-10.0, 110.0)
 """What an OP in % stays within."""
@@ -247,16 +248,6 @@ def _only(block: Block, signal: str) -> tuple[str, FloatArray] | None:
 def _explained(output: FloatArray, measured: FloatArray, stride: int) -> float:
     """Return which share of the moves of ``output`` over ``stride`` samples a PI law explains."""
     there = np.isfinite(output) & np.isfinite(measured)
-    u, y = output[there], measured[there]
-    if len(u) < FEWEST:
+    if np.count_nonzero(there) < FEWEST:
         return 0.0
-    moves = u[stride:] - u[:-stride]
-    total = np.cumsum(y)
-    law = [y[stride:] - y[:-stride], total[stride:] - total[:-stride], np.ones(len(moves))]
-    rows = np.column_stack(law)
-    spread = float(((moves - moves.mean()) ** 2).sum())
-    if spread <= 0.0:
-        return 0.0
-    solution, *_ = np.linalg.lstsq(rows, moves, rcond=None)
-    rest = float(((moves - rows @ solution) ** 2).sum())
-    return 1.0 - rest / spread
+    return explained(output[there], measured[there, None], stride)

@@ -41,7 +41,7 @@ class ClosedLoopRun:
 def simulate_closed_loop(
     model: LoopModel,
     controller: Controller,
-    set_points: SetPoints,
+    set_points: SetPoints | None,
     samples: int,
     seed: int,
     progress: Callable[[int], None] | None = None,
@@ -52,7 +52,7 @@ def simulate_closed_loop(
     Args:
         model: plant, sample time and starting point.
         controller: called once per sample, in order.
-        set_points: schedule, in seconds.
+        set_points: schedule, in seconds; None where there are none, as in manual.
         samples: number N of samples.
         seed: of the plant's noise.
         progress: called with the number of samples done, about a hundred times.
@@ -82,14 +82,13 @@ def simulate_closed_loop(
     for k in range(samples):
         measurement = plant.measure()
         pv[k], clean[k] = measurement.pv, measurement.pv_clean
-        sp[k] = set_points.at(measurement.time)
+        sp[k] = np.nan if set_points is None else set_points.at(measurement.time)
         op[k] = controller(measurement, sp[k])
         stem[k] = plant.apply(op[k])
         if progress is not None and k % every == 0:
             progress(k)
-    record = Record(
-        model.name, model.sample_time, model.valve_names, model.outputs, op, pv, sp, stem
-    )
+    tags = model.name, model.sample_time, model.valve_names, model.outputs
+    record = Record(*tags, op, pv, None if set_points is None else sp, stem)
     return ClosedLoopRun(record, clean)
 
 

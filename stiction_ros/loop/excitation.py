@@ -6,8 +6,8 @@ import numpy as np
 
 from stiction_ros.effects import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.loop.closed_loop import ClosedLoopRun, simulate_closed_loop
 from stiction_ros.loop.model import LoopModel
-from stiction_ros.loop.plant import Plant
 from stiction_ros.records import Record
 
 SWITCH_PROBABILITY = 0.05
@@ -52,8 +52,8 @@ def random_binary(
     return np.where(np.cumsum(switches, axis=0) % 2 == 1, high, low)
 
 
-def simulate_open_loop(model: LoopModel, op: FloatArray, seed: int) -> Record:
-    """Return the record of the plant of ``model`` under given controller outputs.
+def simulate_open_loop(model: LoopModel, op: FloatArray, seed: int) -> ClosedLoopRun:
+    """Return the run of the plant of ``model`` under given controller outputs, without set-points.
 
     Args:
         model: plant and starting point.
@@ -68,14 +68,8 @@ def simulate_open_loop(model: LoopModel, op: FloatArray, seed: int) -> Record:
         raise InputError(f"op has shape {op.shape}, not (N, {len(model.valves)})", where=model.name)
     if not np.isfinite(op).all():
         raise InputError("op is not finite", where=model.name)
-    plant = Plant(model, seed)
-    pv, stem = np.empty((len(op), len(model.outputs))), np.empty_like(op)
-    for k, row in enumerate(op):
-        pv[k] = plant.measure().pv
-        stem[k] = plant.apply(row)
-    return Record(
-        model.name, model.sample_time, model.valve_names, model.outputs, op, pv, None, stem
-    )
+    rows = iter(op)
+    return simulate_closed_loop(model, lambda *_: next(rows), None, len(op), seed)
 
 
 def prbs_experiment(
@@ -114,4 +108,4 @@ def prbs_experiment(
         raise InputError(f"{seed} is negative", where="seed")
     moves = np.random.default_rng([seed, 1])
     op = random_binary(moves, samples, len(model.valves), switch_probability, levels)
-    return simulate_open_loop(model, op, seed)
+    return simulate_open_loop(model, op, seed).record

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -101,22 +100,3 @@ class SetPoints:
         ]
         repeat = {"repeat": float(self.repeat)} if np.isfinite(self.repeat) else {}
         return {**repeat, "moves": moves}
-
-
-def set_point_moves(sp: FloatArray) -> NDArray[np.intp]:
-    """Return the samples at which a set-point differs from the sample before, ascending.
-
-    Args:
-        sp: set-points, shape (N, p).
-    """
-    return np.flatnonzero(np.any(np.diff(sp, axis=0) != 0.0, axis=1)) + 1
-
-
-def holds(sp: FloatArray) -> list[tuple[int, int]]:
-    """Return first and one-past-last sample of every stretch without a set-point move.
-
-    Args:
-        sp: set-points, shape (N, p).
-    """
-    edges = [0, *set_point_moves(sp).tolist(), len(sp)]
-    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]

@@ -20,6 +20,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.records import Record
+from stiction_ros.signals.holds import holds
 
 SETTLED = 0.5  # share of a hold after which OP has settled
 REPEATED = 0.5  # of the larger of two spans that come from the same cycle
@@ -73,18 +74,12 @@ def sustained_oscillations(record: Record) -> tuple[SustainedOscillation, ...]:
 
 def _parts(record: Record) -> tuple[tuple[int, int], ...]:
     """Return the settled half of every hold, or equal parts where no set-point moves."""
-    count = len(record)
-    moved = np.zeros(0, dtype=int)
-    if record.sp is not None:
-        moved = np.flatnonzero((np.diff(record.sp, axis=0) != 0.0).any(axis=1)) + 1
-    if len(moved) == 0:
-        edges = np.linspace(0, count, PARTS + 1).astype(int).tolist()
+    rows = [] if record.sp is None else holds(record.sp)
+    if len(rows) < 2:
+        edges = np.linspace(0, len(record), PARTS + 1).astype(int).tolist()
         rows = list(itertools.pairwise(edges))
     else:
-        edges = [0, *moved.tolist(), count]
-        rows = [
-            (begin + int(SETTLED * (end - begin)), end) for begin, end in itertools.pairwise(edges)
-        ]
+        rows = [(begin + int(SETTLED * (end - begin)), end) for begin, end in rows]
     return tuple((begin, end) for begin, end in rows if end - begin >= MIN_SAMPLES)
 
 

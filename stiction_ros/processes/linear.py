@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
+from stiction_ros.signals.state_space import responses
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,9 +80,4 @@ class LinearModel:
         Returns:
             Shape (N, p, m), engineering units.
         """
-        state = np.zeros(self.b.shape)
-        out = np.empty((samples, len(self.c), self.b.shape[1]))
-        for k in range(samples):
-            out[k] = self.c @ state
-            state = self.a @ state + self.b
-        return out
+        return responses(self.a, self.c, itertools.repeat(self.b, samples))

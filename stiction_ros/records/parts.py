@@ -7,9 +7,7 @@ import datetime
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiction_ros.effects.behaviour import IntArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
@@ -127,20 +125,3 @@ def _moment(seconds: float) -> str:
         return f"{seconds:.9g} s"
     moment = datetime.datetime.fromtimestamp(round(seconds, 3), datetime.UTC)
     return moment.replace(tzinfo=None).isoformat(" ")[:23]
-
-
-def stretches(there: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
-    """Return where stretches of True begin, and the places behind their ends, shape (R,) each.
-
-    Args:
-        there: shape (N,).
-
-    Examples:
-        >>> import numpy as np
-        >>> from stiction_ros.records.parts import stretches
-        >>> begins, ends = stretches(np.array([True, True, False, True]))
-        >>> print(begins, ends)
-        [0 3] [2 4]
-    """
-    edges = np.diff(np.concatenate([[0], there.astype(np.int8), [0]]))
-    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)

@@ -14,6 +14,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import USABLE, Quality, QualityArray
 from stiction_ros.records.segment import Gap, Segment
+from stiction_ros.signals.holds import stretches
 
 IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
 
@@ -163,12 +164,7 @@ class Record:
         if self.mask is None:
             return [(s.first, s.last) for s in self.segments if s.last > s.first]
         there = np.isin(self.mask, list(wanted))
-        cut = np.zeros(len(self) + 1, dtype=bool)
-        cut[[gap.row for gap in self.gaps]] = True
-        before = np.concatenate([[False], there])
-        after = np.concatenate([there, [False]])
-        begins = np.flatnonzero(after & (~before | cut))
-        ends = np.flatnonzero(before & (~after | cut))
+        begins, ends = stretches(there, [gap.row for gap in self.gaps])
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
     def good_parts(self) -> tuple[Record, ...]:

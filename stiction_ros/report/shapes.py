@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification import OutputModel
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
 from stiction_ros.report.drawing import (
@@ -22,6 +23,9 @@ from stiction_ros.report.drawing import (
     legend,
     panels,
 )
+from stiction_ros.signals.free_run import driven, fitted_free_run
+from stiction_ros.signals.free_run import step_response as answer_to_step
+from stiction_ros.signals.polynomials import largest_root
 
 
 def draw_output(axis: Any, at: FloatArray, record: Record, output: int, part: slice) -> None:
@@ -111,61 +115,25 @@ def step_response(output: Mapping[str, Any], valve: str, samples: int) -> FloatA
         valve: whose stem steps at sample 0.
         samples: N.
     """
-    stems = {name: np.zeros(samples) for name in output["b"]}
-    stems[valve] = np.ones(samples)
-    return free_run({**output, "bias": 0.0}, stems, np.zeros(len(output["a"])), rest=False)
+    if valve not in output["b"]:
+        return np.zeros(samples)
+    delay = int(output["delay"].get(valve, 0))
+    return answer_to_step(output["a"], output["b"][valve], delay, samples)
 
 
 def free_run(
-    output: Mapping[str, Any],
-    stems: Mapping[str, FloatArray],
-    start: FloatArray,
-    *,
-    rest: bool = True,
+    output: OutputModel, stems: Mapping[str, FloatArray], measured: FloatArray
 ) -> FloatArray:
-    """Return the free run, shape (N,), of equation (9) without noise.
+    """Return PV of an identified output driven by stems alone, its start fitted, shape (N,).
 
     Args:
-        output: entry of ``outputs`` of ``identify --json``: a, b, delay, bias.
+        output: equation (9).
         stems: positions of each valve, shape (N,), %.
-        start: outputs of the first n_a samples.
-        rest: whether stems were where they start before the first sample, else at 0.
-    """
-    a, count = np.array(output["a"], dtype=float), len(next(iter(stems.values())))
-    driven = np.full(count, float(output["bias"]))
-    for valve, b in output["b"].items():
-        stem, delay = stems[valve], int(output["delay"].get(valve, 0))
-        for i, weight in enumerate(b, start=1):
-            late = min(i + delay, count)
-            before = np.full(late, stem[0] if rest else 0.0)
-            driven += weight * np.concatenate([before, stem[: count - late]])
-    y = np.zeros(count)
-    order = len(a)
-    y[:order] = start[:count]
-    if not rest:
-        order = 0
-    for k in range(order, count):
-        past = y[max(k - len(a), 0) : k][::-1]
-        y[k] = driven[k] - float(a[: len(past)] @ past)
-    return y
-
-
-def fitted_start(
-    output: Mapping[str, Any], stems: Mapping[str, FloatArray], measured: FloatArray
-) -> FloatArray:
-    """Return the outputs of the first n_a samples from which the free run fits best.
-
-    Args:
-        output, stems: as for :func:`free_run`.
         measured: PV, shape (N,).
     """
-    order = len(output["a"])
-    forced = free_run(output, stems, np.zeros(order))
-    silent = {**output, "b": {name: [] for name in output["b"]}, "bias": 0.0}
-    basis = np.column_stack([free_run(silent, stems, row) for row in np.eye(order)])
-    if not (np.isfinite(forced).all() and np.isfinite(basis).all()):
-        return measured[:order].copy()
-    return np.asarray(np.linalg.lstsq(basis, measured - forced, rcond=None)[0])
+    delays = [output.delay[valve] for valve in output.b]
+    drive = driven(output.b.values(), delays, [stems[valve] for valve in output.b], output.bias)
+    return fitted_free_run(output.a, drive, measured)
 
 
 def true_response(model: LoopModel, output: int, valve: int, samples: int) -> FloatArray:
@@ -207,8 +175,7 @@ def _settling(outputs: Sequence[Mapping[str, Any]], truth: LoopModel | None) -> 
         linear = truth.process.linear(truth.sample_time)
         radius = float(np.abs(np.linalg.eigvals(linear.a)).max())
     else:
-        roots = [np.abs(np.roots([1.0, *output["a"]])) for output in outputs]
-        radius = max(float(each.max(initial=0.0)) for each in roots)
+        radius = max(largest_root(np.array([1.0, *output["a"]])) for output in outputs)
     if not 0.0 < radius < 1.0:
         return 100
     return int(np.clip(math.ceil(math.log(0.01) / math.log(radius)), 20, 400))

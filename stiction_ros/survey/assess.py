@@ -13,14 +13,14 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.gain.gain import gain_of
 from stiction_ros.identification import Identification, identify
-from stiction_ros.identification.closed_loop.oscillation import REGULAR
-from stiction_ros.identification.closed_loop.recovered_controller import LoopSignals, recover
 from stiction_ros.intake.loop import Loop
 from stiction_ros.records.csv_names import DEFAULT_OUTPUT, DEFAULT_VALVE
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
+from stiction_ros.signals.controller_recovery import resting_limits
+from stiction_ros.signals.oscillation import REGULAR
 from stiction_ros.survey.beats import beats
 from stiction_ros.survey.entry import Cycling, Entry, Status
 from stiction_ros.survey.pages.loop_page import loop_page
@@ -184,10 +184,8 @@ def _beats(record: Record, output: int, cycling: Cycling | None) -> tuple[float,
 
 def saturated(record: Record) -> float:
     """Return the share of samples at which the first valve's OP rests at an end of its range."""
-    op, pv = record.op[:, 0], record.pv[:, 0]
-    sp = None if record.sp is None else record.sp[:, 0]
-    limits = recover(LoopSignals(op, pv, sp, [(0, len(record))]), 1).limits
-    return at_limits(op, limits)
+    op = record.op[:, 0]
+    return at_limits(op, resting_limits(op))
 
 
 def at_limits(op: FloatArray, limits: tuple[float, float]) -> float:

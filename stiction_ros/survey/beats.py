@@ -6,6 +6,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.movement import moving, size
+from stiction_ros.signals.oscillation import turnings
 
 MOST = 200
 """Beats that are kept of a record, the last ones."""
@@ -29,15 +30,10 @@ def beats(error: FloatArray, period: float) -> FloatArray:
         period: samples.
     """
     moved = moving(error, period)
-    level = 0.3 * size(moved)
-    rows, below = [], False
-    for k in np.flatnonzero(np.abs(moved) > level).tolist():
-        if moved[k] < 0.0:
-            below = True
-        elif below:
-            below = False
-            before = np.flatnonzero(moved[:k] <= 0.0)
-            a = int(before[-1])
+    rows = []
+    for k in turnings(moved, 0.3 * size(moved)).tolist():
+        if moved[k] > 0.0:
+            a = int(np.flatnonzero(moved[:k] <= 0.0)[-1])
             rows.append(a + float(moved[a] / (moved[a] - moved[a + 1])))
     return np.array(rows[-MOST:])
 

@@ -80,6 +80,7 @@ def test_a_model_in_the_place_of_a_record_is_told(
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.trial
 def test_a_model_that_comes_along_is_found_by_its_name(
     files: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

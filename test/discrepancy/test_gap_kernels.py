@@ -15,19 +15,13 @@ from stiction_ros.config_files import find_config
 from stiction_ros.discrepancy.candidate.base import Response
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
-from stiction_ros.discrepancy.fit.misfit_kernels import whitened_shifts
 from stiction_ros.discrepancy.likelihood.kernels import least_squares, turn
-from stiction_ros.discrepancy.likelihood.noise import (
-    Blocks,
-    autoregression,
-    fit_noise,
-    projector,
-    whiten,
-)
+from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise, projector
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.discrepancy.simulation.response_kernels import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel, simulate_open_loop
+from stiction_ros.signals.autoregression import whiten
 
 COUNT = 400
 TRAIN = (np.arange(COUNT) % 50 < 37) & (np.arange(COUNT) >= 7)
@@ -75,12 +69,6 @@ def test_a_basis_is_orthonormal_and_holds_the_columns(seed: int, count: int) -> 
     assert basis @ (basis.T @ columns) == pytest.approx(columns, abs=1e-12)
 
 
-def test_whitened_responses_are_those_rows_of_all() -> None:
-    shift, ar = drawn(12, COUNT, 3), np.array([0.7, -0.2])
-    found = whitened_shifts(shift, np.flatnonzero(TRAIN), ar)
-    assert found == pytest.approx(whiten(shift, ar)[TRAIN])
-
-
 def test_a_turn_is_whitened_least_squares_of_the_fitted_rows() -> None:
     columns, target, ar = drawn(3, 2, COUNT), drawn(4, COUNT), np.array([0.7, -0.2])
     white = whiten(columns.T, ar)[TRAIN]
@@ -94,30 +82,6 @@ def test_a_column_that_is_zero_on_the_fitted_rows_has_no_size() -> None:
         warnings.simplefilter("error")
         fit = fit_noise(drawn(5, COUNT), columns.astype(float), BLOCKS)
     assert fit.coefficients[1:].tolist() == [0.0, 0.0]
-
-
-@given(SEEDS, st.floats(-0.95, 0.95))
-@settings(max_examples=25, deadline=None)
-def test_autoregression_solves_the_normal_equations(seed: int, first: float) -> None:
-    residual = np.asarray(lfilter([1.0], [1.0, -first, 0.3], drawn(seed, COUNT)))
-    phi = autoregression(residual, TRAIN)
-    late = [np.concatenate([np.zeros(k), residual[: COUNT - k]])[TRAIN] for k in range(7)]
-    lagged = np.column_stack(late[1 : len(phi) + 1]) if len(phi) else np.zeros((TRAIN.sum(), 0))
-    wanted = np.linalg.lstsq(lagged, late[0], rcond=None)[0]
-    assert phi == pytest.approx(wanted, rel=1e-7, abs=1e-9)
-
-
-@given(SEEDS)
-@settings(max_examples=25, deadline=None)
-def test_the_order_is_the_one_of_least_bic(seed: int) -> None:
-    residual = np.asarray(lfilter([1.0], [1.0, -0.5, 0.0, 0.2], drawn(seed, COUNT)))
-    late = [np.concatenate([np.zeros(k), residual[: COUNT - k]])[TRAIN] for k in range(7)]
-    scores = []
-    for order in range(7):
-        inner = np.column_stack([np.zeros_like(late[0]), *late[1 : order + 1]])
-        left = late[0] - inner @ np.linalg.lstsq(inner, late[0], rcond=None)[0]
-        scores.append(len(left) * np.log(left @ left) + order * np.log(len(left)))
-    assert len(autoregression(residual, TRAIN)) == int(np.argmin(scores))
 
 
 def baseline() -> Baseline:
@@ -162,7 +126,7 @@ def test_a_process_filters_deviations_from_the_first_stem(points: int) -> None:
 
 def test_a_valve_of_the_tank_that_does_not_reach_an_output_leaves_it() -> None:
     model = LoopModel.load(find_config("tank.loop.yaml"))
-    recorded = simulate_open_loop(model, 50.0 + drawn(10, COUNT, 2), 0)
+    recorded = simulate_open_loop(model, 50.0 + drawn(10, COUNT, 2), 0).record
     run = FreeRun(model, join_records(model, [recorded]))
     moved = run.stems[:, 1:] + 10.0 * drawn(9, COUNT, 2)
     reached = [np.ptp(run.drive(i, 1, moved) - run.forced[:, i : i + 1]) > 0.0 for i in range(2)]

@@ -40,6 +40,7 @@ def test_a_step_of_the_load_is_told_from_one_of_the_output() -> None:
     assert effect.units["size"] == "%"
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(
     ("place", "effect"),
     [
@@ -56,6 +57,7 @@ def test_a_wave_is_named_by_shape_and_place(place: str, effect: Behaviour) -> No
     assert answer.effects[0].parameters["amplitude"] == pytest.approx(own["amplitude"], rel=0.1)
 
 
+@pytest.mark.trial
 def test_a_sine_is_the_same_wherever_it_enters() -> None:
     answer = found("load:V1", SineDisturbance(3.0, 57.0))
     (effect,) = answer.effects
@@ -108,6 +110,7 @@ def test_a_line_of_chance_is_no_wave() -> None:
     assert not answer.alternatives
 
 
+@pytest.mark.trial
 def test_an_effect_less_than_the_noise_of_the_equation_wanders_is_named() -> None:
     seen, _ = blind_loop(287, "single")
     answer = find_discrepancy(seen.model, [seen.record], QUICK)

@@ -26,6 +26,7 @@ def off(gain: float = 1.0, later: int = 0) -> LoopModel:
     return LoopModel.from_mapping(document)
 
 
+@pytest.mark.trial
 def test_a_stem_limit_behind_a_controller_that_winds_up_is_one_effect() -> None:
     model, recorded = with_cause("valve:V1", Saturation(0.0, 52.0), seed=5)
     answer = find_discrepancy(model, [recorded], QUICK)
@@ -72,12 +73,14 @@ def test_what_closes_the_gap_says_so() -> None:
     assert "BIC" in effect.sentence
 
 
+@pytest.mark.trial
 def test_no_effect_is_both_named_and_untestable() -> None:
     answer = found("process:PV1")
     named = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
     assert not named & {(t.place, t.effect) for t in answer.untestable}
 
 
+@pytest.mark.trial
 def test_the_preview_shows_rivals_that_differ_in_the_stem() -> None:
     shown = preview(found("process:PV1"))
     assert shown is not None

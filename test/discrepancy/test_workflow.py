@@ -103,6 +103,7 @@ def test_a_quiet_record_can_show_little() -> None:
     assert ("valve:V1", "lag") in {(t.place, t.effect) for t in answer.untestable}
 
 
+@pytest.mark.trial
 def test_the_same_seed_gives_the_same_intervals() -> None:
     model, recorded = with_cause("process:PV1", ProcessGain(1.3))
     options = GapOptions(resamples=10, seed=3)

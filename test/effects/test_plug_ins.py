@@ -104,7 +104,7 @@ def test_the_law_is_simulated_and_survives_yaml() -> None:
 
 
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize("method", ["exact", "evidence"])
+@pytest.mark.parametrize("method", ["exact", pytest.param("evidence", marks=pytest.mark.trial)])
 def test_all_three_parameters_are_identified_and_nothing_is_certified(method: str) -> None:
     record = record_of(loop().with_valve_effects({"V1": (lopsided(),)}), 450)
     found = identify(record, IdentificationOptions(law="lopsided", method=method))
@@ -131,6 +131,7 @@ def test_no_controller_plans_for_a_law_without_a_jump_form(mode: ControlMode) ->
         MpcController(ControlSettings().design(loop()), mode, [lopsided()])
 
 
+@pytest.mark.trial
 @pytest.mark.usefixtures("folder")
 def test_gap_finds_the_effect_and_says_that_the_law_was_not_considered() -> None:
     kick = effects.from_mapping({"effect": "kick", "share": 2.0})

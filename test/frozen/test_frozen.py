@@ -8,7 +8,7 @@ from stiction_studies import freeze
 
 QUICK = (
     *("field_50000", "bag_signals_only", "example1_measurement_exact"),
-    *("example1_measurement_grid", "blind_single_50002"),
+    *("example1_measurement_grid", "blind_single_50004"),
 )
 
 

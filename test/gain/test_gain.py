@@ -142,6 +142,7 @@ def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
     assert document["options"][1]["settings"]["embedding_move_weights"] > 0.0
 
 
+@pytest.mark.trial
 def test_the_embedding_takes_over_and_does_not_rest_off_its_place(
     loop: RecordedLoop, draws: Draws, gain: Gain
 ) -> None:
@@ -368,6 +369,7 @@ PARAMETERS = {
 }
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("law", PARAMETERS)
 def test_a_loop_is_run_again_by_the_law_that_was_identified(law: str) -> None:
     """With the true estimate the loop repeats its record, until a slip hangs on rounding."""

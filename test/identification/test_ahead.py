@@ -15,7 +15,7 @@ PATIENCE = 60.0  # s
 
 NEEDED = """
 from stiction_ros.identification.ahead import compile_end
-from stiction_ros.identification.closed_loop.loop_run import run_loops
+from stiction_ros.loop.linear_loops import run_loops
 from stiction_ros.identification.kernels import descent, output_error
 from stiction_ros.identification.warm_up import compile_loops
 
@@ -48,6 +48,7 @@ def told_by(code: str) -> str:
     ).stdout
 
 
+@pytest.mark.trial
 def test_another_process_compiles_what_an_identification_needs() -> None:
     assert told_by(NEEDED).split() == ["1", "1", "1", "1", "1", "1"]
 

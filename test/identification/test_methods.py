@@ -33,6 +33,7 @@ def test_each_method_signs_its_result(method: str) -> None:
     assert json.loads(json.dumps(document, allow_nan=False))["valves"][0]["name"] == "V1"
 
 
+@pytest.mark.trial
 def test_the_default_is_the_search_by_evidence() -> None:
     record = loops.example1(0, samples=700)
     assert identify(record, SMALL).valves == engine.identify_by_evidence(record, SMALL).valves

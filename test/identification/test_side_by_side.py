@@ -53,6 +53,7 @@ def test_the_error_of_the_first_part_that_fails_is_raised_and_the_next_call_work
     assert at_once(lambda: 1, lambda: "two") == (1, "two")
 
 
+@pytest.mark.trial
 def test_one_thread_identifies_what_two_do(monkeypatch: pytest.MonkeyPatch) -> None:
     record = example1(3, samples=900)
     options = IdentificationOptions(output_order=3, input_order=3, delay=(4, 6))

@@ -500,6 +500,7 @@ def peak_memory(path: Path, rows: int) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.trial
 def test_memory_grows_with_the_numbers_and_not_with_the_text(tmp_path: Path) -> None:
     few, many = (peak_memory(tmp_path / "long.csv", rows) for rows in (50_000, 110_000))
     # Four columns and their copies; the cells as text would take 400 bytes a row and more.

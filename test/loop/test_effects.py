@@ -37,7 +37,7 @@ def tag(model: LoopModel, place: str) -> str:
 
 def run(model: LoopModel) -> np.ndarray:
     moves = model.op0 + np.random.default_rng(1).uniform(-30.0, 30.0, (40, len(model.op0)))
-    return simulate_open_loop(model, moves, seed=4).pv
+    return simulate_open_loop(model, moves, seed=4).record.pv
 
 
 @every_pair
@@ -125,8 +125,8 @@ def test_a_load_moves_the_process_as_its_stem_does_but_is_no_stem(name: str) -> 
     moves = np.tile(model.op0, (40, 1))
     shifted = moves + np.eye(len(model.op0))[0] * 5.0
     step = from_mapping({"effect": "step", "time": 0.0, "size": 5.0})
-    loaded = simulate_open_loop(model.with_effect(tag(model, "load"), step), moves, seed=4)
-    moved = simulate_open_loop(model, shifted, seed=4)
+    loaded = simulate_open_loop(model.with_effect(tag(model, "load"), step), moves, seed=4).record
+    moved = simulate_open_loop(model, shifted, seed=4).record
     assert loaded.pv == pytest.approx(moved.pv, rel=1e-12)
     assert loaded.stem is not None
     assert np.array_equal(loaded.stem, moves)
@@ -157,6 +157,6 @@ def test_a_coloured_disturbance_depends_on_the_seed_alone() -> None:
         "disturbance:PV1", from_mapping({"effect": "coloured", "std": 1.0, "tau": 10.0})
     )
     held = np.full((30, 1), 50.0)
-    one, two, other = (simulate_open_loop(model, held, seed).pv for seed in (4, 4, 5))
+    one, two, other = (simulate_open_loop(model, held, seed).record.pv for seed in (4, 4, 5))
     assert np.array_equal(one, two)
     assert not np.array_equal(one, other)

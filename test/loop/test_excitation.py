@@ -64,7 +64,7 @@ def test_seed_repeats_the_experiment_bit_for_bit() -> None:
 
 def test_moves_and_noise_do_not_depend_on_each_other() -> None:
     record = prbs_experiment(TANK, 4000, 5)
-    clean = simulate_open_loop(LoopModel.from_mapping(_without_noise()), record.op, 5)
+    clean = simulate_open_loop(LoopModel.from_mapping(_without_noise()), record.op, 5).record
     noise = record.pv - clean.pv
     assert noise.std(axis=0) == pytest.approx([0.01, 0.01], rel=0.05)
     assert np.abs(np.corrcoef(np.hstack([noise, record.op]).T)[:2, 2:]).max() < 0.06

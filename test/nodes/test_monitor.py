@@ -97,6 +97,7 @@ def statuses(graph: Graph, task: str | None) -> list[tuple[Any, dict[str, str]]]
     ]
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("key", ["look", "finding"])
 def test_what_is_told_is_what_is_said_without_ros_bit_for_bit(
     graph: Graph, twin: dict[str, list[dict[str, Any]]], key: str
@@ -104,6 +105,7 @@ def test_what_is_told_is_what_is_said_without_ros_bit_for_bit(
     assert told(graph, key) == twin[key]
 
 
+@pytest.mark.trial
 def test_it_is_silent_before_the_shift_and_warns_after_it(graph: Graph) -> None:
     levels: dict[int, bytes] = {}
     for status, values in statuses(graph, "monitor"):
@@ -113,6 +115,7 @@ def test_it_is_silent_before_the_shift_and_warns_after_it(graph: Graph) -> None:
     assert {level for end, level in levels.items() if end > ONSET} == {b"\x01"}
 
 
+@pytest.mark.trial
 def test_the_status_names_the_shift_with_figures_per_output(graph: Graph) -> None:
     status, values = statuses(graph, "monitor")[-1]
     assert "PV1: sensor bias_step" in status.message
@@ -122,6 +125,7 @@ def test_the_status_names_the_shift_with_figures_per_output(graph: Graph) -> Non
     assert float(values["PV1.noise_floor"]) == pytest.approx(0.1, rel=0.2)
 
 
+@pytest.mark.trial
 def test_the_configuration_tells_the_model_that_is_compared_with(graph: Graph) -> None:
     (message,) = graph.seen["estimator/config"]
     assert yaml.safe_load(message.data)["model"]["loop"] == "watched"

@@ -44,6 +44,7 @@ def test_no_node_listens(tmp_path: Path) -> None:
     assert found == {name: [] for name in ("plant", "controller", "estimator", "recorder")}
 
 
+@pytest.mark.trial
 def test_the_demonstration_of_the_bridge_opens_one_port_of_this_machine(tmp_path: Path) -> None:
     pytest.importorskip("asyncua", reason="asyncua is not installed")
     demo = subprocess.Popen(

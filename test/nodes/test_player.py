@@ -216,6 +216,7 @@ def test_a_running_player_refuses_a_step(graph: Graph) -> None:
     assert "pause it first" in answer.message
 
 
+@pytest.mark.trial
 def test_a_loop_begins_again(graph: Graph) -> None:
     stage = Stage(graph, {"/pv": JointState}, rate=FAST, loop=True, topics="/pv", start=2090.0)
     graph.spin_until(lambda: len(stage.seen["/pv"]) >= 25, "the third round")
@@ -269,6 +270,7 @@ def test_a_player_without_a_bag_says_so(graph: Graph) -> None:
     assert node.failure == "player: bag: no bag; set it to a bag"
 
 
+@pytest.mark.trial
 def test_an_estimator_that_hears_the_player_finds_what_the_live_one_found(
     graph: Graph, recorded: dict[str, list[Any]]
 ) -> None:

@@ -144,6 +144,7 @@ writer.close()
 """
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("seed", range(trials(3, 20)))
 def test_a_kill_while_the_bag_is_finished_loses_nothing(seed: int, tmp_path: Path) -> None:
     bag = tmp_path / "bag"

@@ -52,6 +52,7 @@ def test_a_node_is_named_once(tmp_path: Path) -> None:
         read_nodes(path, without="plant")
 
 
+@pytest.mark.trial
 def test_the_command_of_the_page_finds_the_process_behind_a_sticky_valve(tmp_path: Path) -> None:
     """Delay 2, gain 0.8, f_S 4, f_D 1.5, by the record of a loop that cycles."""
     record, out = str(tmp_path / "FIC101.csv"), str(tmp_path / "fic101.loop.yaml")

@@ -92,6 +92,7 @@ def test_the_best_accepted_end_wins(found: Identification) -> None:
     assert found.search.objective == pytest.approx(best, rel=1e-6)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("method", ["nlp", "nlp_printed"])
 def test_as_many_runs_of_ipopt_as_the_paper_makes(method: str) -> None:
     options = dataclasses.replace(OPTIONS, method=method, delay=(4, 6), starts=2)
@@ -133,6 +134,7 @@ def test_a_run_never_ends_worse_than_it_began(start: tuple[float, float]) -> Non
     assert 0.0 <= dynamic <= static <= limits[0]
 
 
+@pytest.mark.trial
 def test_the_same_record_gives_the_same_result(found: Identification) -> None:
     again = identify(short(), OPTIONS)
     assert (again.valves, again.outputs, again.search) == (

@@ -119,6 +119,7 @@ def test_identify_takes_the_longest_part_and_says_so(
     assert found["valves"][0]["f_s"] == pytest.approx(5.0, abs=0.5)
 
 
+@pytest.mark.trial
 def test_report_shows_all_parts_and_says_so(
     fault: tuple[Path, list[int], str], tmp_path: Path
 ) -> None:

@@ -72,10 +72,13 @@ def test_a_pause_leaves_every_sample_at_its_place(tmp_path: Path, whole: RunLog)
     ("first", "last", "status", "told"),
     [
         (400.0, 460.0, "ok", " samples are missing"),
-        (700.0, 760.0, "ok", " samples are missing"),
+        pytest.param(700.0, 760.0, "ok", " samples are missing", marks=pytest.mark.trial),
         (150.0, 550.0, "no_round", "gap in the last round of set-points before the swap"),
-        (1450.0, 2050.0, "no_round", "gap in the first round of set-points after the swap"),
-        (1080.0, 1110.0, "no_swap", " samples are missing"),
+        pytest.param(
+            *(1450.0, 2050.0, "no_round", "gap in the first round of set-points after the swap"),
+            marks=pytest.mark.trial,
+        ),
+        pytest.param(1080.0, 1110.0, "no_swap", " samples are missing", marks=pytest.mark.trial),
     ],
 )
 def test_the_report_of_a_run_with_a_pause(
@@ -94,6 +97,7 @@ def test_the_report_of_a_run_with_a_pause(
         assert ratio < 0.1
 
 
+@pytest.mark.trial
 def test_the_report_of_a_restarted_plant_is_that_of_the_longest_run(
     tmp_path: Path, whole: RunLog
 ) -> None:
@@ -122,6 +126,7 @@ def test_a_bad_message_of_a_live_run(tmp_path: Path, whole: RunLog) -> None:
     np.testing.assert_array_equal(run.record.op, whole.record.op)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(
     ("fault", "words"),
     [

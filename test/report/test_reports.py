@@ -18,7 +18,7 @@ from stiction_ros.report.run.identified import valve_cards, verdict_line
 from stiction_ros.report.run.page import headline
 from stiction_ros.report.run.report import write_run
 from stiction_ros.report.run.story import tell
-from stiction_ros.report.shapes import fitted_start, free_run, step_response, true_response
+from stiction_ros.report.shapes import step_response, true_response
 
 FIGURES = {"rounds", "swap", "trends", "valves", "estimates", "step_responses"}
 
@@ -115,13 +115,6 @@ def test_step_responses_agree_with_the_loop_model(model: LoopModel) -> None:
     assert steps[:3] == pytest.approx([0.0, 0.1, 0.19])
     late = step_response({**entry, "delay": {"V1": 4}}, "V1", 60)
     assert late[4:] == pytest.approx(steps[:-4])
-
-
-def test_the_start_of_a_free_run_is_fitted() -> None:
-    entry = {"a": [-1.5, 0.56], "b": {"V1": [0.1, 0.05]}, "delay": {"V1": 2}, "bias": 0.2}
-    stems = {"V1": np.random.default_rng(1).uniform(40, 60, 80)}
-    run = free_run(entry, stems, np.array([3.0, -2.0]))
-    assert fitted_start(entry, stems, run) == pytest.approx([3.0, -2.0])
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.effects import Behaviour, FloatArray, from_mapping
 from stiction_ros.errors import InputError
-from stiction_ros.loop import LoopModel, Plant
+from stiction_ros.loop import LoopModel, simulate_open_loop
 
 HOLD, RAMP = 30, 60  # samples of each part of the moves of OP
 TRAVEL = 10.0  # % that OP is moved at least
@@ -85,7 +85,10 @@ def preview(found: Discrepancy) -> Preview | None:
             altered = model.with_effect(place, _soon(behaviour, model.sample_time))
         except InputError:
             continue  # what changes the record alone has nothing to show in the plant
-        shown.append(Shown(place, effect, *_run(altered, op, j, i)))
+        run = simulate_open_loop(altered, op, 0)
+        assert run.record.stem is not None
+        signals = run.record.stem[:, j], run.record.pv[:, i], run.pv_clean[:, i]
+        shown.append(Shown(place, effect, *signals))
     return Preview(valve, output, op[:, j], model.sample_time, tuple(shown))
 
 
@@ -145,19 +148,6 @@ def _moves(model: LoopModel, valve: int, rivals: Mapping[Name, Behaviour]) -> Fl
     op = np.tile(model.op0, (len(path), 1))
     op[:, valve] = np.clip(middle + path, low, high)
     return op
-
-
-def _run(
-    model: LoopModel, op: FloatArray, valve: int, output: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    plant = Plant(model, 0)
-    rows = []
-    for each in op:
-        seen = plant.measure()
-        stem = plant.apply(each)
-        rows.append((stem[valve], seen.pv[output], seen.pv_clean[output]))
-    stems, pv, true = np.array(rows).T
-    return stems, pv, true
 
 
 def _quiet(model: LoopModel) -> LoopModel:

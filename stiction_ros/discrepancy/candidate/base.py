@@ -9,10 +9,9 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Axis, Behaviour, FloatArray, Parameter, Seen, about
-from stiction_ros.effects.behaviour import SimulatesGrid
+from stiction_ros.effects.behaviour import BoolArray, SimulatesGrid
 
 _RANKED = 200  # points of a grid that may be among the best ones
 _NEIGHBOURS = 1.5  # steps of the first grid

@@ -11,7 +11,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
 from stiction_ros.discrepancy.candidate.lags import lag_axis, lasts, late_axes, later
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -27,6 +26,7 @@ from stiction_ros.effects import (
     Slew,
     XchStiction,
 )
+from stiction_ros.effects.behaviour import BoolArray
 
 Rows = Callable[[FloatArray], FloatArray]
 LARGEST = 0.95  # of the span of OP: what never moves the stem cannot be told

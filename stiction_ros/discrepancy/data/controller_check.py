@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
-from stiction_ros.discrepancy.data.op_steps import OpSteps, law_terms, other_tuning
+from stiction_ros.discrepancy.data.op_steps import OpSteps, errors_of, law_terms, other_tuning
 from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
@@ -160,7 +160,7 @@ def _refuted(model: LoopModel, runs: Runs) -> ControllerCheck | None:
     found = other_tuning(OpSteps.of(model, runs), recorded)
     if found is None:
         return None
-    own, left = (_left(model, runs, each, 0) for each in (recorded, found))
+    own, left = (_left(model, runs, each) for each in (recorded, found))
     law = _Law(found.gain, found.integral_time, left, len(runs.op))
     if _alike(recorded, law):
         return None
@@ -218,7 +218,7 @@ def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:
         return ControllerCheck(ControllerStatus.SAME, None, laws[0].left, False, scans)
     best = min(range(len(laws)), key=lambda shift: laws[shift].left * (1.0 + 1e-3 * shift))
     recorded = model.controller
-    own = math.inf if recorded is None else _left(model, runs, recorded, 0)
+    own = math.inf if recorded is None else _left(model, runs, recorded)
     as_well = own <= 2.0 * laws[0].left
     if (
         recorded is not None
@@ -293,9 +293,9 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
     """
     low, high = model.limits[0]
     moves, columns = [], []
-    for record, rows in zip(runs.records, runs.slices, strict=True):
-        op = runs.op[rows, 0]
-        count = len(op) - shift
+    errors = errors_of(model, runs, shift)
+    for record, rows, error in zip(runs.records, runs.slices, errors, strict=True):
+        op, count = runs.op[rows, 0], len(error)
         if count < 2:
             continue
         told = record.measured[1:] & record.measured[:-1]
@@ -303,7 +303,7 @@ def _regression(model: LoopModel, runs: Runs, shift: int) -> tuple[FloatArray, F
         told = told[: count - 1] & known[shift:]
         inside = (op[1:count] > low) & (op[1:count] < high) & told
         moves.append(np.diff(op[:count])[inside])
-        columns.append(law_terms(model, runs, record, rows, shift)[inside])
+        columns.append(law_terms(error, runs.sample_time)[inside])
     if not moves:
         return np.zeros(0), np.zeros((0, 2))
     return np.concatenate(moves), np.vstack(columns)
@@ -329,8 +329,9 @@ def _rounding(runs: Runs, law: _Law) -> float:
     return math.sqrt(variance) / law.usual if law.usual > 0.0 else 0.0
 
 
-def _left(model: LoopModel, runs: Runs, tuning: PiTuning, shift: int) -> float:
-    moves, columns = _regression(model, runs, shift)
+def _left(model: LoopModel, runs: Runs, tuning: PiTuning) -> float:
+    """Return the share of the moves of OP that a law leaves."""
+    moves, columns = _regression(model, runs, 0)
     if not np.any(moves):
         return math.inf
     left = moves - columns @ np.array([tuning.gain, tuning.gain / tuning.integral_time])

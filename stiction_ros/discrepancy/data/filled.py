@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 OFTEN = 0.05  # of the samples: filled-in values, from which on a record is thinned out
 FLOAT = 2e-7  # of the largest value: digits that a difference of three has by itself

@@ -9,13 +9,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.data.filled import OFTEN, drawn, held
-from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, BoolArray, autoregression, whiten
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER
 from stiction_ros.discrepancy.simulation.free_run import Runs, join_records
 from stiction_ros.effects import Behaviour, Clip, FloatArray, Freeze, Quantisation
-from stiction_ros.effects.behaviour import IntArray
+from stiction_ros.effects.behaviour import BoolArray, IntArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
-from stiction_ros.records.parts import stretches
+from stiction_ros.records.valve_work import ValveWork
+from stiction_ros.signals.autoregression import best_autoregression, whiten
+from stiction_ros.signals.holds import stretches
 
 SHOWN = (Freeze, Clip, Quantisation)
 """What is looked for here."""
@@ -149,7 +151,7 @@ def look_at_data(model: LoopModel, runs: Runs) -> Gate:
         tuple(quanta),
         tuple(rounding),
         _moves(model, runs),
-        tuple(_reversals(runs, j) for j in range(len(model.valves))),
+        tuple(_reversals(runs, op) for op in runs.op.T),
         tuple(dict.fromkeys(notes)),
         tuple(lonely),
     )
@@ -321,7 +323,7 @@ def _surprise(runs: Runs, output: int) -> float:
         rows[part.start : part.start + MAX_ORDER] = False
     if not rows.any():
         return math.inf
-    return float(np.std(whiten(values, autoregression(values, rows))[rows]))
+    return float(np.std(whiten(values, best_autoregression(values, rows, MAX_ORDER)[0])[rows]))
 
 
 def _again(values: FloatArray, quantum: float, usable: BoolArray) -> BoolArray:
@@ -365,10 +367,5 @@ def _moves(model: LoopModel, runs: Runs) -> tuple[int, ...] | None:
     return tuple(moves.tolist())
 
 
-def _reversals(runs: Runs, valve: int) -> int:
-    count = 0
-    for rows in runs.slices:
-        signs = np.sign(np.diff(runs.op[rows, valve]))
-        signs = signs[signs != 0.0]
-        count += int((signs[1:] != signs[:-1]).sum())
-    return count
+def _reversals(runs: Runs, op: FloatArray) -> int:
+    return round(sum(ValveWork.of(op[rows]).reversals for rows in runs.slices))

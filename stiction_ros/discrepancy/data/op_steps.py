@@ -11,7 +11,6 @@ from stiction_ros.discrepancy.data.unrounded import left_out, unrounded
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
-from stiction_ros.records import Record
 
 REFUTED = 0.02  # of the samples, at which no OP within its step follows a law
 FACTORS = 2.0 ** np.linspace(-2.5, 2.5, 61)  # of gain and integral time, tried for another tuning
@@ -39,8 +38,8 @@ class OpSteps:
     def of(cls, model: LoopModel, runs: Runs) -> OpSteps:
         """Return those of records in which SP is recorded."""
         parts = [
-            (runs.op[rows, 0], law_terms(model, runs, record, rows))
-            for record, rows in zip(runs.records, runs.slices, strict=True)
+            (runs.op[rows, 0], law_terms(error, runs.sample_time))
+            for rows, error in zip(runs.slices, errors_of(model, runs), strict=True)
         ]
         low, high = model.limits[0].tolist()
         quantum = quantum_of(runs.op[:, 0])
@@ -92,23 +91,19 @@ def other_tuning(steps: OpSteps, recorded: PiTuning) -> PiTuning | None:
     return PiTuning(recorded.gain * gain, recorded.integral_time * time)
 
 
-def law_terms(
-    model: LoopModel, runs: Runs, record: Record, rows: slice, shift: int = 0
-) -> FloatArray:
-    """Return (e_k − e_{k−1}, T_s e_k) of one record from its second sample on, shape (n, 2).
+def errors_of(model: LoopModel, runs: Runs, shift: int = 0) -> list[FloatArray]:
+    """Return SP − PV of each record, shape (n − shift,), where PV is ``shift`` samples late."""
+    found = []
+    for record, rows in zip(runs.records, runs.slices, strict=True):
+        assert record.sp is not None
+        late = runs.pv[rows, 0][shift:]
+        found.append(record.sp[: len(late), record.outputs.index(model.outputs[0])] - late)
+    return found
 
-    Args:
-        model: of one output.
-        runs: all records.
-        record: one of them, with SP.
-        rows: of it, in all.
-        shift: samples by which PV is late.
-    """
-    assert record.sp is not None
-    pv = runs.pv[rows, 0]
-    sp = record.sp[: len(pv) - shift, record.outputs.index(model.outputs[0])]
-    error = sp - pv[shift:]
-    return np.column_stack([np.diff(error), runs.sample_time * error[1:]])
+
+def law_terms(error: FloatArray, sample_time: float) -> FloatArray:
+    """Return (e_k − e_{k−1}, T_s e_k) from the second sample on, shape (n, 2)."""
+    return np.column_stack([np.diff(error), sample_time * error[1:]])
 
 
 def _law(tuning: PiTuning) -> FloatArray:

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
+from stiction_ros.discrepancy.data.op_steps import errors_of
 from stiction_ros.discrepancy.simulation.free_run import Runs
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
 
 LIKE_PV = (0.15, 2.0)  # times the spread of PV about its neighbours; a quarter where it is smooth
@@ -106,8 +106,8 @@ def rather_twice(model: LoopModel, runs: Runs, tuning: PiTuning) -> bool:
 def _parts(model: LoopModel, runs: Runs) -> list[_Part]:
     low, high = model.limits[0].tolist()
     return [
-        _Part.of(runs.op[rows, 0], _error(model, runs, k), (low, high))
-        for k, rows in enumerate(runs.slices)
+        _Part.of(runs.op[rows, 0], error, (low, high))
+        for rows, error in zip(runs.slices, errors_of(model, runs), strict=True)
     ]
 
 
@@ -177,11 +177,3 @@ class _Part:
         mean = self.op.copy()
         mean[:-1] = 0.5 * (self.op[:-1] + np.clip(later, *limits))
         return mean
-
-
-def _error(model: LoopModel, runs: Runs, record: int) -> FloatArray:
-    """Return SP − PV of a record, shape (N,)."""
-    sp = runs.records[record].sp
-    assert sp is not None
-    column = runs.records[record].outputs.index(model.outputs[0])
-    return np.asarray(sp[:, column] - runs.pv[runs.slices[record], 0])

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from stiction_ros.discrepancy.data.scans import between_samples
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
 from stiction_ros.discrepancy.simulation.free_run import Runs
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
+from stiction_ros.signals.holds import stretches
 
 TURNS = 30  # of the weights that make the sum of sizes least
 DIGITS = 1e-9  # of the largest move, that counts as nothing
@@ -111,7 +111,7 @@ class _Part:
         """Return SP, shape (N,); None where it moves too often."""
         told = self.moves + self.columns @ np.array([gain, integral])
         moved = self.free & (np.abs(np.diff(told, prepend=told[0])) > OUTSIDE * usual)
-        begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]]))
+        begins, _ = stretches(moved)
         rests = self.free & ~moved
         if len(begins) > MOST_MOVES * len(told) or not rests.any():
             return None

@@ -18,7 +18,7 @@ from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.loop import LoopModel
-from stiction_ros.records.parts import stretches
+from stiction_ros.signals.holds import stretches
 
 EXTENSION_ROUNDS = 2
 GROWN = 2.0  # standard errors by which the free-run error of the held-out blocks may grow

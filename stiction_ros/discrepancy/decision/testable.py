@@ -8,9 +8,10 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import left_by, whiten
+from stiction_ros.discrepancy.likelihood.noise import left_by
 from stiction_ros.discrepancy.simulation.free_run import seen_of
 from stiction_ros.effects import FloatArray, Offset, ProcessGain
+from stiction_ros.signals.autoregression import whiten
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,10 +9,9 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Response
 from stiction_ros.discrepancy.fit.misfit_kernels import left_of_shifts, taken_by_sizes
-from stiction_ros.discrepancy.likelihood.noise import Blocks, left_by, whiten
+from stiction_ros.discrepancy.likelihood.noise import Blocks, left_by
 from stiction_ros.effects import FloatArray
-
-_TINY = 1e-300
+from stiction_ros.signals.autoregression import TINY, whiten
 
 
 class Shared(Protocol):
@@ -47,8 +46,8 @@ def misfit(
         else:
             assert sizes is not None
             columns, across = np.ascontiguousarray(sizes), np.ascontiguousarray(basis.T)
-            squares = target @ target - taken_by_sizes(target, columns, rows, across, ar[i])
-        total = total + len(rows) * np.log(np.maximum(squares, _TINY))
+            squares = target @ target - taken_by_sizes(target, columns, marked, across, ar[i])
+        total = total + len(rows) * np.log(np.maximum(squares, TINY))
     if response.possible is not None:
         total = np.where(response.possible, total, np.inf)
     return np.asarray(total)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
-from stiction_ros.discrepancy.likelihood.kernels import inner_product
-from stiction_ros.effects import FloatArray
+from stiction_ros.discrepancy.likelihood.kernels import whitened_block
+from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
+from stiction_ros.signals.autoregression import TINY, inner_product
 
-IntArray = NDArray[np.int64]
 _RIDGE = 1e-10
 _ROUNDING = 1e-14
-_TINY = 1e-300
 
 
 @compiled
@@ -56,37 +54,6 @@ def left_of_shifts(
 
 
 @compiled
-def whitened_shifts(shift: FloatArray, rows: IntArray, ar: FloatArray) -> FloatArray:
-    """Return the rows of whitened responses alone, shape (n, G); arguments as above."""
-    size = shift.shape[1]
-    white = np.empty((len(rows), size))
-    for n in range(len(rows)):
-        k = rows[n]
-        for g in range(size):
-            white[n, g] = shift[k, g]
-        for i in range(min(len(ar), k)):
-            factor = ar[i]
-            for g in range(size):
-                white[n, g] -= factor * shift[k - 1 - i, g]
-    return white
-
-
-@compiled
-def _whitened(sizes: FloatArray, point: int, rows: IntArray, ar: FloatArray) -> FloatArray:
-    """Return the columns of one point, whitened, shape (s, n)."""
-    count = sizes.shape[2]
-    white = np.empty((count, len(rows)))
-    for s in range(count):
-        for n in range(len(rows)):
-            k = rows[n]
-            value = sizes[k, point, s]
-            for i in range(min(len(ar), k)):
-                value -= ar[i] * sizes[k - 1 - i, point, s]
-            white[s, n] = value
-    return white
-
-
-@compiled
 def _solved(gram: FloatArray, cross: FloatArray) -> FloatArray:
     """Return the solution of positive definite equations; both arguments are used up."""
     count = len(cross)
@@ -107,26 +74,27 @@ def _solved(gram: FloatArray, cross: FloatArray) -> FloatArray:
 def taken_by_sizes(
     target: FloatArray,
     sizes: FloatArray,
-    rows: IntArray,
+    rows: BoolArray,
     basis: FloatArray,
     ar: FloatArray,
 ) -> FloatArray:
     """Return the squares that least squares of the factors takes away, shape (G,).
 
     Args:
-        target, rows, ar: as for :func:`left_of_shifts`; the shared columns are not in ``target``.
+        target, ar: as for :func:`left_of_shifts`; the shared columns are not in ``target``.
         sizes: columns of the factors, shape (N, G, s).
+        rows: which of the N are those of ``target``, shape (N,).
         basis: as for :func:`left_of_shifts`, but of shape (r, n).
     """
     points, count, rank = sizes.shape[1], sizes.shape[2], len(basis)
     taken, inside = np.empty(points), np.empty((count, rank))
     gram, cross = np.empty((count, count)), np.empty(count)
     for g in range(points):
-        white = _whitened(sizes, g, rows, ar)
+        white = whitened_block(sizes[:, g].T.copy(), ar, rows, 0.0)
         for s in range(count):
             for c in range(rank):
                 inside[s, c] = inner_product(white[s], basis[c])
-        ridge = _TINY
+        ridge = TINY
         for s in range(count):
             cross[s] = inner_product(white[s], target)
             for t in range(s + 1):

@@ -44,7 +44,6 @@ POLISHES = 8
 NEXT_TO_NOTHING = 0.02  # BIC
 NO_MEMORY = np.zeros(0)
 SIDE = (-1.0, -0.5, 0.0, 0.5, 1.0)
-_TINY = 1e-300
 
 Under = Mapping[int, FloatArray]  # φ of an output's noise
 

@@ -11,10 +11,10 @@ from stiction_ros.discrepancy.likelihood.noise import (
     NoiseFit,
     left_by,
     projector,
-    whiten,
     whitened_columns,
 )
 from stiction_ros.effects import FloatArray
+from stiction_ros.signals.autoregression import whiten
 
 
 def information(

@@ -11,22 +11,19 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit
-from stiction_ros.discrepancy.fit.misfit_kernels import whitened_shifts
 from stiction_ros.discrepancy.fit.region import SMOOTH, Region
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.fit.settled import PROBE
 from stiction_ros.discrepancy.fit.shared_factors import information, shared_factors
 from stiction_ros.discrepancy.likelihood.noise import (
-    coloured,
     given_noise,
     left_by,
     projector,
-    whiten,
     whitened_columns,
 )
 from stiction_ros.effects import FloatArray
+from stiction_ros.signals.autoregression import TINY, coloured, whiten
 
-TINY = 1e-300
 AROUND = 16  # points of an ellipse
 BLOCK = 25
 DRAWS = 200
@@ -180,8 +177,7 @@ def _chance_gain(
     ar, rows = base.noise[output].ar, base.blocks[output].train
     total = np.sum(drawn**2, axis=0)
     if shift is not None:
-        wave = whitened_shifts(np.ascontiguousarray(shift), np.flatnonzero(rows), ar)
-        wave = left_by(basis, wave)
+        wave = left_by(basis, whiten(np.ascontiguousarray(shift), ar)[rows])
         left = (-2.0 * wave.T) @ drawn
         left += np.einsum("ng,ng->g", wave, wave)[:, None]
         left += total

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import whiten
 from stiction_ros.effects import FloatArray
+from stiction_ros.signals.autoregression import whiten
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable
 
@@ -17,6 +18,8 @@ from stiction_ros.effects import (
     RandomWalkDisturbance,
 )
 from stiction_ros.processes import AlteredProcess, ArxProcess
+from stiction_ros.signals.autoregression import companion
+from stiction_ros.signals.state_space import responses
 
 TIMES = (5.0, 30.0, 150.0)  # samples, of the first guesses of a coloured noise's memory
 RATIOS = (0.03, 0.3)  # of a random walk's step to the declared noise, first guesses
@@ -152,19 +155,14 @@ def _path(base: Baseline, output: int, valve: int) -> tuple[FloatArray, FloatArr
     equation = inner.equations[output]
     own = np.asarray(equation.b[name], dtype=float)
     count = max(len(equation.a), len(own))
-    a, b = np.zeros((count, count)), np.zeros(count)
-    a[: len(equation.a), 0] = -np.asarray(equation.a)
-    a[:-1, 1:] += np.eye(count - 1)
+    ar, b = np.pad(-np.asarray(equation.a), (0, count - len(equation.a))), np.zeros(count)
     b[: len(own)] = own
-    return a, b, np.eye(count)[0]
+    return companion(ar), b, np.eye(count)[0]
 
 
 def _reach(a: FloatArray, b: FloatArray, c: FloatArray, rows: slice) -> float:
     """Return how far a step moves an output within a record, in the mean."""
-    state, seen = np.zeros(len(a)), np.empty(rows.stop - rows.start)
-    for k in range(len(seen)):
-        seen[k] = c @ state
-        state = a @ state + b
+    seen = responses(a, c[None], itertools.repeat(b[:, None], rows.stop - rows.start))
     return max(float(np.sqrt(np.mean(seen**2))), 1e-9)
 
 

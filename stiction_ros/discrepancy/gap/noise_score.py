@@ -10,9 +10,9 @@ from scipy.linalg import block_diag
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import FLOOR, Block, Law
-from stiction_ros.discrepancy.likelihood.noise import SURPRISE, VANISHED, Blocks, BoolArray
+from stiction_ros.discrepancy.likelihood.noise import SURPRISE, VANISHED, Blocks
 from stiction_ros.discrepancy.likelihood.state_noise import innovations, left_by_columns
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 CLOSE, FLAT, TURNS = 1e-2, 0.05, 60  # of the search: figures, their likelihood, turns
 _TINY = 1e-300

@@ -9,12 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_laws import Block, Law
 from stiction_ros.discrepancy.gap.noise_score import best_figures, score_of, shown_of
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects import Backlash
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 PLAYS = (0.1, 0.25, 0.5)  # of the span of OP: bands whose strain is asked for
 RESTS = 0.1  # of the samples, in which a stem has to rest for its moves to be told from all others
@@ -103,7 +102,8 @@ def relations(base: Baseline, output: int) -> tuple[FloatArray, FloatArray]:
         if span <= 0.0:
             continue
         plain, others = [stem], [_direction(op), ((op - op.mean()) / span) ** 2]
-        others += [(op - played(op, share * span)) / span for share in PLAYS]
+        plays = Backlash.simulate_grid(np.array([[share * span] for share in PLAYS]), op, op[0])
+        others += [(op - play) / span for play in plays.T]
         if float(np.abs(op - stem).max()) > SMALL * span:
             plain.append(op)
             others.append(_direction(stem))
@@ -143,14 +143,3 @@ def _direction(signal: FloatArray) -> FloatArray:
     signs = np.sign(np.diff(signal, prepend=signal[0]))
     last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(len(signs)), 0))
     return np.asarray(signs[last])
-
-
-@compiled
-def played(signal: FloatArray, band: float) -> FloatArray:
-    """Return a signal behind a play of the given band, shape (N,)."""
-    behind = np.empty(len(signal))
-    place = signal[0]
-    for k in range(len(signal)):
-        place = min(max(place, signal[k] - 0.5 * band), signal[k] + 0.5 * band)
-        behind[k] = place
-    return behind

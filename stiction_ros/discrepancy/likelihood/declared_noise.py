@@ -12,6 +12,7 @@ from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import ColouredDisturbance, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxProcess, NoiseEntry
+from stiction_ros.signals.autoregression import companion
 
 LONGEST = 20  # samples that an autoregression of declared noises reaches back
 NEGLIGIBLE = 0.01  # of φ
@@ -102,12 +103,9 @@ def rounded(noise: DeclaredNoise, quantum: float) -> DeclaredNoise:
     count, white = len(noise.ar), quantum**2 / 12.0
     if not count or white * (1.0 + float(noise.ar @ noise.ar)) < UNSEEN * noise.std**2:
         return noise
-    states = np.zeros((count, count))
-    states[:, 0] = noise.ar
-    states[:-1, 1:] += np.eye(count - 1)
     driven, look = np.zeros((count, count)), np.eye(count)[0]
     driven[0, 0] = 1.0
-    steady = steady_gain(states, driven, look, white / noise.std**2)
+    steady = steady_gain(companion(noise.ar), driven, look, white / noise.std**2)
     if steady is None:
         return noise
     gain, missed = steady

@@ -1,4 +1,4 @@
-"""Whitening, least squares and autoregression of one gap, compiled.
+"""Whitened columns and least squares of one gap, compiled.
 
 Columns are rows of their arrays here, so that inner loops run over samples.
 """
@@ -6,52 +6,16 @@ Columns are rows of their arrays here, so that inner loops run over samples.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects import FloatArray
-
-BoolArray = NDArray[np.bool_]
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
+from stiction_ros.signals.autoregression import inner_product, whitened_rows
 
 DOUBTFUL = 1e-8  # pivot of a scaled column below which the fast solution is not trusted,
 DEPENDENT = 1e-10  # and below which the column adds nothing to the others
 APART = 1e-3  # and above which the normal equations keep half of all digits
 NOTHING = 1e-150  # length of a column that is zero on the fitted rows
-TINY = 1e-300
-_TRACE_SHARE = 1e-12
 _NEW = 1e-9  # of a scaled column that is no sum of others
-
-
-@compiled
-def inner_product(first: FloatArray, second: FloatArray) -> float:
-    """Return Σ first second, in four interleaved sums."""
-    count = len(first)
-    a = b = c = d = 0.0
-    whole = count - count % 4
-    for k in range(0, whole, 4):
-        a += first[k] * second[k]
-        b += first[k + 1] * second[k + 1]
-        c += first[k + 2] * second[k + 2]
-        d += first[k + 3] * second[k + 3]
-    for k in range(whole, count):
-        a += first[k] * second[k]
-    return (a + b) + (c + d)
-
-
-@compiled
-def whitened_rows(values: FloatArray, ar: FloatArray, rows: BoolArray) -> FloatArray:
-    """Return values_k − Σ φ_i values_{k−i} at the marked rows alone, zeros before the start."""
-    white = values.copy()
-    for lag in range(1, min(len(ar), len(values)) + 1):
-        factor = ar[lag - 1]
-        for k in range(lag, len(values)):
-            white[k] -= factor * values[k - lag]
-    at = 0
-    for k in range(len(values)):
-        if rows[k]:
-            white[at] = white[k]
-            at += 1
-    return white[:at].copy()
 
 
 @compiled
@@ -225,80 +189,6 @@ def orthonormal(columns: FloatArray) -> FloatArray:
                 columns[j, k] -= share * columns[step, k]
         rank += 1
     return columns[:rank].copy()
-
-
-@compiled
-def _lagged_products(residual: FloatArray, rows: BoolArray, most: int) -> FloatArray:
-    """Return Σ r_{k−i} r_{k−j} over the marked rows, shape (most + 1, most + 1), i ≤ j alone.
-
-    One sample later the sum of the same lag differs by the products at the ends of blocks.
-    """
-    count = len(residual)
-    gram = np.zeros((most + 1, most + 1))
-    marked, ends, found = np.zeros(count), np.empty(count, dtype=np.int64), 0
-    for k in range(count):
-        if rows[k]:
-            marked[k] = residual[k]
-        if rows[k] != (k + 1 < count and rows[k + 1]):
-            ends[found] = k
-            found += 1
-    for lag in range(min(most, count - 1) + 1):
-        value = inner_product(marked[lag:], residual[: count - lag])
-        gram[0, lag] = value
-        for i in range(most - lag):
-            for end in ends[:found]:
-                at = end - i
-                if at >= lag:
-                    product = residual[at] * residual[at - lag]
-                    value += -product if rows[end] else product
-            gram[i + 1, i + 1 + lag] = value
-    return gram
-
-
-@compiled
-def best_autoregression(
-    residual: FloatArray, rows: BoolArray, most: int
-) -> tuple[FloatArray, float]:
-    """Return φ of the order of least BIC up to ``most``, and n log Σe² + p log n.
-
-    Least squares on the n marked rows; one Cholesky factor of the normal equations holds those
-    of every lower order.
-    """
-    gram = _lagged_products(residual, rows, most)
-    ridge, count = TINY, 0
-    for lag in range(most + 1):
-        ridge += _TRACE_SHARE * gram[lag, lag]
-    for marked in rows:
-        count += 1 if marked else 0
-    count = max(count, 2)
-    factor, half = np.zeros((most, most)), np.zeros(most)
-    best_order, left = 0, gram[0, 0]
-    best_score = count * np.log(max(left, TINY))
-    for n in range(most):
-        for j in range(n + 1):
-            value = gram[j + 1, n + 1] + (ridge if j == n else 0.0)
-            for i in range(j):
-                value -= factor[n, i] * factor[j, i]
-            if j < n:
-                factor[n, j] = value / factor[j, j]
-        if not value > 0.0:
-            break
-        factor[n, n] = np.sqrt(value)
-        half[n] = gram[0, n + 1]
-        for i in range(n):
-            half[n] -= factor[n, i] * half[i]
-        half[n] /= factor[n, n]
-        left -= half[n] ** 2
-        score = count * np.log(max(left, TINY)) + (n + 1) * np.log(count)
-        if score < best_score:
-            best_order, best_score = n + 1, score
-    phi = np.zeros(best_order)
-    for n in range(best_order - 1, -1, -1):
-        value = half[n]
-        for i in range(n + 1, best_order):
-            value -= factor[i, n] * phi[i]
-        phi[n] = value / factor[n, n]
-    return phi, best_score
 
 
 @compiled

@@ -7,29 +7,29 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiction_ros.deferred import lfilter
 from stiction_ros.discrepancy.likelihood.kernels import (
     NOTHING,
-    best_autoregression,
     least_squares,
     orthonormal,
     sums_of_squares,
     turn,
     whitened_block,
+)
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
+from stiction_ros.signals.autoregression import (
+    TINY,
+    best_autoregression,
+    gain_of_noise,
+    whiten,
     whitened_rows,
 )
-from stiction_ros.effects import FloatArray
 
 MAX_ORDER = 6
 NOISE_FIT_ROUNDS = 4
 SURPRISE = 5.0  # standard deviations that one held-out row may count
 ENLARGED = 10.0  # BIC: noise beyond the declared one is an effect, and has to beat it as one
 VANISHED = 1e-9  # of a column, that whitening leaves of what it takes away
-_TINY = 1e-300
-
-BoolArray = NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,19 +95,6 @@ class NoiseFit:
     def bic(self, parameters: int) -> float:
         """Return −2 log likelihood, the price of φ and ``parameters`` log n."""
         return self.minus_two_log + self.price + parameters * math.log(max(self.rows, 2))
-
-
-def whiten(values: FloatArray, ar: FloatArray) -> FloatArray:
-    """Return values_k − Σ φ_i values_{k−i} along the first axis; zeros before the start."""
-    out = np.array(values, dtype=float, copy=True)
-    for lag, coefficient in enumerate(ar.tolist(), start=1):
-        out[lag:] -= coefficient * values[:-lag]
-    return out
-
-
-def coloured(white: FloatArray, ar: FloatArray) -> FloatArray:
-    """Return r_k = Σ φ_i r_{k−i} + white_k along the first axis: the inverse of :func:`whiten`."""
-    return np.asarray(lfilter([1.0], np.concatenate([[1.0], -ar]), white, axis=0))
 
 
 def fit_noise(
@@ -197,7 +184,7 @@ def _result(
 ) -> NoiseFit:
     """Return what a fit left; its φ cost something where they are its own."""
     rows, inside, held, outside = sums_of_squares(residual, ar, blocks.train, blocks.held, SURPRISE)
-    variance = max(inside / max(rows, 1), _TINY)
+    variance = max(inside / max(rows, 1), TINY)
     log = math.log(2.0 * math.pi * variance)
     return NoiseFit(
         ar,
@@ -210,11 +197,6 @@ def _result(
         held,
         len(ar) * math.log(max(rows, 2)) if own else 0.0,
     )
-
-
-def autoregression(residual: FloatArray, rows: BoolArray) -> FloatArray:
-    """Return φ of the order of least BIC, least squares on ``rows``, shape (p ≤ 6,)."""
-    return best_autoregression(residual, rows, MAX_ORDER)[0]
 
 
 def projector(columns: FloatArray) -> FloatArray:
@@ -233,17 +215,3 @@ def _solve(columns: FloatArray, target: FloatArray) -> FloatArray:
     scale = np.linalg.norm(columns, axis=0)
     scale = np.where(scale > NOTHING, scale, np.inf)
     return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0] / scale)
-
-
-def gain_of_noise(ar: FloatArray) -> float:
-    """Return the variance of an autoregressive process of unit innovations."""
-    order = len(ar)
-    if not order:
-        return 1.0
-    companion = np.vstack([ar, np.eye(order)[:-1]])
-    if np.abs(np.linalg.eigvals(companion)).max() >= 1.0 - 1e-9:
-        return math.inf
-    start = np.zeros((order, order))
-    start[0, 0] = 1.0
-    flat = np.linalg.solve(np.eye(order**2) - np.kron(companion, companion), start.ravel())
-    return float(flat[0])

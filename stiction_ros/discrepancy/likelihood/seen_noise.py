@@ -20,6 +20,7 @@ from stiction_ros.discrepancy.likelihood.state_noise import steady_gain
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import AlteredProcess, ArxOutput, ArxProcess
+from stiction_ros.signals.autoregression import companion
 
 REMEMBERED = 60  # samples that an OP off its record is remembered behind the process
 
@@ -82,7 +83,7 @@ def beside_unseen(
         return None
     passed, driven, shown = _of_op(inner.equations[output], model, unseen)
     white = quantum**2 / 12.0 + (0.0 if len(noise.ar) else noise.std**2)
-    own = _companion(noise.ar)
+    own = companion(noise.ar)
     excited = np.zeros(own.shape)
     if len(own):
         excited[0, 0] = noise.std**2
@@ -109,7 +110,7 @@ def _of_op(
     """
     ways = [np.asarray(equation.b.get(name, ()), dtype=float) for name in model.valve_names]
     count = max(len(equation.a), *(len(way) for way in ways))
-    states = _companion(-np.pad(np.asarray(equation.a, dtype=float), (0, count - len(equation.a))))
+    states = companion(-np.pad(np.asarray(equation.a, dtype=float), (0, count - len(equation.a))))
     parts = [
         (np.pad(way, (0, count - len(way))), each)
         for way, beside in zip(ways, unseen, strict=True)
@@ -125,15 +126,6 @@ def _of_op(
         whole[:count, k] = way
         driven[k, k] = each.variance * (1.0 - each.keep**2)
     return whole, driven, np.eye(1, len(whole))[0]
-
-
-def _companion(ar: FloatArray) -> FloatArray:
-    """Return the states of an autoregression, the first of which is seen, shape (p, p)."""
-    states = np.zeros((len(ar), len(ar)))
-    if len(ar):
-        states[:, 0] = ar
-        states[:-1, 1:] += np.eye(len(ar) - 1)
-    return states
 
 
 def _alike(one: DeclaredNoise, other: DeclaredNoise) -> bool:

@@ -6,8 +6,7 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.discrepancy.likelihood.kernels import DEPENDENT
-from stiction_ros.discrepancy.likelihood.noise import BoolArray
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 DOUBLINGS = 30
 STEADY = 1e-13  # of a gain and of a variance: what changes less from row to row stays

@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect, open_columns, run_with
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import left_by, whiten
+from stiction_ros.discrepancy.likelihood.noise import left_by
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
 from stiction_ros.discrepancy.process.slower import Changeable
@@ -18,6 +18,7 @@ from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
+from stiction_ros.signals.autoregression import whiten
 
 STEPS = 5
 TINY_STEP = 0.02  # of the probes, at which it has settled

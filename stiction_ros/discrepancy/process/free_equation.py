@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.deferred import lfilter
-from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, fit_noise, whiten
+from stiction_ros.discrepancy.likelihood.noise import Blocks, NoiseFit, fit_noise
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects import FloatArray
-from stiction_ros.identification.kernels.polynomials import stabilised
+from stiction_ros.signals.autoregression import whiten
+from stiction_ros.signals.polynomials import largest_root, stabilised
 
 RADIUS = 0.9995
 LARGEST_START = 0.995
@@ -37,7 +38,7 @@ class Equation:
     @property
     def stable(self) -> bool:
         """Whether all poles lie well inside the unit circle."""
-        return bool(np.abs(np.roots(self.denominator)).max(initial=0.0) < RADIUS)
+        return largest_root(self.denominator) < RADIUS
 
     def moved(self, step: FloatArray) -> Equation:
         """Return the equation with a step in (a, b of each valve) added."""

@@ -10,11 +10,11 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import BoolArray, NoiseFit
+from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.process.free_equation import Equation, Fitted, best_fit, filtered_fits
 from stiction_ros.discrepancy.process.refit import equations_of, problems_of
 from stiction_ros.discrepancy.process.stem_scan import Prefilter, StemScan
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 WORK = 3_000_000  # samples of all stems of a first grid together
 BATCH = 160_000

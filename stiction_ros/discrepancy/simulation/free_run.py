@@ -9,10 +9,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
-from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks, BoolArray
+from stiction_ros.discrepancy.likelihood.noise import MAX_ORDER, Blocks
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.responses import Responses, responses_of
 from stiction_ros.effects import Behaviour, FloatArray, Seen
+from stiction_ros.effects.behaviour import BoolArray
 from stiction_ros.effects.disturbance.periodic import PeriodicDisturbance
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel

@@ -59,15 +59,13 @@ class LinearResponses(Responses):
             den = np.real(np.poly(model.a)) if model.order else np.ones(1)
             self._denominators = [den] * count
             self._numerators = [
-                [_numerator(model, den, model.b[:, j], i) for j in range(model.b.shape[1])]
-                for i in range(count)
+                [_numerator(model.a, b, c, den) for b in model.b.T] for c in model.c
             ]
             self.skip = 0
             self._rests = [_state_starts(model, den, i) for i in range(count)]
         self._loads = [
-            [_numerator(model, self._denominators[i], model.e[:, d], i) for d in range(e)]
-            for i in range(count)
-            for e in [model.e.shape[1]]
+            [_numerator(model.a, e, c, denominator) for e in model.e.T]
+            for c, denominator in zip(model.c, self._denominators, strict=True)
         ]
 
     def forced(self, output: int, stems: list[FloatArray]) -> FloatArray:
@@ -219,14 +217,14 @@ def _recursion_starts(denominator: FloatArray) -> list[FloatArray]:
 
 
 def _numerator(
-    model: LinearModel, denominator: FloatArray, column: FloatArray, output: int
+    a: FloatArray, b: FloatArray, c: FloatArray, denominator: FloatArray, d: float = 0.0
 ) -> FloatArray:
-    """Return the numerator of C (qI − A)⁻¹ b in powers of q⁻¹."""
-    impulse, state = [0.0], column
-    for _ in range(model.order):
-        impulse.append(float(model.c[output] @ state))
-        state = model.a @ state
-    return np.asarray(np.convolve(denominator, impulse)[: model.order + 1])
+    """Return the numerator of C (qI − A)⁻¹ b + d in powers of q⁻¹."""
+    impulse, state = [d], b
+    for _ in range(len(b)):
+        impulse.append(float(c @ state))
+        state = a @ state
+    return np.asarray(np.convolve(denominator, impulse)[: len(b) + 1])
 
 
 def _state_starts(model: LinearModel, denominator: FloatArray, output: int) -> list[FloatArray]:
@@ -243,11 +241,7 @@ def _of_filter(entry: Filter) -> tuple[FloatArray, FloatArray]:
     """Return numerator and denominator in powers of q⁻¹, common zeros at the end cut off."""
     size = len(entry.b)
     denominator = np.real(np.poly(entry.a)) if size else np.ones(1)
-    impulse, state = [entry.d], entry.b
-    for _ in range(size):
-        impulse.append(float(entry.c @ state))
-        state = entry.a @ state
-    numerator = np.convolve(denominator, impulse)[: size + 1]
+    numerator = _numerator(entry.a, entry.b, entry.c, denominator, entry.d)
     while len(denominator) > 1 and denominator[-1] == 0.0:
         denominator = denominator[:-1]
-    return np.asarray(numerator), np.asarray(denominator)
+    return numerator, np.asarray(denominator)

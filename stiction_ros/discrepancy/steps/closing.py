@@ -41,7 +41,6 @@ from stiction_ros.discrepancy.gap.noise_check import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.likelihood.noise import gain_of_noise
 from stiction_ros.discrepancy.process.free_intervals import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
 from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
@@ -49,6 +48,7 @@ from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import whole, with_laws
 from stiction_ros.effects import FloatArray, from_mapping
+from stiction_ros.signals.autoregression import gain_of_noise
 
 BESIDE = 0.2  # of the first gap, that is left as noise: less is no effect beside another one
 A_ROW = 0.1  # of −2 log likelihood, that noise gains beside an effect: a twentieth of its σ

@@ -10,7 +10,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
-from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
 from stiction_ros.identification.closed_loop.scaled_loop import (
     EXACT,
     free_run,
@@ -25,6 +24,7 @@ from stiction_ros.identification.result.identification import (
 )
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
+from stiction_ros.signals.recovered_controller import RecoveredController
 
 FIGURES = 10
 """Digits that are written: enough for the poles of any process."""

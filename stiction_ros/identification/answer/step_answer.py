@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.polynomials import filtered
 from stiction_ros.identification.result.identification import OutputModel
+from stiction_ros.signals.free_run import step_response
 
 RISEN = 0.632
 """Share of the whole answer that a first-order process has given after one lag."""
@@ -50,9 +50,8 @@ class StepAnswer:
             sample_time: s.
         """
         wait = model.delay[valve] + 1
-        drive = np.zeros(max(samples // 2, wait + 2))
-        drive[wait:] = 1.0
-        values = filtered(np.array(model.b[valve]), np.array([1.0, *model.a]), drive)
+        count = max(samples // 2, wait + 2)
+        values = step_response(model.a, model.b[valve], model.delay[valve], count)
         reached, before = (np.abs(part).max() for part in (values, values[: len(values) // 2 + 1]))
         lag = None
         if reached <= GROWS * before:

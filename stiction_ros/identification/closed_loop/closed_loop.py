@@ -14,31 +14,11 @@ import math
 
 import numpy as np
 
-from stiction_ros.identification.closed_loop.damping import LinearController, Ringing, ringing
-from stiction_ros.identification.closed_loop.loop_run import Process
+from stiction_ros.identification.closed_loop.damping import Ringing, ringing
 from stiction_ros.identification.closed_loop.movement import STILL, Movement, compare
-from stiction_ros.identification.closed_loop.oscillation import (
-    Oscillation,
-    amplitude,
-    oscillation,
-)
-from stiction_ros.identification.closed_loop.outside_line import (
-    NO_LINE,
-    OutsideLine,
-    Predicted,
-    beside,
-    outside_line,
-)
-from stiction_ros.identification.closed_loop.recovered_controller import (
-    ControllerStatus,
-    LoopSignals,
-    RecoveredController,
-    recover,
-)
 from stiction_ros.identification.closed_loop.repeated_runs import (
     MOST,
     Repeated,
-    period_of,
     span_of,
 )
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, scaled, scaled_process
@@ -48,8 +28,27 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
 )
 from stiction_ros.identification.side_by_side import at_once
-from stiction_ros.loop.set_points import holds
+from stiction_ros.loop.linear_loops import Process
 from stiction_ros.records.record import Record
+from stiction_ros.signals.controller_recovery import recover
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import (
+    Oscillation,
+    amplitude,
+    oscillation,
+)
+from stiction_ros.signals.outside_line import (
+    NO_LINE,
+    OutsideLine,
+    Predicted,
+    beside,
+    outside_line,
+)
+from stiction_ros.signals.recovered_controller import (
+    ControllerStatus,
+    LoopSignals,
+    RecoveredController,
+)
 
 UNSEEN_CYCLES = 10
 """Cycles that a record without an oscillation is taken to have room for."""
@@ -180,8 +179,7 @@ def close_loop(record: Record, found: Identification) -> ClosedLoop:
             tuple(OutputLoop(tag, None) for tag in record.outputs),
         )
     process = scaled_process(found.outputs, record.valves, loop)
-    swings = [oscillation(loop.op[:, j], loop.stretches) for j in range(len(record.valves))]
-    periods = [period_of(swing, loop, UNSEEN_CYCLES) for swing in swings]
+    swings, periods = op_cycles(loop)
     outputs = [_output(loop, process, tag, i) for i, tag in enumerate(record.outputs)]
     repeated = Repeated.of(loop, process, found.valves, paired(loop, periods), periods)
     valves = [
@@ -236,6 +234,14 @@ def output_oscillation(loop: ScaledLoop, i: int) -> Oscillation | None:
     return oscillation(error, still if longest >= MOST_ALIKE * whole else loop.stretches)
 
 
+def op_cycles(loop: ScaledLoop) -> tuple[list[Oscillation | None], list[float]]:
+    """Return how each OP oscillates, and its period, or that of cycles that could not be seen."""
+    first, last = loop.longest
+    swings = [oscillation(op, loop.stretches) for op in loop.op.T]
+    unseen = (last - first) / UNSEEN_CYCLES
+    return swings, [unseen if swing is None else swing.period for swing in swings]
+
+
 def paired(loop: ScaledLoop, periods: list[float]) -> list[tuple[int, RecoveredController]]:
     """Return for each valve the output of its controller, −1 for none, and the controller."""
     valves, outputs = loop.op.shape[1], loop.pv.shape[1]
@@ -284,7 +290,7 @@ def _valve(
             tag, "", LoopStatus.UNTESTABLE, law.reason, oscillation=swing, band_share=share
         )
     recorded = repeated.recorded(j, period)
-    linear = LinearController(law.coefficients, law.lag, law.smoothing)
+    linear = law.coefficients, law.lag, law.smoothing
     cycle = outputs[i].oscillation
     at = outputs[i].alone.period or (period if cycle is None else cycle.period)
     rows = _last_rows(loop)
@@ -310,8 +316,8 @@ def _valve(
         swing,
         stuck,
         free,
-        ringing(repeated.process, i, j, linear),
-        ringing(_beside(loop, repeated.process, i, at), 0, j, linear),
+        ringing(repeated.process, i, j, *linear),
+        ringing(_beside(loop, repeated.process, i, at), 0, j, *linear),
         repeated.driven(j),
         share,
         moved.with_friction,

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.loop_run import Process
+from stiction_ros.loop.linear_loops import Process
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,23 +23,13 @@ class Ringing:
     growth: float
 
 
-@dataclasses.dataclass(frozen=True)
-class LinearController:
-    """One controller as :mod:`.loop_run` simulates it.
-
-    Attributes:
-        tuning: (K, K_i, K_d), shape (3,).
-        lag: samples between PV and OP.
-        smoothing: share of the last value in the filter of the error.
-    """
-
-    tuning: FloatArray
-    lag: int
-    smoothing: float
-
-
 def ringing(
-    process: Process, output: int, valve: int, controller: LinearController
+    process: Process,
+    output: int,
+    valve: int,
+    tuning: FloatArray,
+    lag: int = 0,
+    smoothing: float = 0.0,
 ) -> tuple[Ringing, ...]:
     r"""Return the oscillations of one valve and one output, the least damped first.
 
@@ -50,13 +40,19 @@ def ringing(
 
     in the backward shift q, over which the loop is closed, are the inverse poles. One on the
     negative axis rings from sample to sample, with a period of two.
+
+    Args:
+        process: of all outputs and valves.
+        output, valve: indices.
+        tuning: (K, K_i, K_d) of the controller between them, shape (3,).
+        lag: samples between PV and OP.
+        smoothing: share s of the last value in the filter of the error.
     """
-    gain, reset, rate = (float(value) for value in controller.tuning)
-    share = controller.smoothing
+    gain, reset, rate = tuning.tolist()
     a = np.concatenate([[1.0], process.a[output]])
-    left = np.convolve(np.convolve(a, [1.0, -1.0]), [1.0, -share])
-    law = np.array([gain + reset + rate, -gain - 2.0 * rate, rate]) * (1.0 - share)
-    late = 1 + int(process.delay[output, valve]) + controller.lag
+    left = np.convolve(np.convolve(a, [1.0, -1.0]), [1.0, -smoothing])
+    law = np.array([gain + reset + rate, -gain - 2.0 * rate, rate]) * (1.0 - smoothing)
+    late = 1 + int(process.delay[output, valve]) + lag
     right = np.concatenate([np.zeros(late), np.convolve(law, process.b[output, valve])])
     both = np.zeros(max(len(left), len(right)))
     both[: len(left)] += left

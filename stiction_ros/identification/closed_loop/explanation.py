@@ -11,10 +11,10 @@ from stiction_ros.identification.closed_loop.closed_loop import (
     ValveLoop,
 )
 from stiction_ros.identification.closed_loop.damping import Ringing
-from stiction_ros.identification.closed_loop.oscillation import REGULAR
 from stiction_ros.identification.result.cause import Cause, CauseKind
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
 from stiction_ros.records.record import Record
+from stiction_ros.signals.oscillation import REGULAR
 
 ENDLESS = 1e6
 """Stands in the figures for a movement that grows without end."""

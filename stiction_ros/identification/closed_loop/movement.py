@@ -6,9 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.oscillation import slow_mean
+from stiction_ros.signals.oscillation import slow_mean, turnings
 
 ALIKE = (0.5, 1.7)
 """Movement of OP over the recorded one that is the same cycle."""
@@ -74,45 +73,21 @@ def size(moved: FloatArray) -> float:
     return float(np.sqrt(np.mean(moved**2)))
 
 
-@compiled
-def _sizes_and_periods(runs: FloatArray, late: int) -> FloatArray:
-    """Return root mean square and samples per cycle of runs about their mean, shape (R, 2).
+def _size_and_period(run: FloatArray, late: int) -> tuple[float, float]:
+    """Return root mean square and samples per cycle of a run about its mean.
 
-    A half cycle ends where the signal goes from beyond half its size on one side to beyond it
-    on the other. The period is 0 with less than one cycle; a run that is not finite has no
-    period and an infinite size.
+    The period is 0 with less than one cycle; a run that is not finite has no period and an
+    infinite size.
 
     Args:
-        runs: shape (R, n).
+        run: shape (n,).
         late: first sample that counts.
     """
-    found = np.empty((len(runs), 2))
-    for r in range(len(runs)):
-        total = 0.0
-        for k in range(late, runs.shape[1]):
-            total += runs[r, k]
-        mean = total / (runs.shape[1] - late)
-        squares = 0.0
-        for k in range(late, runs.shape[1]):
-            squares += (runs[r, k] - mean) ** 2
-        size = np.sqrt(squares / (runs.shape[1] - late))
-        found[r, 0], found[r, 1] = np.inf, 0.0
-        if not (np.isfinite(size) and np.isfinite(runs[r, :late]).all()):
-            continue
-        found[r, 0], level = size, 0.5 * size
-        side, turns, first, last = 0, 0, 0, 0
-        for k in range(late, runs.shape[1]):
-            away = runs[r, k] - mean
-            now = 1 if away > level else (-1 if away < -level else 0)
-            if now == 0:
-                continue
-            if side == -now:
-                first, last = (k, k) if turns == 0 else (first, k)
-                turns += 1
-            side = now
-        if turns >= 3:
-            found[r, 1] = 2.0 * (last - first) / (turns - 1)
-    return found
+    if not np.isfinite(run).all():
+        return np.inf, 0.0
+    away = run[late:] - run[late:].mean()
+    at = turnings(away, 0.5 * size(away))
+    return size(away), 2.0 * float(at[-1] - at[0]) / (len(at) - 1) if len(at) > 2 else 0.0
 
 
 def gone(stuck: float, free: float) -> float:
@@ -129,7 +104,7 @@ def compare(runs: FloatArray, recorded: float, period: float) -> Movement:
         period: recorded one, samples.
     """
     late = int((1.0 - LATE) * runs.shape[1])
-    sizes, periods = _sizes_and_periods(np.ascontiguousarray(runs), late).T
+    sizes, periods = np.array([_size_and_period(run, late) for run in runs]).T
     ratio, own = sizes / recorded, periods / period
     same = (own > 1.0 / SAME_PERIOD) & (own < SAME_PERIOD)
     alike = (ratio > ALIKE[0]) & (ratio < ALIKE[1]) & same

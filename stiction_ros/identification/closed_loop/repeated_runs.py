@@ -10,17 +10,17 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.switching import MovingCells, SlipPolygons
-from stiction_ros.identification.closed_loop.loop_run import Controllers, Process, Runs, run_loops
 from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
-from stiction_ros.identification.closed_loop.oscillation import (
-    REGULAR,
-    Oscillation,
-    oscillation,
-)
-from stiction_ros.identification.closed_loop.recovered_controller import RecoveredController
-from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run
+from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
+from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
+from stiction_ros.signals.oscillation import (
+    REGULAR,
+    oscillation,
+)
+from stiction_ros.signals.recovered_controller import RecoveredController
+from stiction_ros.signals.spectral_lines import fitted_lines
 
 STARTS = (0.2, 0.5, 0.8)
 """Shares of the longest stretch at which runs begin as recorded."""
@@ -49,20 +49,6 @@ KNOWN = 1e-10
 DOUBTED = 0.7
 """Share of the friction that is tried as its least where the interval begins at none."""
 
-Pairs = Sequence[tuple[int, RecoveredController]]
-
-
-def controllers_of(pairs: Pairs) -> Controllers:
-    """Return controllers, each with the output that it reads, as the runs take them."""
-    laws = [law for _, law in pairs]
-    return Controllers(
-        np.array([i for i, _ in pairs]),
-        np.array([law.lag for law in laws]),
-        np.array([law.smoothing for law in laws]),
-        np.array([law.limits[0] for law in laws]),
-        np.array([law.limits[1] for law in laws]),
-    )
-
 
 def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
     """Return what the runs are told of a valve's law; of one without switching patterns, He's."""
@@ -86,6 +72,7 @@ class Repeated:
         periods: of OP of each valve, samples.
         simulated: PV of the process driven by the estimated stems, shape (N, p).
         load: what that leaves of PV, shape (N, p).
+        set_points: recorded, or found with the controllers, shape (N, p).
     """
 
     loop: ScaledLoop
@@ -96,6 +83,7 @@ class Repeated:
     periods: tuple[float, ...]
     simulated: FloatArray
     load: FloatArray
+    set_points: FloatArray
 
     @classmethod
     def of(
@@ -118,6 +106,7 @@ class Repeated:
             tuple(periods),
             simulated,
             loop.pv - simulated,
+            set_points_of(loop, pairs),
         )
 
     @property
@@ -126,11 +115,6 @@ class Repeated:
         a, b, delay, _ = self.process
         late = max(law.lag for _, law in self.pairs)
         return int(max(a.shape[1], b.shape[2] + int(delay.max()), 3 + late))
-
-    @property
-    def controllers(self) -> Controllers:
-        """The controllers as the runs take them."""
-        return controllers_of(self.pairs)
 
     def with_friction(self, valve: int) -> FloatArray:
         """Return OP, shape (R, n), with the frictions tried for ``valve``."""
@@ -171,7 +155,7 @@ class Repeated:
         frictions = self.frictions[:, 0].copy()
         frictions[valve] = 0.0
         none = np.zeros((1, last - first, self._p))
-        op, _ = self._again(first, self._set_points(rows), frictions[None], none)
+        op, _ = self._again(first, self.set_points[rows], frictions[None], none)
         if not np.isfinite(op).all():
             return 0.0
         period = self.periods[valve]
@@ -234,20 +218,9 @@ class Repeated:
         """Return the last ``MOST`` samples of a stretch."""
         return max(stretch[0], stretch[1] - MOST), stretch[1]
 
-    def _set_points(self, rows: slice) -> FloatArray:
-        """Return set-points, shape (n, p): recorded, or found with the controller."""
-        loop = self.loop
-        sp = (
-            np.zeros((rows.stop - rows.start, self._p)) if loop.sp is None else loop.sp[rows].copy()
-        )
-        for i, law in self.pairs:
-            if i >= 0:
-                sp[:, i] = law.set_point[rows]
-        return sp
-
     def _at_rest(self, first: int, last: int) -> FloatArray:
         """Return set-points, shape (n, p), that stay after ``past`` samples, or cycle on."""
-        sp = self._set_points(slice(first, last))
+        sp = self.set_points[first:last].copy()
         for i in range(self._p):
             swing = None
             if self.loop.sp is not None:
@@ -279,7 +252,7 @@ class Repeated:
         )
         repeated = np.repeat(sp[None], number, axis=0)
         outside = np.ascontiguousarray(load)
-        return run_loops(self.process, self.controllers, runs, repeated, outside, True)
+        return run_loops(self.process, Controllers.of(self.pairs), runs, repeated, outside, True)
 
     def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
         """Return OP of one valve, shape (R, n), without a load and with resting set-points."""
@@ -308,7 +281,9 @@ class Repeated:
             np.array([start.op for start in begins]),
             self.laws,
         )
-        op, _ = run_loops(self.process, self.controllers, runs, sp, np.zeros_like(sp[:1]), False)
+        op, _ = run_loops(
+            self.process, Controllers.of(self.pairs), runs, sp, np.zeros_like(sp[:1]), False
+        )
         return np.ascontiguousarray(op[:, :, valve])
 
     def _starts(self, valve: int) -> list[_Start]:
@@ -320,10 +295,10 @@ class Repeated:
             rows = slice(row - past, row)
             near = slice(max(first, row - half), min(last, row + half + 1))
             pv = self.simulated[rows] + self.load[near].mean(axis=0)
-            sp = self._set_points(slice(row, row + 1))[0]
+            sp = self.set_points[row]
             starts.append(_Start(pv, self.loop.stem[rows], self.loop.op[row - 1], sp))
         output = self.pairs[valve][0]
-        rest = self._set_points(slice(first, last)).mean(axis=0)
+        rest = self.set_points[first:last].mean(axis=0)
         for kick in KICKS:
             pv = np.repeat(rest[None], past, axis=0)
             pv[:, output] += kick
@@ -357,13 +332,7 @@ def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:
 
 def without_lines(values: FloatArray, period: float) -> FloatArray:
     """Return ``values``, shape (N,), without sine and cosine at the period and its harmonics."""
-    angle = 2 * np.pi / period * np.arange(len(values))
-    columns = [np.ones(len(values))]
-    for k in range(1, LINES + 1):
-        columns += [np.cos(k * angle), np.sin(k * angle)]
-    basis = np.column_stack(columns)
-    mean = float(values.mean())
-    return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0] + mean)
+    return values - fitted_lines(values, period, LINES)[1] + float(values.mean())
 
 
 def tried_frictions(valve: ValveEstimate) -> FloatArray:
@@ -405,9 +374,3 @@ def span_of(loop: ScaledLoop, valve: int, period: float) -> float:
     parts = [moving(loop.op[a:b, valve], period) for a, b in loop.stretches]
     low, high = np.percentile(np.concatenate(parts), [1.0, 99.0])
     return float(high - low)
-
-
-def period_of(swing: Oscillation | None, loop: ScaledLoop, unseen_cycles: int) -> float:
-    """Return the period of a signal, or that of ``unseen_cycles`` in the longest stretch."""
-    first, last = loop.longest
-    return (last - first) / unseen_cycles if swing is None else swing.period

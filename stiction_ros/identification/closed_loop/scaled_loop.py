@@ -11,10 +11,11 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.kernels.polynomials import recursion
 from stiction_ros.identification.result.identification import OutputModel
+from stiction_ros.loop.linear_loops import Pairs, Process
 from stiction_ros.records.record import Record
+from stiction_ros.signals.free_run import driven
+from stiction_ros.signals.polynomials import recursion
 
 DIGITS = 7
 """Decimals that are kept of scaled numbers: a valve that slips a sample later for the last bits of
@@ -112,26 +113,23 @@ def scaled_process(
     return Process(a, np.round(b, loop.digits + 3), delay, np.round(bias, loop.digits))
 
 
+def set_points_of(loop: ScaledLoop, pairs: Pairs) -> FloatArray:
+    """Return set-points, recorded or found with the controllers, shape (N, p)."""
+    found = np.zeros_like(loop.pv) if loop.sp is None else loop.sp.copy()
+    for i, law in pairs:
+        if i >= 0:
+            found[:, i] = law.set_point
+    return found
+
+
 def free_run(process: Process, loop: ScaledLoop, stem: FloatArray) -> FloatArray:
     """Return PV of the process driven by ``stem`` alone, shape (N, p); NaN outside stretches."""
     found = np.full(loop.pv.shape, np.nan)
     for first, last in loop.stretches:
         for i in range(loop.pv.shape[1]):
-            drive = np.full(last - first, process.bias[i])
-            for j in range(loop.op.shape[1]):
-                shift = int(process.delay[i, j]) + 1
-                moves = np.concatenate(
-                    [np.full(shift, stem[first, j]), stem[first : max(last - shift, first), j]]
-                )[: last - first]
-                held, moved = _held(process.b[i, j], moves[0]), np.convolve(process.b[i, j], moves)
-                moved[: len(held)] += held
-                drive += moved[: last - first]
+            rows = stem[first:last].T
+            drive = driven(process.b[i], process.delay[i].tolist(), rows, process.bias[i])
             poles = np.concatenate([[1.0], process.a[i]])
             rest = np.full(len(poles) - 1, loop.pv[first, i])
             found[first:last, i] = recursion(poles, drive, rest)
     return found
-
-
-def _held(taps: FloatArray, value: float) -> FloatArray:
-    """Return the state of a filter of ``taps`` that has seen ``value`` for ever."""
-    return np.asarray(np.cumsum(taps[::-1])[::-1][1:] * value)

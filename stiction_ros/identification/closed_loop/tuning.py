@@ -20,12 +20,11 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.closed_loop.closed_loop import UNSEEN_CYCLES, paired
-from stiction_ros.identification.closed_loop.oscillation import oscillation
-from stiction_ros.identification.closed_loop.repeated_runs import period_of
+from stiction_ros.identification.closed_loop.closed_loop import op_cycles, paired
 from stiction_ros.identification.closed_loop.scaled_loop import scaled
 from stiction_ros.identification.linear.response_prior import Reach
 from stiction_ros.records.record import Record
+from stiction_ros.signals.polynomials import largest_root
 
 RESETS = 3.0  # reset times after which the answer is looked at
 LEAST_FIT = 0.5  # R² of a controller whose gain is believed: rounded and held PV make it too small
@@ -74,7 +73,7 @@ class Tuning:
         law = self.gain * pv_shrunk * np.array([1.0 + 1.0 / resets, -1.0])
         poles = np.convolve(law, np.append(0.0, taps))
         poles[:2] += [1.0, -1.0]
-        return bool(np.abs(np.roots(poles)).max(initial=0.0) < 1.0)
+        return largest_root(poles) < 1.0
 
 
 def tunings(record: Record) -> tuple[Tuning | None, ...]:
@@ -87,9 +86,7 @@ def tunings(record: Record) -> tuple[Tuning | None, ...]:
     loop = scaled(record, record.op)
     if loop is None:
         return tuple(none)
-    swings = [oscillation(loop.op[:, j], loop.stretches) for j in range(len(record.valves))]
-    periods = [period_of(swing, loop, UNSEEN_CYCLES) for swing in swings]
-    for j, (i, law) in enumerate(paired(loop, periods)):
+    for j, (i, law) in enumerate(paired(loop, op_cycles(loop)[1])):
         if i >= 0 and law.r_squared > LEAST_FIT and np.isfinite(law.integral_time):
             none[i] = Tuning(j, law.gain, RESETS * law.integral_time)
     return tuple(none)

@@ -13,7 +13,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
-from stiction_ros.identification.kernels.lags import whitened
+from stiction_ros.signals.autoregression import innovations
 
 SHORTEST = NOISE_ORDER + 4  # rows of a turn: the noise model describes shorter ones
 LONGEST = 0.25  # of the rows
@@ -36,7 +36,7 @@ def echo(problem: Problem, candidate: Candidate) -> float:
     """
     longest = int(LONGEST * problem.rows)
     return max(
-        _strongest(whitened(fit.noise, fit.rest, float(fit.rest[0]))[problem.first :], longest)
+        _strongest(innovations(fit.noise, fit.rest)[problem.first :], longest)
         for fit in candidate.fits
     )
 

@@ -12,7 +12,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.laws import with_own_laws
@@ -30,11 +29,10 @@ from stiction_ros.identification.evidence.rates import (
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.conclusion import Findings, conclude
+from stiction_ros.identification.inference.conclusion import Findings, conclude, order_row
 from stiction_ros.identification.inference.verdict import half_gains, is_deadband
 from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.judgement.probability import friction_probability, verdict_of
-from stiction_ros.identification.kernels.lags import whitened
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -53,6 +51,7 @@ from stiction_ros.identification.result.identification import (
 from stiction_ros.identification.result.stability import Look as View
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.records.record import Record
+from stiction_ros.signals.autoregression import whitened
 
 Progress = Callable[[float], None]
 
@@ -133,7 +132,7 @@ def _identification(
     model, table = _process(small, options, valves, part)
     if part is not record:
         valves, model = _over_all(record, data, valves, model)
-    findings = Findings(model, valves, table, (), None)
+    findings = Findings(model, valves, table, ())
     return dataclasses.replace(conclude(record, data, findings, 0.0), method="evidence")
 
 

@@ -17,9 +17,9 @@ from stiction_ros.identification.kernels.lags import (
     moves_of,
     own_products,
     step_products,
-    whitened,
     with_past,
 )
+from stiction_ros.signals.autoregression import whitened
 
 LEAST = 1e-12  # share of the output's energy that is always left
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from stiction_ros.effects import FrictionLaw
 from stiction_ros.effects.behaviour import FloatArray, IntArray
-from stiction_ros.identification.closed_loop.outside_line import LEAST_PER_HARMONIC
 from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.fit_kernels import Lines
 from stiction_ros.identification.friction.further import first_values
@@ -19,6 +18,7 @@ from stiction_ros.identification.identification_options import IdentificationOpt
 from stiction_ros.identification.kernels.lags import in_rows
 from stiction_ros.identification.linear.response_prior import Reach
 from stiction_ros.records.record import Record
+from stiction_ros.signals.spectral_lines import LEAST_PER_HARMONIC
 
 TAPS = 60  # of an impulse response, at most
 SHARE = 8  # rows per tap, at least

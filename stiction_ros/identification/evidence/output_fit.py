@@ -17,9 +17,10 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
-from stiction_ros.identification.evidence.whitened import LOAD, Whitened, energy_of
+from stiction_ros.identification.evidence.whitened import Whitened
 from stiction_ros.identification.kernels.lags import answered
 from stiction_ros.identification.linear.response_prior import FREE, REACHES, ResponsePrior
+from stiction_ros.signals.autoregression import noise_of
 
 OUTPUT_FIT_ROUNDS = 6
 SETTLED = 0.2  # of −2 log likelihood: a round that gains less is the last
@@ -203,12 +204,4 @@ def _fitted(problem: Problem, output: int, whole: Whitened, prior: ResponsePrior
 
 
 def _noise_beside(problem: Problem, fit: OutputFit) -> FloatArray:
-    return noise_of(fit.rest[problem.first - NOISE_ORDER :])
-
-
-def noise_of(rest: FloatArray) -> FloatArray:
-    """Return the monic AR polynomial D of a signal, by least squares, shape (d + 1,)."""
-    order = NOISE_ORDER
-    past = np.array([rest[order - 1 - i : len(rest) - 1 - i] for i in range(order)])
-    gram = past @ past.T + LOAD * energy_of(rest) * np.eye(order)
-    return np.append(1.0, -np.linalg.solve(gram, past @ rest[order:]))
+    return noise_of(fit.rest[problem.first - NOISE_ORDER :], NOISE_ORDER)

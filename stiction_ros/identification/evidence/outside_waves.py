@@ -20,13 +20,11 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import LINE
-from stiction_ros.identification.closed_loop.outside_line import (
-    LEAST_PER_HARMONIC,
-    independent,
-    waves_of,
-)
 from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER, Problem
 from stiction_ros.identification.kernels.lags import with_past
+from stiction_ros.signals.arx import lagged
+from stiction_ros.signals.outside_line import independent
+from stiction_ros.signals.spectral_lines import LEAST_PER_HARMONIC, taken_by_lines, taken_by_waves
 
 HARMONICS = 25  # H, at most: corners of a square wave
 LEAST_CYCLES = 4.0  # of a wave, in a record
@@ -76,7 +74,7 @@ def _strongest(problem: Problem, output: int) -> OutsideWave | None:
     length = FINE << (beside.count - 1).bit_length()
     slowest = int(np.ceil(LEAST_CYCLES / beside.count * length * FINER))
     fundamentals = np.arange(slowest, int(length * FINER / SHORTEST))
-    taken = beside.taken_by_lines(length)
+    taken = taken_by_lines(beside.left, beside.plain, length)
     pays = beside.gain(taken) > 2.0 * np.log(beside.count)
     total, last = np.zeros(len(fundamentals)), np.zeros(len(fundamentals), dtype=np.int64)
     for h in range(1, HARMONICS + 1):
@@ -112,7 +110,7 @@ class _Beside:
     def of(cls, problem: Problem, output: int) -> _Beside:
         """Take an output's last samples and all taps of valves that follow OP."""
         y, rows = problem.pv[output], np.arange(problem.first, problem.rows)
-        columns = [y[rows - lag] for lag in range(1, NOISE_ORDER + 1)]
+        columns = lagged(y, range(1, NOISE_ORDER + 1), problem.first)
         ends = rows + problem.taps
         for stem in problem.ideal_stems():
             sums = np.concatenate([[0.0], np.cumsum(with_past(stem, problem.taps))])
@@ -134,27 +132,5 @@ class _Beside:
     def gain_of_wave(self, frequency: float, harmonics: int) -> float:
         """Return BIC without minus BIC with a wave of a frequency in turns per row."""
         angle = np.asarray(2.0 * np.pi * frequency * np.arange(self.count), dtype=np.float64)
-        lines = waves_of(angle, harmonics)
-        basis = np.linalg.qr(lines - self.plain @ (self.plain.T @ lines))[0]
-        taken = np.array([np.sum((basis.T @ self.left) ** 2)])
-        return float(self.gain(taken)[0] - np.log(self.count) * (1.0 + 2.0 * harmonics))
-
-    def taken_by_lines(self, length: int) -> FloatArray:
-        """Return the energy that one line takes, at k / ``length`` turns a row, (length / 2,).
-
-        Products of sine and cosine with anything come from its Fourier transform, those with each
-        other from that of a constant at twice the frequency.
-        """
-        half = length // 2
-        sums = np.fft.rfft(self.left, length)[:half]
-        double = np.fft.fft(np.ones(self.count), length)[::2]
-        cc, ss = 0.5 * (self.count + double.real), 0.5 * (self.count - double.real)
-        cs = -0.5 * double.imag
-        for column in self.plain.T:
-            known = np.fft.rfft(column, length)[:half]
-            cc, ss = cc - known.real**2, ss - known.imag**2
-            cs = cs + known.real * known.imag
-        c, s = sums.real, -sums.imag
-        determinant = np.maximum(cc * ss - cs**2, 1e-9 * self.count**2)
-        taken = (ss * c**2 - 2.0 * cs * c * s + cc * s**2) / determinant
-        return np.clip(taken, 0.0, float(self.left @ self.left))
+        taken = taken_by_waves(angle, harmonics, self.plain, self.left).sum()
+        return float(self.gain(taken) - np.log(self.count) * (1.0 + 2.0 * harmonics))

@@ -19,8 +19,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.accepted import Interval
 from stiction_ros.identification.evidence.fit_problem import NOISE_ORDER
-from stiction_ros.identification.evidence.output_fit import noise_of
-from stiction_ros.identification.kernels.lags import whitened
+from stiction_ros.signals.autoregression import innovations, noise_of
 
 BETWEEN = 2.0  # standard deviations of OP's innovations by which an end may lie farther out
 LATE = 1.0  # samples by which a stem answers late, at most
@@ -59,4 +58,4 @@ class Unseen:
 def innovation(op: FloatArray) -> float:
     """Return the standard deviation of what the past of OP does not tell."""
     op = op - op.mean()
-    return float(whitened(noise_of(op), op, float(op[0]))[NOISE_ORDER:].std())
+    return float(innovations(noise_of(op, NOISE_ORDER), op)[NOISE_ORDER:].std())

@@ -28,13 +28,11 @@ from stiction_ros.identification.kernels.lags import (
     beside_lags,
     products_of,
     step_products,
-    whitened,
 )
 from stiction_ros.identification.linear.response_prior import Held, Reach, ResponsePrior
+from stiction_ros.signals.autoregression import LOAD, innovations
 
 ComplexArray = NDArray[np.complex128]
-
-LOAD = 1e-8  # of the noise's variance, that keeps its equations regular
 
 
 def energy_of(signal: FloatArray) -> float:
@@ -114,7 +112,7 @@ class Whitened:
             without: index of the valve that is left out.
         """
         y = problem.pv[output]
-        seen = whitened(noise, y, float(y[0]))[problem.first :]
+        seen = innovations(noise, y)[problem.first :]
         known = problem.known[output]
         lags = products_of(noise, stems, seen[None], problem.edges)
         count, size = len(known.rows), len(problem.edges) - 1

@@ -17,8 +17,8 @@ from stiction_ros.identification.kernels.output_error import (
     evaluate,
     normal_equations,
 )
-from stiction_ros.identification.kernels.polynomials import is_stable, pulled_inside
 from stiction_ros.identification.kernels.row import lag_products
+from stiction_ros.signals.polynomials import is_stable, pulled_inside
 
 MAX_RADIUS = 0.9995
 START_RADIUS = 0.99

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.row import averaged
-from stiction_ros.identification.kernels.step import IntArray
 from stiction_ros.lanes import LANES, halves_swapped, put, row, spread
 
 

@@ -9,21 +9,9 @@ import numpy as np
 from stiction_ros.compiled import compiled_fused
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.copies import put, put_block
+from stiction_ros.signals.autoregression import whitened
 
 EIGHT = 8  # stems that are turned at once: a line of the cache
-
-
-@compiled_fused
-def whitened(noise: FloatArray, signal: FloatArray, before: float) -> FloatArray:
-    """Return D(q) of a signal that was ``before`` before its first sample, shape (N,)."""
-    out = np.zeros(len(signal))
-    for i in range(len(noise)):
-        by, late, source = noise[i], out[i:], signal[: max(len(signal) - i, 0)]
-        for k in range(len(source)):
-            late[k] += by * source[k]
-        for k in range(min(i, len(signal))):
-            out[k] += by * before
-    return out
 
 
 @compiled_fused

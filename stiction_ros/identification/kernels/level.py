@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.delay import DelayRoom, delay_room, pattern_energy
-from stiction_ros.identification.kernels.step import IntArray
 
 ZOOMS = 16
 POINTS = 5

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.row import (
     averaged,
     differences,
@@ -23,7 +23,6 @@ from stiction_ros.identification.kernels.row import (
     lag_products,
     solved,
 )
-from stiction_ros.identification.kernels.step import IntArray
 
 FREE_RUN_WEIGHT = 0.02
 THIN = 4

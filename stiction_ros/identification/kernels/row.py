@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.compiled import compiled, compiled_fused
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.step import IntArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 SHORT = 3  # largest n_a for which the recursion is written out
 DEPENDENT = 1e-6  # pivot of a scaled column, as a root, below which it depends on the others

@@ -11,12 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.kernels.copies import put, put_block
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
 from stiction_ros.identification.kernels.filter import Window, filtered_products, tails_of
 from stiction_ros.identification.kernels.row import averaged, driven_rows
-from stiction_ros.identification.kernels.step import IntArray
 
 STEMS = 64  # whose products are kept at a time
 

@@ -7,12 +7,10 @@ extremes of OP in them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 
-IntArray = NDArray[np.int64]
 Rows = tuple[IntArray, IntArray, FloatArray]
 
 BLOCK = 8

@@ -13,7 +13,6 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.deferred import lfilter
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear.armax_problem import (
@@ -21,7 +20,6 @@ from stiction_ros.identification.linear.armax_problem import (
     Point,
     Problem,
     descend,
-    radius,
     stabilised,
 )
 from stiction_ros.identification.linear.data import (
@@ -31,6 +29,9 @@ from stiction_ros.identification.linear.data import (
     nrmse_fit,
 )
 from stiction_ros.processes import ArxOutput, Noise, NoiseEntry
+from stiction_ros.signals.arx import lagged
+from stiction_ros.signals.free_run import fitted_free_run
+from stiction_ros.signals.polynomials import largest_root
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,7 +148,7 @@ def fit_armax(
     y = data.y[output]
     problem = Problem(y, data.u, delays, orders, first)
     point, converged = _search(problem)
-    constrained = radius(point.a) >= 1.0
+    constrained = largest_root(point.a) >= 1.0
     if constrained:
         point, converged = descend(problem, problem.evaluate(point.c, stabilised(point.a)))
     status, reason = LinearStatus.OK, ""
@@ -156,17 +157,6 @@ def fit_armax(
     elif constrained:
         status, reason = LinearStatus.CONSTRAINED, "the best equation is unstable; A is held inside"
     return _finish(data, output, problem, point, (orders, delays, status, reason))
-
-
-def fit_arx(
-    data: LinearData,
-    output: int,
-    orders: ArmaxOrders,
-    delays: tuple[int, ...],
-    first: int | None = None,
-) -> ArmaxFit:
-    """Fit the ARX equation (9), whatever n_c says; see :func:`fit_armax`."""
-    return fit_armax(data, output, dataclasses.replace(orders, noise=0), delays, first)
 
 
 def check(data: LinearData, orders: ArmaxOrders, delays: tuple[int, ...]) -> int:
@@ -208,25 +198,11 @@ def _long_arx(problem: Problem) -> FloatArray:
     white[0] = 1.0
     error = problem.evaluate(white).residual
     lags = min(4 * nc + 4, len(error) // 10)
-    count = len(error) - lags
-    columns = np.stack([error[lags - i : len(error) - i] for i in range(1, lags + 1)], axis=1)
+    columns = np.stack(lagged(error, range(1, lags + 1), lags), axis=1)
     shocks = error[lags:] - columns @ np.linalg.lstsq(columns, error[lags:], rcond=1e-10)[0]
-    rows = [shocks[nc - i : count - i] for i in range(1, nc + 1)]
-    echo = np.linalg.lstsq(np.array(rows).T, error[lags + nc :] - shocks[nc:], rcond=1e-10)[0]
+    rows = np.array(lagged(shocks, range(1, nc + 1), nc))
+    echo = np.linalg.lstsq(rows.T, error[lags + nc :] - shocks[nc:], rcond=1e-10)[0]
     return stabilised(np.concatenate([[1.0], echo]))
-
-
-def free_run(point: Point, problem: Problem) -> FloatArray:
-    """Return ŷ driven by the stems alone; only the n_a terms of its start are fitted."""
-    na = problem.orders.output
-    if radius(point.a) >= 1.0:
-        return np.full(len(problem.target), np.inf)
-    drive = np.concatenate([point.b.ravel(), [point.constant]]) @ problem.others
-    starts = np.eye(na, len(problem.target))
-    filtered = lfilter([1.0], point.a, np.vstack([starts, drive]), axis=1)
-    columns, forced = filtered[:-1].T, filtered[-1]
-    begin = np.linalg.lstsq(columns, problem.target - forced, rcond=1e-10)[0]
-    return np.asarray(forced + columns @ begin)
 
 
 def _finish(
@@ -240,7 +216,8 @@ def _finish(
     orders, delays, status, reason = made
     scale = float(data.y_scale[output])
     y, count = problem.target, len(problem.target)
-    run = free_run(point, problem)
+    drive = np.append(point.b.ravel(), point.constant) @ problem.others
+    run = fitted_free_run(point.a[1:], drive, y)
     parameters = orders.output + point.b.size + 1 + orders.noise
     aic, bic = information(point.energy / count, count, parameters)
     with np.errstate(invalid="ignore", over="ignore"):

@@ -16,7 +16,9 @@ import numpy as np
 
 from stiction_ros.deferred import lfilter
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels import polynomials
+from stiction_ros.signals import polynomials
+from stiction_ros.signals.arx import arx_columns
+from stiction_ros.signals.polynomials import largest_root
 
 MAX_RADIUS = 0.9995
 INSIDE = 0.98
@@ -80,15 +82,9 @@ class Problem:
         self.orders, self.valves = orders, len(u)
         count = len(y)
         self.target = y[first:]
-        # Columns −y_{k−i} of A, χ_{k−i−t_d} of B, the constant, and the start of C.
-        lagged_y = [-y[first - i : count - i] for i in range(1, orders.output + 1)]
-        lagged_u = [
-            row[first - delay - i : count - delay - i]
-            for row, delay in zip(u, delays, strict=True)
-            for i in range(1, orders.input + 1)
-        ]
-        self.lagged_y = np.array(lagged_y).reshape(orders.output, count - first)
-        self.others = np.vstack([*lagged_u, np.ones(count - first)])
+        columns = arx_columns(-y, u, delays, (orders.output, orders.input), first)
+        self.lagged_y = np.array(columns[: orders.output])
+        self.others = np.vstack([*columns[orders.output :], np.ones(count - first)])
         self.starts = np.zeros((orders.noise, count - first))
         self.starts[np.arange(orders.noise), np.arange(orders.noise)] = 1.0
 
@@ -134,11 +130,6 @@ class Problem:
         return np.asarray(jacobian - point.basis @ (point.basis.T @ jacobian))
 
 
-def radius(polynomial: FloatArray) -> float:
-    """Return the largest |root| of a monic polynomial; 0 where it has none."""
-    return float(np.abs(np.roots(polynomial)).max(initial=0.0))
-
-
 def stabilised(polynomial: FloatArray) -> FloatArray:
     """Return the polynomial with roots outside ``INSIDE`` moved onto it, angles kept."""
     return polynomials.stabilised(polynomial, INSIDE)
@@ -177,9 +168,9 @@ def descend(problem: Problem, point: Point, max_iterations: int = 60) -> tuple[P
 def _moved(problem: Problem, point: Point, step: FloatArray, na: int) -> Point | None:
     """Return the point one step on; None where a root would leave the unit circle."""
     c = point.c + np.concatenate([[0.0], step[na:]])
-    if radius(c) >= MAX_RADIUS:
+    if largest_root(c) >= MAX_RADIUS:
         return None
     if not point.searched:
         return problem.evaluate(c)
     a = point.a + np.concatenate([[0.0], step[:na]])
-    return problem.evaluate(c, a) if radius(a) < MAX_RADIUS else None
+    return problem.evaluate(c, a) if largest_root(a) < MAX_RADIUS else None

@@ -34,6 +34,7 @@ from stiction_ros.identification.linear.subspace import (
 )
 from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
 from stiction_ros.records.record import Record
+from stiction_ros.signals.velocity_form import explained
 
 DEFAULT_ORDERS = (1, 2, 3)
 CONTROLLER_SHARE = 0.98
@@ -148,7 +149,7 @@ def fit_linear(
     )
     if options.kind is LinearKind.STATE_SPACE and options.method is not SubspaceMethod.PREDICTOR:
         notes += CLOSED_LOOP if record.sp is not None else ()
-    shares = controller_share(record.op, record.pv)
+    shares = [explained(op, record.pv) for op in record.op.T]
     notes += tuple(
         f"a PI law of PV explains the moves of {valve} (R² {share:.3f}): the record tells no "
         "process from its controller, take one with set-point moves"
@@ -157,24 +158,6 @@ def fit_linear(
     )
     seconds = time.perf_counter() - begun
     return dataclasses.replace(found, seconds=seconds, notes=(*record.notes, *notes))
-
-
-def controller_share(op: FloatArray, pv: FloatArray) -> FloatArray:
-    """Return how much of the moves of each OP a PI law of the PVs alone explains.
-
-    Args:
-        op: shape (N, m).
-        pv: shape (N, p).
-
-    Returns:
-        R² of Δu_k on PV at k and k − 1, shape (m,). Near 1 the record lacks set-point moves,
-        and a model of it may be the controller turned upside down.
-    """
-    moves = np.diff(op, axis=0)
-    columns = np.hstack([pv[1:], pv[:-1], np.ones((len(moves), 1))])
-    left = moves - columns @ np.linalg.lstsq(columns, moves, rcond=None)[0]
-    spread = np.sum((moves - moves.mean(axis=0)) ** 2, axis=0)
-    return np.asarray(1.0 - np.sum(left**2, axis=0) / np.maximum(spread, 1e-300))
 
 
 def _state_space(data: LinearData, options: LinearOptions) -> StateSpaceFit:

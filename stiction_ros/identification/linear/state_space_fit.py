@@ -18,6 +18,7 @@ from scipy.linalg import solve_discrete_are
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.linear.subspace_projection import StateSequence
+from stiction_ros.signals.state_space import responses
 
 TINY = 1e-24
 """Variance, in that of the outputs, below which an error counts as none."""
@@ -161,23 +162,6 @@ def _kalman_gain(a: FloatArray, c: FloatArray, w: FloatArray, v: FloatArray) -> 
         return np.zeros((len(a), len(c)))
 
 
-def _responses(transition: FloatArray, c: FloatArray, drives: FloatArray) -> FloatArray:
-    """Return C Z_k for Z_{k+1} = transition Z_k + drives_k, Z_0 = 0.
-
-    Args:
-        drives: shape (N, n, q).
-
-    Returns:
-        Shape (N, p, q).
-    """
-    state = np.zeros(drives.shape[1:])
-    out = np.empty((len(drives), len(c), drives.shape[2]))
-    for k, drive in enumerate(drives):
-        out[k] = c @ state
-        state = transition @ state + drive
-    return out
-
-
 def _free_decay(transition: FloatArray, c: FloatArray, samples: int) -> FloatArray:
     """Return C transition^k, shape (N, p, n)."""
     out = np.empty((samples, *c.shape))
@@ -203,7 +187,7 @@ def refine(model: Realisation, u: FloatArray, y: FloatArray, error: Refinement) 
         drives[:, :, j * n : (j + 1) * n] = u[j][:, None, None] * np.eye(n)
     drives[:, :, m * n : m * n + p] = -k
     drives[:, :, -1] = (k @ y).T
-    forced = _responses(transition, model.c, drives)
+    forced = responses(transition, model.c, drives)
     forced[:, :, m * n : m * n + p] += np.eye(p)
     target = y.T - forced[:, :, -1]
     decay = _free_decay(transition, model.c, samples)
@@ -221,7 +205,7 @@ def with_initial_state(model: Realisation, u: FloatArray, y: FloatArray) -> Real
     """Return ``model`` with the ξ_0 that fits its free run best; unchanged when unstable."""
     if model.radius >= 1.0:
         return model
-    forced = _responses(model.a, model.c, (model.b @ u).T[:, :, None])[:, :, 0]
+    forced = responses(model.a, model.c, (model.b @ u).T[:, :, None])[:, :, 0]
     target = y.T - model.y0 - forced
     decay = _free_decay(model.a, model.c, y.shape[1])
     x0 = np.linalg.lstsq(decay.reshape(-1, len(model.a)), target.ravel(), rcond=1e-10)[0]
@@ -234,10 +218,6 @@ def predict(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) ->
     drive = model.b @ u
     if one_step:
         drive = drive + model.k @ (y - model.y0[:, None])
-    state = model.x0
-    out = np.empty_like(y)
     with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(y.shape[1]):
-            out[:, k] = model.c @ state
-            state = transition @ state + drive[:, k]
-    return out + model.y0[:, None]
+        run = responses(transition, model.c, drive.T[:, :, None], model.x0[:, None])
+    return run[:, :, 0].T + model.y0[:, None]

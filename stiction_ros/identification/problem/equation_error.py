@@ -17,13 +17,14 @@ import numpy as np
 from scipy.linalg import lstsq
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.kernels.polynomials import recursion, stabilised
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx import arx_columns
+from stiction_ros.signals.free_run import driven
+from stiction_ros.signals.polynomials import largest_root, recursion, stabilised
 
 RANK_TOLERANCE = 1e-12
-BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
 Delays = tuple[tuple[int, ...], ...]
 
 
@@ -106,7 +107,7 @@ class ArxFit:
     @property
     def largest_root(self) -> float:
         """Modulus of the largest root of A(q); the model is stable below 1."""
-        return largest_root(self.a)
+        return largest_root(np.append(1.0, self.a))
 
     def judged(self, y: FloatArray, stems: FloatArray, orders: ArxOrders) -> ArxFit:
         """Return the same model with SE and residuals over output y, (N,), and stems, (m, N)."""
@@ -127,13 +128,8 @@ class ArxFit:
         Returns:
             Shape (N − first,); not finite where an unstable model overflows.
         """
-        count = len(y)
-        driven = np.full(count - first, self.constant)
-        for stem, delay, row in zip(stems, self.delays, self.b, strict=True):
-            for lag, gain in enumerate(row, start=1):
-                driven += gain * stem[first - delay - lag : count - delay - lag]
-        polynomial = np.concatenate([[1.0], self.a])
-        return recursion(polynomial, driven, y[first - len(self.a) : first])
+        drive = driven(self.b, self.delays, stems, self.constant)[first:]
+        return recursion(np.append(1.0, self.a), drive, y[first - len(self.a) : first])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,21 +150,11 @@ class EquationError:
         return float(np.mean([fit.squared_error for fit in self.fits]))
 
 
-def largest_root(a: FloatArray) -> float:
-    """Return the modulus of the largest root of 1 + a_1 q⁻¹ + … + a_na q⁻ⁿᵃ."""
-    return float(np.abs(np.roots(np.concatenate([[1.0], a]))).max(initial=0.0))
-
-
 def regressors(
     y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: ArxOrders
 ) -> FloatArray:
     """Return Φ of (13) without the constant, shape (N − ε, n_a + m n_b)."""
-    first, count = orders.first, len(y)
-    columns = [-y[first - lag : count - lag] for lag in range(1, orders.output + 1)]
-    for stem, delay in zip(stems, delays, strict=True):
-        columns += [
-            stem[first - delay - lag : count - delay - lag] for lag in range(1, orders.input + 1)
-        ]
+    columns = arx_columns(-y, stems, delays, (orders.output, orders.input), orders.first)
     return np.stack(columns, axis=1)
 
 

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_ros.compiled import compiled_fused
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.step import IntArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.lanes import LANES, put, row, spread
 
 

@@ -27,6 +27,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx import lagged
 
 TOO_SHORT = "take a longer record, lower orders or a narrower delay range"
 CLOSER = 0.1  # distance of OP from SP over that of PV from which they are swapped
@@ -292,12 +293,9 @@ def _fit(
     may = explained_stretches(own, others, (order, past.value), starts, width, EXACT)
     if not may.any():
         return None
-    columns = [own[order - i : order - i + count] for i in range(1, order + 1)]
-    columns += [
-        other[order - i : order - i + count]
-        for other in others
-        for i in range(past.value, order + 1)
-    ]
+    columns = lagged(own, range(1, order + 1), order)
+    for other in others:
+        columns += lagged(other, range(past.value, order + 1), order)
     regressors, target = np.column_stack(columns), own[order:]
     moving, starts = target != 0.0, starts[may]
     if not moving.any():

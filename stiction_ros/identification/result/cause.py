@@ -31,7 +31,7 @@ class Cause:
         kind: see :class:`CauseKind`.
         period: of PV − SP, s; None where nothing stands out.
         regularity: above 1 is regular, see
-            :mod:`stiction_ros.identification.closed_loop.oscillation`.
+            :mod:`stiction_ros.signals.oscillation`.
         amplitude: √2 × RMS of the line at this period, engineering units.
         sentence: for people.
     """

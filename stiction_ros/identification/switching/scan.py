@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.step import IntArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects import FrictionLaw, HeStiction
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.friction.grid import simulate
-from stiction_ros.identification.kernels.step import IntArray, dense_steps, he_steps
+from stiction_ros.identification.kernels.step import dense_steps, he_steps
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,18 +10,12 @@ import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import measure_gap
-from stiction_ros.discrepancy.likelihood.noise import (
-    Blocks,
-    BoolArray,
-    fit_noise,
-    left_by,
-    projector,
-    whiten,
-)
+from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise, left_by, projector
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
-from stiction_ros.effects import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
+from stiction_ros.signals.autoregression import whiten
 
 BATCHES = 24  # of the baseline, whose spread tells how much its mean square can be trusted
 CLEARED = 0.05  # a healthy window exceeds the limit of the way back this often

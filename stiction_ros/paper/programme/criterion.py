@@ -18,6 +18,7 @@ from stiction_ros.identification.problem.equation_error import ArxOrders, Delays
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records import Record
+from stiction_ros.signals.arx import lagged
 
 RIDGE = 1e-11  # on normal equations of unit columns: a stem that rests has no effect
 KEPT = 4096  # stems that are kept for the other choices of delays
@@ -74,7 +75,7 @@ class Criterion:
         for i, y in enumerate(table.record.pv.T):
             y = y - y.mean()
             past = orders.of_output(i, len(table.limits))[0]
-            columns = [-y[orders.first - lag : count - lag] for lag in range(1, past + 1)]
+            columns = lagged(-y, range(1, past + 1), orders.first)
             whole = np.column_stack([*columns, np.ones(count - orders.first)])
             basis = np.linalg.qr(whole)[0]
             target = y[orders.first :]
@@ -100,15 +101,10 @@ class Criterion:
 
     def _error(self, output: int, stems: FloatArray) -> float:
         """Return SE (14) of one output with its best coefficients."""
-        orders, count = self.table.orders, stems.shape[1]
+        orders, delays, columns = self.table.orders, self.delays[output], []
         inputs = orders.of_output(output, len(stems))[1]
-        columns = [
-            stem[orders.first - delay - lag : count - delay - lag]
-            for stem, delay, width in zip(
-                stems - stems[:, :1], self.delays[output], inputs, strict=True
-            )
-            for lag in range(1, width + 1)
-        ]
+        for stem, delay, width in zip(stems - stems[:, :1], delays, inputs, strict=True):
+            columns += lagged(stem, range(delay + 1, delay + width + 1), orders.first)
         phi, basis, rest = np.column_stack(columns), self._past[output], self._rest[output]
         phi = phi - basis @ (basis.T @ phi)
         norm = np.sqrt(np.einsum("ij,ij->j", phi, phi))

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.problem.equation_error import Delays, fit_arx, largest_root
+from stiction_ros.identification.problem.equation_error import Delays, fit_arx
 from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
 from stiction_ros.paper.programme.programme_terms import Terms
 
@@ -142,7 +142,7 @@ class FrictionProgramme:
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
             feasible=finite and bool(slack.min(initial=0.0) >= -FEASIBILITY),
-            stable=finite and max(largest_root(fit.a) for fit in self.frame.models(end)) < 1.0,
+            stable=finite and max(fit.largest_root for fit in self.frame.models(end)) < 1.0,
         )
 
     def _build_stems(self) -> Any:

@@ -6,11 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.problem.equation_error import (
     ArxFit,
     ArxOrders,
-    BoolArray,
     Delays,
     regressors,
     stable_arx,

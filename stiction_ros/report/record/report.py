@@ -30,7 +30,6 @@ from stiction_ros.report.shapes import (
     draw_output,
     draw_responses,
     draw_valve,
-    fitted_start,
     free_run,
 )
 from stiction_ros.texts import finite
@@ -193,12 +192,11 @@ def _free_runs(record: Record, identification: Identification) -> Drawing:
     figure, axes = panels(count, 0.6 + 2.2 * count, sharex=True)
     time = TimeAxis.spanning(record.time[-1])
     at = time(record.time)
-    stems = {name: identification.stem[:, j] for j, name in enumerate(record.valves)}
+    stems = dict(zip(record.valves, identification.stem.T, strict=True))
     for row, output in enumerate(identification.outputs):
         axis = axes[row, 0]
         measured = record.pv[:, record.outputs.index(output.name)]
-        model = output.to_json()
-        run = free_run(model, stems, fitted_start(model, stems, measured))
+        run = free_run(output, stems, measured)
         axis.plot(at, measured, color=INK, linewidth=0.8, label="PV, measured")
         axis.plot(at, run, color=VERMILION, linewidth=1.2, label="free run of the model")
         axis.set_title(

@@ -4,7 +4,7 @@ Everything is computed from the error e = PV − SP inside the *holds*: the stre
 between two moves of any set-point.
 
 - *Dominant period* T of the phase `before` and *amplitude* of an output, √2 × RMS of the
-  spectral line at T: see :mod:`stiction_ros.identification.closed_loop.oscillation`.
+  spectral line at T: see :mod:`stiction_ros.signals.oscillation`.
 - *Offset*: mean over the holds of |mean e| over their last 50 samples. Holds of fewer than
   100 samples have not settled by then and do not count, unless all are shorter.
 - *Work* of each valve per hour, and the largest move of its OP from one sample to the next: see
@@ -23,17 +23,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.oscillation import (
+from stiction_ros.records import Record
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.valve_work import ValveWork, largest_op_step, work_per_hour
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import (
     LEAST_LINE,
     NEEDED_CYCLES,
     Cycle,
     amplitude,
     dominant_cycle,
 )
-from stiction_ros.loop.set_points import holds
-from stiction_ros.records import Record
-from stiction_ros.records.quality import Quality
-from stiction_ros.records.valve_work import ValveWork, largest_op_step, work_per_hour
 
 OFFSET_SAMPLES = 50
 NOISE_SHARE = float(np.sqrt(2 / np.pi))  # E|v| of white noise with σ = 1

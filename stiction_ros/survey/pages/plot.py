@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.records.parts import stretches
+from stiction_ros.signals.holds import stretches
 from stiction_ros.survey.pages.frame import text
 
 WIDTH, HEIGHT = 960, 240

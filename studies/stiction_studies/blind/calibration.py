@@ -11,9 +11,9 @@ from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.decision.decide import confirmed, large_enough
 from stiction_ros.discrepancy.decision.scores import all_candidates, score_candidates
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.likelihood.noise import coloured
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import FloatArray
+from stiction_ros.signals.autoregression import coloured
 from stiction_studies.blind.loops.generator import blind_loop
 
 

@@ -174,9 +174,9 @@ def _amplitudes(live: LiveRun, scenario: Scenario, seed: int) -> dict[str, float
     What comes before the swap does for this only where the swap comes late enough; the twin that
     is never swapped has cycles in every seed.
     """
-    from stiction_ros.identification.closed_loop.oscillation import dominant_cycle
     from stiction_ros.online.session import run_live
     from stiction_ros.report.run.scoring import errors, score
+    from stiction_ros.signals.oscillation import dominant_cycle
 
     record = live.run.record
     round_samples = round(scenario.set_points.repeat / record.sample_time)

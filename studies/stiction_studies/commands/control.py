@@ -14,7 +14,7 @@ from rich.table import Table
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.loop.set_points import holds
+from stiction_ros.signals.holds import holds
 from stiction_studies.commands import choices
 from stiction_studies.seeds import add_jobs, run_seeds, seed_range
 
@@ -116,7 +116,7 @@ def run_seed(names: tuple[str, ...], seed: int) -> dict[str, Runs]:
 
 def scores(name: str, runs: list[Runs]) -> CaseScores:
     """Return the scores of the case ``name`` over ``runs``, one entry per seed."""
-    from stiction_ros.identification.closed_loop.oscillation import amplitude, dominant_cycle
+    from stiction_ros.signals.oscillation import amplitude, dominant_cycle
     from stiction_studies.examples.control_cases import CASES
 
     cycles = []

@@ -19,10 +19,10 @@ from stiction_ros.loop import (
     SetPoints,
     simulate_closed_loop,
 )
-from stiction_ros.loop.set_points import holds
 from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.session import Scenario
 from stiction_ros.records.valve_work import ValveWork, largest_op_step
+from stiction_ros.signals.holds import holds
 
 SAMPLES = 640
 OFFSET_SAMPLES = 50

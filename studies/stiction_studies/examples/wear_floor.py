@@ -27,9 +27,9 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.loop.set_points import holds
 from stiction_ros.online.session import Scenario
 from stiction_ros.processes.stirred_tank import StirredTank, TankParameters
+from stiction_ros.signals.holds import holds
 from stiction_studies.examples.wear_study import schedule_of
 
 STEMS = np.linspace(0.0, 100.0, 201)  # %, tried for a stem on its way

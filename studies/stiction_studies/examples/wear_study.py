@@ -11,9 +11,9 @@ from stiction_ros.control import ControlMode, FrictionSpread, MpcController
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.loop import Measurement, SetPoints, simulate_closed_loop
-from stiction_ros.loop.set_points import holds
 from stiction_ros.online.session import Scenario
 from stiction_ros.records.valve_work import ValveWork, largest_op_step
+from stiction_ros.signals.holds import holds
 from stiction_studies.examples.control_study import FIRST_HOLD, MOVES, held_out_set_points
 
 HOLD = 120  # samples between two moves of the set-points that are drawn

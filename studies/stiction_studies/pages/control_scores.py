@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.oscillation import (
+from stiction_ros.records.valve_work import ValveWork, largest_op_step
+from stiction_ros.report.run.scoring import offset
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import (
     LEAST_LINE,
     amplitude,
     dominant_cycle,
 )
-from stiction_ros.loop.set_points import holds
-from stiction_ros.records.valve_work import ValveWork, largest_op_step
-from stiction_ros.report.run.scoring import offset
 from stiction_studies.examples.control_study import COLUMNS, ColumnRun, Trial
 
 

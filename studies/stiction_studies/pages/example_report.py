@@ -10,7 +10,6 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
-from stiction_ros.loop.set_points import set_point_moves
 from stiction_ros.processes import StirredTank
 from stiction_ros.report.drawing import (
     BLUE,
@@ -32,9 +31,9 @@ from stiction_ros.report.shapes import (
     draw_curves,
     draw_responses,
     draw_valve,
-    fitted_start,
     free_run,
 )
+from stiction_ros.signals.holds import set_point_moves
 from stiction_ros.texts import finite
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison
 from stiction_studies.examples.example import Example
@@ -183,8 +182,7 @@ def _draw_estimates(
     i = record.outputs.index(output.name)
     measured = record.pv[:, i]
     stems = {name: found.stem[:, j] for j, name in enumerate(record.valves)}
-    model = output.to_json()
-    run = free_run(model, stems, fitted_start(model, stems, measured))[part]
+    run = free_run(output, stems, measured)[part]
     one_step = one_step_estimate(record, found.stem, output)[part]
     axis.plot(at, measured[part], color=SKY, linewidth=3.0, alpha=0.6, label="PV, measured")
     if record.sp is not None:

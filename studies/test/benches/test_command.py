@@ -106,6 +106,7 @@ def test_the_paper_s_methods_are_run_in_full_and_tell_their_work(document: dict[
     assert "extrapolated" not in nlp["note"] + grid["note"]
 
 
+@pytest.mark.trial
 def test_settings_of_the_paper_s_methods_can_be_chosen() -> None:
     plan = dataclasses.replace(TINY, lengths=(300,), valves=(), friction_limit=6.0, grid_step=3.0)
     nlp, grid = identification(plan, lambda share, text: None)[:2]

@@ -24,10 +24,12 @@ def test_the_stored_threshold_of_one_loop_is_what_was_calibrated() -> None:
     assert stored_threshold(FEW_CANDIDATES) == pytest.approx(SCORE_OF_FEW)
 
 
+@pytest.mark.trial
 def test_scores_of_noise_alone_stay_below_the_margin(scores: list[ChanceScore]) -> None:
     assert len(scores) == 4
     assert max(each.evidence for each in scores) < 10.0
 
 
+@pytest.mark.trial
 def test_scores_of_noise_are_drawn_from_the_seed(scores: list[ChanceScore]) -> None:
     assert next(chance_scores([2], 2)) == scores[2] != scores[3]

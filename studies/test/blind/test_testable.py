@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import pytest
+
 from stiction_studies.blind.loops.generator import blind_loop
 from stiction_studies.blind.testable import gains_beyond_margin
 
@@ -13,6 +15,7 @@ STICTION_OF_ONE = 11  # in a loop of one valve
 NOTHING_MOVES = 210  # a seed with a curved valve that rests in one place
 
 
+@pytest.mark.trial
 def test_an_effect_that_shows_is_testable() -> None:
     for seed in (SINE, STICTION):
         seen, truth = blind_loop(seed)

@@ -27,6 +27,7 @@ def test_page_figures_and_scores_are_written(folder: Path) -> None:
     assert names == {"compare.html", "compare.json", "figure6_linear.png", "figure6_linear.svg"}
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(("width", "tables"), [(80, 2), (120, 1)])
 def test_a_terminal_of_80_columns_cuts_nothing_off(
     tmp_path: Path,

@@ -20,6 +20,7 @@ def test_a_case_is_scored_and_written(tmp_path: Path) -> None:
     assert max(found["cycle"]) < 0.3
 
 
+@pytest.mark.trial
 def test_the_floor_stands_below_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     call = ["study-control", "--seeds", "41:41", "--jobs", "1", "--cases", "two_valves"]
     assert main([*call, "--floor"]) in (0, 1)

@@ -55,6 +55,7 @@ def test_the_report_shows_the_figures(written: Path) -> None:
     assert page.count("data:image/png;base64") == 4
 
 
+@pytest.mark.trial
 def test_many_seeds_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["example", "healthy", "--family", "sine", "--seeds", "3:4", "--jobs", "1"]
     assert main([*arguments, "--na", "1", "--json", "-"]) == 0

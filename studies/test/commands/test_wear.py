@@ -8,6 +8,7 @@ import pytest
 from stiction_ros.cli.main import main
 
 
+@pytest.mark.trial
 def test_the_curve_is_written(tmp_path: Path) -> None:
     target = tmp_path / "curve.json"
     call = ["study-wear", "tank", "--seeds", "41:41", "--jobs", "1", "--no-printed"]

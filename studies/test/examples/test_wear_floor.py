@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
-from stiction_ros.loop.set_points import holds
 from stiction_ros.online.session import Scenario
+from stiction_ros.signals.holds import holds
 from stiction_studies.examples.wear_floor import LONGEST, floor_of, least_iae, least_iae_beside
 from stiction_studies.examples.wear_study import schedule_of
 
@@ -119,6 +119,7 @@ def test_who_knows_a_set_point_before_it_moves_may_be_below_it() -> None:
     assert iae_of_second(stems) < 0.95 * BESIDE[1]
 
 
+@pytest.mark.trial
 def test_the_floor_is_met_by_going_beyond_and_coming_back() -> None:
     process = TANK.plant.process
     wanted = np.repeat([[7.5, 42.324], [7.5, 43.6]], [5, 100], axis=0)

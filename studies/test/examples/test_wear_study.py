@@ -21,6 +21,7 @@ def tank() -> Scenario:
     return Scenario.load(find_config("tank.scenario.yaml"))
 
 
+@pytest.mark.trial
 def test_the_exact_embedding_spares_the_valve_and_keeps_the_set_points(tank: Scenario) -> None:
     runs = [run_candidates(tank, (FREE, UNAWARE, EXACT), seed) for seed in (211, 212)]
     free, unaware, exact = (mean_score([run[i] for run in runs]) for i in range(3))

@@ -27,6 +27,7 @@ def found(tank: Example) -> Identification:
     return identify(tank.record, FAST)
 
 
+@pytest.mark.trial
 def test_the_page_stands_alone(tank: Example, found: Identification, tmp_path: Path) -> None:
     target = tmp_path / "report.html"
     assert report_example(tank, found, compare(tank, found), target) == target
@@ -39,6 +40,7 @@ def test_the_page_stands_alone(tank: Example, found: Identification, tmp_path: P
     assert "true 8" in page
 
 
+@pytest.mark.trial
 def test_a_truth_outside_its_interval_stands_out(
     tank: Example, found: Identification, tmp_path: Path
 ) -> None:
@@ -48,6 +50,7 @@ def test_a_truth_outside_its_interval_stands_out(
     assert '<td class="bad">8.500 … 9.000</td>' in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.trial
 def test_step_responses_are_drawn_per_channel(tank: Example, found: Identification) -> None:
     with style():
         steps, part, whole, curves = draw_example(tank, found)
@@ -62,6 +65,7 @@ def test_step_responses_are_drawn_per_channel(tank: Example, found: Identificati
     assert titles == ["V1 → C", "V2 → C", "V1 → T", "V2 → T"]
 
 
+@pytest.mark.trial
 def test_trends_show_measured_and_estimated_signals(tank: Example, found: Identification) -> None:
     with style():
         part = draw_example(tank, found)[1]

@@ -11,7 +11,7 @@ from stiction_studies.examples.control_study import COLUMNS, StudyOptions, run_t
 from stiction_studies.pages import control_scores
 from stiction_studies.pages.control_scores import ColumnScore, score_trial
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.trial
 
 
 @pytest.fixture(scope="module")

@@ -6,14 +6,13 @@ import dataclasses
 import math
 
 import numpy as np
-import pytest
 from gap_loops import loop, record, without_controller
 
 from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.noise_effects import noise_effects
 from stiction_ros.discrepancy.gap.noise_laws import declared_block, laws_of
-from stiction_ros.discrepancy.gap.of_the_stem import played, relations, with_a_stem
+from stiction_ros.discrepancy.gap.of_the_stem import relations, with_a_stem
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Backlash, Behaviour, RandomWalkDisturbance
@@ -66,11 +65,3 @@ def test_an_op_that_stands_still_has_no_relation_to_anything() -> None:
     runs = dataclasses.replace(base.run.runs, op=np.full_like(base.run.runs.op, 50.0))
     straight, bent = relations(Baseline.of(FreeRun(base.run.model, runs)), 0)
     assert straight.shape[1] == bent.shape[1] == 0
-
-
-def test_a_play_follows_half_its_band_behind() -> None:
-    signal = np.concatenate([np.linspace(0.0, 10.0, 11), np.linspace(9.0, 0.0, 10)])
-    behind = played(signal, 4.0)
-    assert behind[10] == pytest.approx(8.0)
-    assert behind[13] == pytest.approx(8.0)
-    assert behind[-1] == pytest.approx(2.0)

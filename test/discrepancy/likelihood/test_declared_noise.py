@@ -16,7 +16,7 @@ from stiction_ros.discrepancy.likelihood.declared_noise import (
     declared_noise,
     rounded,
 )
-from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms, whiten
+from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, noise_forms
 from stiction_ros.effects import (
     Behaviour,
     ColouredDisturbance,
@@ -25,6 +25,7 @@ from stiction_ros.effects import (
     RandomWalkDisturbance,
 )
 from stiction_ros.loop import LoopModel
+from stiction_ros.signals.autoregression import whiten
 
 QUICK = GapOptions(quick=True)
 
@@ -118,6 +119,7 @@ def test_the_noise_of_a_healthy_loop_agrees(model: LoopModel) -> None:
     assert found.noise[0].found == pytest.approx(found.noise[0].declared, rel=0.1)
 
 
+@pytest.mark.trial
 def test_slow_noise_is_named_although_an_autoregression_describes_it() -> None:
     found = answer(loop(0.1), "disturbance:PV1", ColouredDisturbance(1.0, 25.0))
     names = {(e.place, e.effect) for e in found.effects} | set(found.alternatives)
@@ -141,6 +143,7 @@ def test_a_model_that_declares_no_noise_is_not_contradicted() -> None:
     assert not any(noise.disagrees for noise in found.noise)
 
 
+@pytest.mark.trial
 def test_noise_that_passes_the_lag_is_no_second_effect() -> None:
     model = with_equation_noise()
     found = answer(model, "process:PV1", ExtraPole(8.0))

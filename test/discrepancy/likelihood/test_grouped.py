@@ -36,6 +36,7 @@ def test_nothing_is_gained_inside_a_step(share: float) -> None:
     assert minus_two_log(inside, 1.0) < 0.2 * minus_two_log(inside + 0.5 * np.sign(inside), 1.0)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_rounding_makes_no_friction(seed: int) -> None:
     model = loop(0.05)

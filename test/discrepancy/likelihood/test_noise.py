@@ -4,17 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from stiction_ros.discrepancy.likelihood.noise import (
-    Blocks,
-    autoregression,
-    coloured,
-    fit_noise,
-    whiten,
-)
+from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.effects import FloatArray
+from stiction_ros.signals.autoregression import coloured
 
 COUNT = 1500
 
@@ -29,26 +22,9 @@ def drawn(seed: int, ar: FloatArray) -> FloatArray:
     return coloured(np.random.default_rng(seed).standard_normal(COUNT), ar)
 
 
-@given(st.lists(st.floats(-0.9, 0.9), min_size=0, max_size=4), st.integers(0, 100))
-@settings(max_examples=20, deadline=None)
-def test_whitening_undoes_colouring(ar: list[float], seed: int) -> None:
-    noise = np.random.default_rng(seed).standard_normal((50, 2))
-    shaped = coloured(noise, np.array(ar))
-    rounding = max(1e-6, 1e-14 * float(np.abs(shaped).max()))  # some of these grow without end
-    assert whiten(shaped, np.array(ar)) == pytest.approx(noise, rel=1e-6, abs=rounding)
-
-
-def test_coloured_noise_remembers() -> None:
-    assert coloured(np.eye(4)[0], np.array([0.5, 0.25])) == pytest.approx([1.0, 0.5, 0.5, 0.375])
-
-
 def test_the_noise_of_first_order_is_found() -> None:
     fit = fit_noise(drawn(1, np.array([0.9])), np.zeros((COUNT, 0)), blocks())
     assert fit.ar[0] == pytest.approx(0.9, abs=0.05)
-
-
-def test_white_noise_needs_no_memory() -> None:
-    assert len(autoregression(drawn(2, np.zeros(0)), blocks().train)) == 0
 
 
 def test_a_step_under_coloured_noise_is_sized() -> None:

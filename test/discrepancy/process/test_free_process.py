@@ -97,6 +97,7 @@ def test_a_sound_loop_lacks_nothing() -> None:
     assert answer.effects == ()
 
 
+@pytest.mark.trial
 def test_a_curve_may_be_the_process_s() -> None:
     answer = found(recorded(Characteristic(4.0), samples=900))
     assert (answer.verdict, answer.effects) == (GapVerdict.AMBIGUOUS, ())

@@ -34,7 +34,7 @@ def noise_free(model: LoopModel) -> LoopModel:
 def moved(model: LoopModel, samples: int = 300) -> Record:
     op = random_binary(np.random.default_rng(5), samples, len(model.valves))
     op[:20] = 50.0  # at rest, as the free run takes every valve to be
-    return simulate_open_loop(model, op, 0)
+    return simulate_open_loop(model, op, 0).record
 
 
 def left(model: LoopModel, recorded: Record) -> float:

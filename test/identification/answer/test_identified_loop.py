@@ -110,6 +110,7 @@ def test_without_its_friction_it_comes_to_rest(loop: LoopModel, record: Record) 
     assert calm.op[200:].std() < 0.3 * record.op.std()
 
 
+@pytest.mark.trial
 def test_the_record_shows_no_gap_to_it(loop: LoopModel, record: Record) -> None:
     assert find_gap(loop, [record]).effects == ()
     without = find_gap(loop.with_ideal_valves(), [record])

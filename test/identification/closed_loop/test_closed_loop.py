@@ -11,8 +11,8 @@ from stiction_ros.identification.closed_loop.closed_loop import (
     LoopStatus,
     close_loop,
 )
-from stiction_ros.identification.closed_loop.damping import LinearController, ringing
-from stiction_ros.identification.closed_loop.loop_run import Process
+from stiction_ros.identification.closed_loop.damping import ringing
+from stiction_ros.loop.linear_loops import Process
 
 STICKY = Kind(friction=(3.0, 1.0))
 
@@ -95,7 +95,7 @@ def test_what_turns_at_each_sample_has_a_period_of_two() -> None:
         Process(np.array([[-0.2]]), np.array([[[1.0]]]), np.zeros((1, 1), np.int64), np.zeros(1)),
         0,
         0,
-        LinearController(np.array([0.8, 0.3, 0.0]), 0, 0.0),
+        np.array([0.8, 0.3, 0.0]),
     )
     assert found[0].period == pytest.approx(2.0)
     assert 0.3 < found[0].growth < 1.0

@@ -15,9 +15,9 @@ from stiction_ros.identification.closed_loop.closed_loop import (
 )
 from stiction_ros.identification.closed_loop.explanation import cause as cause_of
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.closed_loop.outside_line import NO_LINE
 from stiction_ros.identification.result.cause import Cause, CauseKind
 from stiction_ros.identification.result.identification import Identification, VerdictKind
+from stiction_ros.signals.outside_line import NO_LINE
 
 
 def wave(shape: str, period: float, samples: int = 900) -> np.ndarray:

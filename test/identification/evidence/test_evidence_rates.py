@@ -106,6 +106,7 @@ def test_a_rate_that_does_not_see_the_end_of_a_response_needs_coarser_ones_that_
     assert not agreement((ending(first, 1.0),), 0).alike
 
 
+@pytest.mark.trial
 def test_a_slow_process_without_friction_is_not_called_sticky() -> None:
     """Its response of 100 samples outlasts the taps of three rates."""
     answer = identify(slow_loop())
@@ -139,6 +140,7 @@ def test_a_short_record_has_one_look_and_its_word_counts(seen: tuple[Look, ...])
     assert found.gain == short[0].accepted[0].gain - PRICE
 
 
+@pytest.mark.trial
 def test_what_a_valve_gains_is_told_beside_the_friction_of_the_others() -> None:
     one, two = pi_loop(3.0, 1.0, seed=3), pi_loop(0.0, 0.0, seed=4)
     both = dataclasses.replace(

@@ -73,6 +73,7 @@ def test_lines_that_the_rows_are_too_slow_for_are_left_out() -> None:
     assert lines == ((0.05, 0.09),)
 
 
+@pytest.mark.trial
 def test_friction_gains_little_beside_the_wave_that_it_stood_for() -> None:
     """A healthy valve and a square load, of a simulator that shares nothing with the search."""
     record = longest_part([field_loop(66).record])

@@ -55,6 +55,7 @@ def test_each_valve_of_a_problem_has_its_own_law() -> None:
         assert np.array_equal(*stems) is same
 
 
+@pytest.mark.trial
 def test_he_is_kept_where_no_other_law_is_better_by_more_than_chance() -> None:
     record = pi_loop(3.0, 1.0)
     own, he = (identify(record, IdentificationOptions(law=law)) for law in ("auto", "he"))
@@ -72,6 +73,6 @@ def test_a_law_that_is_given_is_kept() -> None:
 
 
 def test_the_other_methods_keep_he_s_law() -> None:
-    options = IdentificationOptions("exact", output_order=1, delay=(0, 4), one_step_best=False)
+    options = IdentificationOptions("exact", output_order=1, delay=(0, 4))
     assert identify(pi_loop(3.0, 1.0), options).valves[0].law == "he"
     assert PaperOptions.of(options, "grid").law == "he"

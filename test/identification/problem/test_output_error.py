@@ -8,9 +8,9 @@ from scipy.signal import lfilter
 
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification.kernels.output_error import THIN, evaluate, normal_equations
-from stiction_ros.identification.kernels.polynomials import is_stable, stabilised
 from stiction_ros.identification.kernels.row import driven_rows, lag_products
 from stiction_ros.identification.problem.output_error import Orders, fit_output, pose, room_for
+from stiction_ros.signals.polynomials import is_stable, stabilised
 
 A = np.array([1.0, -1.5, 0.6])
 seeds = st.integers(0, 10_000)

@@ -91,6 +91,7 @@ def test_a_baseline_in_bursts_is_worth_less() -> None:
     assert known[1].freedom < 0.3 * known[0].freedom
 
 
+@pytest.mark.trial
 def test_a_healthy_window_exceeds_the_limit_as_seldom_as_asked() -> None:
     """One window of each of 100 records: 5 are 5 %, 12 are three sigma more."""
     above = sum(

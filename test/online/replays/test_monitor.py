@@ -94,6 +94,7 @@ def test_a_bag_that_begins_late_has_no_baseline(bag: Path, tmp_path: Path) -> No
     assert found.monitor.difference == "the bag begins after the baseline"
 
 
+@pytest.mark.trial
 def test_another_figure_is_named(bag: Path, tmp_path: Path) -> None:
     found = replay(copy_bag(bag, tmp_path / "bag", spoilt('"begin": 250', '"begin": 251')))
     assert found.monitor is not None
@@ -103,6 +104,7 @@ def test_another_figure_is_named(bag: Path, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.trial
 def test_what_does_not_come_again_is_named(bag: Path, tmp_path: Path) -> None:
     old, new = str(550 * SECOND), str(551 * SECOND)
     found = replay(copy_bag(bag, tmp_path / "bag", spoilt(old, new)))

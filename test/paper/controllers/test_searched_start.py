@@ -17,6 +17,7 @@ from stiction_ros.paper.controllers.searched_start import SearchedStart
 MODEL = two_valves()
 
 
+@pytest.mark.trial
 def test_it_finds_what_a_fine_grid_finds() -> None:
     """One valve, R = 0: two stems, the first held 1, 2 or 4 samples, on a grid of 0.25 %."""
     model = stable_model(5, 2, 1, 1)

@@ -5,8 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.identification.closed_loop.oscillation import amplitude, dominant_cycle
-from stiction_ros.loop.set_points import holds
 from stiction_ros.records.record import Record
 from stiction_ros.report.run.scoring import (
     PhaseStatus,
@@ -16,6 +14,8 @@ from stiction_ros.report.run.scoring import (
     round_length,
     score,
 )
+from stiction_ros.signals.holds import holds
+from stiction_ros.signals.oscillation import amplitude, dominant_cycle
 
 ROUND = 400
 

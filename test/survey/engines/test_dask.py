@@ -101,6 +101,7 @@ def test_a_lost_worker_loses_no_loop(cluster: Cluster, tmp_path: Path) -> None:
     assert len(once.entries) == 5
 
 
+@pytest.mark.trial
 def test_an_answer_lost_before_it_is_fetched_is_made_once_more(cluster: Cluster) -> None:
     first = cluster.work()
     engine = _engine(cluster, 1)

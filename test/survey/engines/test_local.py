@@ -77,6 +77,7 @@ def test_a_loop_that_kills_its_workers_fails_alone() -> None:
     assert done["4"].reason == "has no column OP"
 
 
+@pytest.mark.trial
 def test_a_loop_that_takes_too_long_is_given_up() -> None:
     tasks = [_bad(_Then(time.sleep, 300.0)), *_tasks(2)]
     begun = time.monotonic()
@@ -86,6 +87,7 @@ def test_a_loop_that_takes_too_long_is_given_up() -> None:
     assert time.monotonic() - begun < 100.0
 
 
+@pytest.mark.trial
 def test_the_time_of_a_loop_begins_when_its_worker_is_ready() -> None:
     slow = dataclasses.replace(OPTIONS, read_by=_Then(time.sleep, 2.5))  # unpickled by the worker
     done = list(LocalEngine(1, longest=1.5).run(_tasks(3), slow))
@@ -103,6 +105,7 @@ def test_where_no_worker_can_start_that_is_said_once() -> None:
     assert engine.processes == ()
 
 
+@pytest.mark.trial
 def test_a_loop_whose_worker_died_may_be_tried_again_and_one_that_was_judged_not() -> None:
     tasks = [*_tasks(1), _bad(_Then(os._exit, 9))]
     again = {done.task.key: done.again for done in LocalEngine(1).run(tasks, OPTIONS)}

@@ -24,6 +24,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("inside", ["", "raise ImportError('a folder of that name')"])
 def test_a_folder_of_the_name_of_the_package_is_not_taken_for_it(
     tmp_path: Path, inside: str

@@ -24,18 +24,21 @@ def judged() -> list[Scored]:
     return [judge(family, seed, False) for family, seed in SUBSET]
 
 
+@pytest.mark.trial
 @pytest.mark.slow
 def test_nothing_of_the_subset_is_named_wrongly(judged: list[Scored]) -> None:
     wrong = {Score.WRONG, Score.ALARM, Score.LOST}
     assert not [(row.family, row.seed, row.said) for row in judged if row.score in wrong]
 
 
+@pytest.mark.trial
 @pytest.mark.slow
 def test_most_of_the_subset_is_right(judged: list[Scored]) -> None:
     good = {Score.RIGHT, Score.QUIET, Score.UNKNOWN}
     assert sum(row.score in good for row in judged) >= 4
 
 
+@pytest.mark.trial
 @pytest.mark.slow
 def test_effects_of_full_size_are_testable(judged: list[Scored]) -> None:
     assert [row.testable for row in judged] == [True, True, True, False, False]

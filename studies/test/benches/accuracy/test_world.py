@@ -22,6 +22,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.trial
 def test_a_finished_log_is_resumed_without_any_work(log: Path, tmp_path: Path) -> None:
     before, out = log.read_text(), tmp_path / "out.json"
     options = ["--first", "9", "--loops", "2", "--log", str(log), "--resume", "--json", str(out)]
@@ -73,6 +74,7 @@ def test_benchmarks_that_cannot_be_run_are_refused(changes: dict[str, object]) -
         WorldBench(**changes)  # type: ignore[arg-type]
 
 
+@pytest.mark.trial
 @pytest.mark.trial
 def test_physics_is_of_this_world_alone(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

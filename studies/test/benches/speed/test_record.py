@@ -28,6 +28,7 @@ def test_both_writers_write_the_same_messages(
         assert read == written
 
 
+@pytest.mark.trial
 def test_the_nodes_are_compared_on_messages_of_which_none_is_lost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -59,7 +59,7 @@ def test_noise_has_the_size_that_was_drawn(noise: str) -> None:
     regime = dataclasses.replace(MOVES, noise=noise)
     sizes = drawn_noise(np.random.default_rng(2), base, regime)
     model = with_noise(base.model, sizes, noise)
-    pv = simulate_open_loop(model, np.full((6000, 1), 50.0), seed=1).pv[500:]
+    pv = simulate_open_loop(model, np.full((6000, 1), 50.0), seed=1).record.pv[500:]
     white, load = float(sizes.white[0]), float(sizes.loads[0])
     wanted = {"measurement": white, "ar1": np.hypot(white, load), "equation": load}[noise]
     assert pv.std() == pytest.approx(wanted, rel=0.25)

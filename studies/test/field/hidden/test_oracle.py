@@ -47,6 +47,7 @@ def test_noise_of_its_true_form_becomes_white_and_of_size_one(noise: Noise) -> N
         assert abs(np.mean(bare[apart:] * bare[:-apart])) < 0.07
 
 
+@pytest.mark.trial
 def test_the_true_form_is_likelier_than_another() -> None:
     noise = Noise(0.3, coloured=0.8, memory=12.0)
     rows = np.ones(ROWS, dtype=np.bool_)

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 from known_loops import DELAY, A, B, Kind, known
 
-from stiction_ros.identification.closed_loop.damping import LinearController, ringing
-from stiction_ros.identification.closed_loop.loop_run import (
+from stiction_ros.identification.closed_loop.damping import ringing
+from stiction_ros.identification.closed_loop.repeated_runs import law_of
+from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.loop.linear_loops import (
     Controllers,
     Process,
     Runs,
     run_loops,
 )
-from stiction_ros.identification.closed_loop.repeated_runs import law_of
+from stiction_ros.loop.repeated_loops import Equations, RecoveredControl, Stems, run_again
 
 PAST = 8
 PROCESS = Process(
@@ -59,6 +61,30 @@ def test_the_kernel_does_what_a_plain_loop_does(
     assert pv[0, :, 0] == pytest.approx(plain.record.pv[:, 0], abs=near)
 
 
+@pytest.mark.parametrize("smoothing", [0.0, 0.5])
+@pytest.mark.parametrize("lag", [0, 2])
+@pytest.mark.parametrize("law", ["he", "xch", "kano"])
+def test_a_loop_under_any_controller_moves_as_in_the_kernel(
+    smoothing: float, lag: int, law: str
+) -> None:
+    friction, tuning = (3.0, 1.0), np.array([[[1.0, 1.0 / 8.0, 0.2]]])
+    ways = controllers(lag)._replace(smoothing=np.array([smoothing]))
+    sp = np.full((1, PAST + 300, 1), 20.0)
+    sp[:, PAST + 5 :] = 26.0
+    code = law_of(known(Kind(friction, law=law), samples=50).found.valves[0])
+    begun = runs(friction, 1.0, 0.0, code)._replace(tuning=tuning)
+    _, pv = run_loops(PROCESS, ways, begun, sp, np.zeros_like(sp), True)
+    outside = np.full((1, 1, PAST + 300), PROCESS.bias[0])
+    equations = Equations(np.array([[A]]), np.array([[[B]]]), PROCESS.delay, outside)
+    op, rest = np.zeros((PAST + 300, 1)), np.full((PAST + 300, 1), 20.0)
+    stems, units = begun.stem.swapaxes(1, 2), (np.zeros(1), np.ones(1))
+    laws = [[find_law(law).from_frictions(*friction)]]
+    valves = Stems(laws, op[:PAST], stems[0, :, 0], units, 1.0)
+    control = RecoveredControl(ways, tuning, sp[0], rest[:PAST])
+    again, _ = run_again(equations, stems, valves, control, (op, rest))
+    assert again == pytest.approx(pv, abs=1e-9)
+
+
 def test_a_run_that_grows_without_end_is_infinite() -> None:
     sp = np.full((1, PAST + 4000, 1), 20.0)
     sp[:, PAST + 5 :] = 21.0
@@ -89,8 +115,7 @@ def test_a_valve_without_a_controller_keeps_its_op() -> None:
 @pytest.mark.parametrize("gain", [2.0, 2.6])
 @pytest.mark.parametrize("lag", [0, 1])
 def test_poles_ring_as_the_simulated_loop_does(gain: float, lag: int) -> None:
-    controller = LinearController(np.array([gain, gain / 10.0, 0.0]), lag, 0.0)
-    found = ringing(PROCESS, 0, 0, controller)[0]
+    found = ringing(PROCESS, 0, 0, np.array([gain, gain / 10.0, 0.0]), lag)[0]
     sp = np.full((1, PAST + 600, 1), 20.0)
     sp[:, PAST + 5 :] = 21.0
     _, pv = run_loops(

@@ -17,7 +17,6 @@ c / K_i, at which OP rests.
 from __future__ import annotations
 
 import dataclasses
-import enum
 import itertools
 from collections.abc import Mapping
 
@@ -25,11 +24,16 @@ import numpy as np
 
 from stiction_ros.compiled import compiled
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.polynomials import recursion
-from stiction_ros.records.parts import stretches
+from stiction_ros.signals.holds import stretches
+from stiction_ros.signals.recovered_controller import (
+    ControllerStatus,
+    LoopSignals,
+    RecoveredController,
+    Stretches,
+)
+from stiction_ros.signals.velocity_form import terms
 
 BoolArray = np.ndarray[tuple[int], np.dtype[np.bool_]]
-Stretches = list[tuple[int, int]]
 
 LEAST_FIT = 0.2
 """R² from which on a controller is believed: rounded and held signals leave no more."""
@@ -63,78 +67,6 @@ CLIPPED_LEVELS = 20
 """Values between its ends that OP must take for a rest at an end to be a limit, not a step."""
 
 
-class ControllerStatus(enum.StrEnum):
-    """Whether a controller was recovered."""
-
-    OK = "ok"
-    NO_MOVES = "no_moves"
-    NO_RELATION = "no_relation"
-
-
-@dataclasses.dataclass(frozen=True)
-class RecoveredController:
-    """A PI(D) controller in velocity form, all times in samples.
-
-    Attributes:
-        status: ok, or why there is none.
-        reason: one sentence; empty when ok.
-        coefficients: (K, K_i, K_d), OP per unit of PV and sample, signed for e = SP − PV,
-            shape (3,).
-        covariance: of the coefficients from a jackknife over blocks, shape (3, 3).
-        lag: samples between PV and the OP that answers it.
-        smoothing: share of the last value in the filter of the error.
-        span: h, samples.
-        r_squared: share of the moves of OP over h samples that is explained.
-        set_point: as recorded or found, shape (N,).
-        limits: where OP was seen to rest while the controller would have gone on; infinite
-            where it was not.
-    """
-
-    status: ControllerStatus
-    reason: str
-    coefficients: FloatArray
-    covariance: FloatArray
-    lag: int
-    smoothing: float
-    span: int
-    r_squared: float
-    set_point: FloatArray
-    limits: tuple[float, float]
-
-    @property
-    def gain(self) -> float:
-        """K, OP per unit of PV."""
-        return float(self.coefficients[0])
-
-    @property
-    def integral_time(self) -> float:
-        """T_i = K / K_i, samples; infinite without reset."""
-        if self.coefficients[1] == 0.0:
-            return float("inf")
-        return float(self.coefficients[0] / self.coefficients[1])
-
-    @property
-    def errors(self) -> FloatArray:
-        """Standard errors of the coefficients, shape (3,)."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-
-
-@dataclasses.dataclass(frozen=True)
-class LoopSignals:
-    """What a controller reads and writes.
-
-    Attributes:
-        op, pv: shape (N,).
-        sp: shape (N,), or None when not recorded.
-        stretches: first sample of each stretch in automatic and the one behind its last.
-    """
-
-    op: FloatArray
-    pv: FloatArray
-    sp: FloatArray | None
-    stretches: Stretches
-
-
 def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
     """Return the controller between PV and OP.
 
@@ -146,12 +78,12 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
     rows = np.concatenate([np.arange(a, b) for a, b in signals.stretches] or [np.empty(0, int)])
     rest = float(pv[rows].mean()) if len(rows) else 0.0
     set_point = np.full(len(pv), rest) if sp is None else sp
-    limits = _limits(op[rows])
+    limits = resting_limits(op[rows])
     free = (op < limits[1]) & (op > limits[0])
     scales = (_spread(op[rows]), _spread(set_point[rows] - pv[rows]))
     if len(rows) < LEAST_ROWS or min(scales) <= 0.0:
         reason = "OP or the error does not move in automatic"
-        return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
+        return RecoveredController(ControllerStatus.NO_MOVES, reason, set_point, limits)
     error = (set_point - pv) / scales[1]
     command = (op - float(op[rows].mean())) / scales[0]
     filtered = {
@@ -167,7 +99,7 @@ def recover(signals: LoopSignals, longest_span: int) -> RecoveredController:
     fits = {span: fit for span, fit in textbook.items() if fit is not None}
     if not fits:
         reason = f"fewer than {LEAST_ROWS} samples in automatic"
-        return _failed(ControllerStatus.NO_MOVES, reason, set_point, limits)
+        return RecoveredController(ControllerStatus.NO_MOVES, reason, set_point, limits)
     top = max(fit.r_squared for fit in fits.values())
     span = next(span for span, fit in fits.items() if fit.r_squared >= top - NEARLY)
     kinds = itertools.product(LAGS, FILTERS, (False, True))
@@ -225,8 +157,7 @@ def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
         if last - start <= h:
             continue
         error = filtered[1 : last - first - form.lag]
-        sums = np.concatenate([[0.0], np.cumsum(error)])
-        columns = [error[h:] - error[:-h], (sums[h:] - sums[:-h])[1:]]
+        columns = [terms(error, h)]
         if form.derivative:
             change = error - filtered[: len(error)]
             columns.append(change[h:] - change[:-h])
@@ -236,8 +167,6 @@ def _columns(data: _Data, form: _Form) -> tuple[FloatArray, FloatArray]:
         kept = free[h:] & free[:-h]
         rows.append(np.column_stack(columns)[kept])
         moves.append((command[h:] - command[:-h])[kept])
-    if not rows:
-        return np.empty((0, 2)), np.empty(0)
     return np.vstack(rows), np.concatenate(moves)
 
 
@@ -360,37 +289,33 @@ def _told(
     return RecoveredController(
         status,
         reason,
+        set_point,
+        limits,
         coefficients,
         covariance,
         form.lag,
         form.smoothing,
         form.span,
         fit.r_squared,
-        set_point,
-        limits,
     )
 
 
-def _failed(
-    status: ControllerStatus, reason: str, set_point: FloatArray, limits: tuple[float, float]
-) -> RecoveredController:
-    return RecoveredController(
-        status, reason, np.zeros(3), np.zeros((3, 3)), 0, 0.0, 1, 0.0, set_point, limits
-    )
-
-
+@compiled
 def smoothed(values: FloatArray, share: float) -> FloatArray:
     """Return ``values``, shape (N,), behind a filter that keeps ``share`` of its last value."""
-    if share == 0.0:
-        return values
-    return recursion(np.array([1.0, -share]), (1.0 - share) * values, values[:1])
+    out = np.empty(len(values))
+    kept = share * values[0]
+    for k in range(len(values)):
+        out[k] = kept + (1.0 - share) * values[k]
+        kept = share * out[k]
+    return out
 
 
 def _spread(values: FloatArray) -> float:
     return float(values.std()) if len(values) else 0.0
 
 
-def _limits(op: FloatArray) -> tuple[float, float]:
+def resting_limits(op: FloatArray) -> tuple[float, float]:
     """Return where OP rests at the ends of its range, infinite where it does not.
 
     A coarse step also lets OP rest at an end: then it takes few values.

@@ -55,6 +55,11 @@ def stabilised(a: FloatArray, radius: float = 0.99) -> FloatArray:
     return pulled_inside(np.ascontiguousarray(a, dtype=float), radius)
 
 
+def largest_root(a: FloatArray) -> float:
+    """Return the modulus of the largest root of A; 0 where it has none."""
+    return float(np.abs(np.roots(a)).max(initial=0.0))
+
+
 def filtered(b: FloatArray, a: FloatArray, values: FloatArray) -> FloatArray:
     """Return ``values``, shape (N,), through B/A from rest; A is monic."""
     length = max(len(a), len(b))

@@ -20,16 +20,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.kernels.step import IntArray
+from stiction_ros.signals.arx import arx_columns
+from stiction_ros.signals.spectral_lines import (
+    DEPENDENT,
+    LEAST_PER_HARMONIC,
+    taken_by_waves,
+    waves_of,
+)
 
 ORDER = 5
 """n, samples of the past: enough to leave white noise of what loops are sampled at."""
 
 HARMONICS = 5
 """H at most: the first three that a square or a triangle wave has; the best number is taken."""
-
-LEAST_PER_HARMONIC = 2.5
-"""Samples that the fastest harmonic has per period at least."""
 
 NEAR = 1.0
 """Line widths 1/N by which the period may differ from the one given, to either side."""
@@ -39,9 +42,6 @@ STEPS = 17
 
 BESIDE = 3
 """Order of the process that is fitted beside a line."""
-
-DEPENDENT = 1e-7
-"""Size of a direction, of scaled columns, below which it is rounding."""
 
 LEAST_ROWS = 40
 """Rows that a fit needs."""
@@ -79,6 +79,11 @@ class Predicted:
     inputs: Sequence[FloatArray]
     delays: Sequence[int]
 
+    def columns(self, order: int, first: int) -> list[FloatArray]:
+        """Return ``order`` samples of each signal for every row from ``first`` on."""
+        delays = [delay - 1 for delay in self.delays]
+        return arx_columns(self.y, self.inputs, delays, (order, order), first)
+
 
 def outside_line(signal: Predicted, period: float) -> OutsideLine:
     """Return the gain by a line at about ``period`` samples."""
@@ -87,18 +92,16 @@ def outside_line(signal: Predicted, period: float) -> OutsideLine:
     rows = np.arange(first, count)
     if len(rows) < LEAST_ROWS + (1 + len(signal.inputs)) * ORDER or harmonics < 1:
         return NO_LINE
-    columns = [signal.y[rows - lag] for lag in range(1, ORDER + 1)]
-    for x, delay in zip(signal.inputs, signal.delays, strict=True):
-        columns += [x[rows - delay - lag] for lag in range(ORDER)]
-    plain = independent(np.column_stack(columns))
-    wanted = signal.y[rows] - signal.y[rows].mean()  # far from zero, rounding would eat it
+    plain = independent(np.column_stack(signal.columns(ORDER, first)))
+    wanted = signal.y[first:] - signal.y[first:].mean()  # far from zero, rounding would eat it
     left = wanted - plain @ (plain.T @ wanted)
     energy = float(left @ left)
     floor = 1e-12 * float(wanted @ wanted)  # what rounding leaves
     frequencies = 1.0 / period + np.linspace(-NEAR, NEAR, STEPS) / count
     frequencies = frequencies[frequencies > 0.0]
-    taken = _taken(2.0 * np.pi * frequencies, rows, harmonics, plain, left)
-    rest = np.maximum(energy - taken, floor)
+    turns = (np.asarray(2.0 * np.pi * one * rows, dtype=np.float64) for one in frequencies)
+    each = np.array([taken_by_waves(angle, harmonics, plain, left) for angle in turns])
+    rest = np.maximum(energy - np.cumsum(each, axis=1)[:, 1::2], floor)
     price = np.log(len(rows)) * (1.0 + 2.0 * np.arange(1, harmonics + 1))
     gains = (len(rows) * np.log(max(energy, floor) / rest) - price).max(axis=1)
     best = max(zip(gains.tolist(), (1.0 / frequencies).tolist(), strict=True))
@@ -117,81 +120,15 @@ def beside(signal: Predicted, period: float) -> tuple[FloatArray, FloatArray]:
         a_1 … a_3 and b_0 … b_2 of each input after its delay, signs as in equation (8a), shape
         (3,) and (inputs, 3).
     """
-    rows = np.arange(BESIDE + max(signal.delays), len(signal.y))
+    first = BESIDE + max(signal.delays)
+    rows = np.arange(first, len(signal.y))
     harmonics = max(1, min(HARMONICS, int(period / LEAST_PER_HARMONIC)))
-    columns = [signal.y[rows - lag] for lag in range(1, BESIDE + 1)]
-    for x, delay in zip(signal.inputs, signal.delays, strict=True):
-        columns += [x[rows - delay - lag] for lag in range(BESIDE)]
-    columns.append(np.ones(len(rows)))
+    columns = [*signal.columns(BESIDE, first), np.ones(len(rows))]
     wave = waves_of(np.asarray(2 * np.pi / period * rows, dtype=np.float64), harmonics)
     table = np.column_stack([*columns, wave])
     scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
     theta = np.linalg.lstsq(table / scale, signal.y[rows], rcond=1e-10)[0] / scale
     return -theta[:BESIDE], theta[BESIDE : BESIDE * (1 + len(signal.inputs))].reshape(-1, BESIDE)
-
-
-def waves_of(angle: FloatArray, harmonics: int) -> FloatArray:
-    """Return sine and cosine of one harmonic after the other, shape (N, 2 H)."""
-    turns = np.cumprod(np.tile(np.exp(1j * angle), (harmonics, 1)), axis=0)
-    return np.stack([turns.imag, turns.real], axis=1).reshape(-1, len(angle)).T
-
-
-def _taken(
-    turns: FloatArray, rows: IntArray, harmonics: int, plain: FloatArray, left: FloatArray
-) -> FloatArray:
-    """Return the energy that the first h harmonics take of what a basis leaves, shape (F, H).
-
-    Args:
-        turns: radians per sample, rising in even steps, shape (F,).
-        rows: consecutive, shape (N,).
-        harmonics: H.
-        plain: orthonormal basis, shape (N, q).
-        left: that it leaves, shape (N,).
-    """
-    by_harmonic = np.empty((len(turns), harmonics, 2, len(rows)))
-    wave = np.exp(1j * turns[0] * rows)
-    step = np.exp(1j * (turns[1] - turns[0]) * rows)
-    for own in by_harmonic:
-        power = wave
-        for h in range(harmonics):
-            own[h] = power.imag, power.real
-            power = power * wave
-        wave = wave * step
-    lines = by_harmonic.reshape(len(turns), 2 * harmonics, len(rows))
-    known, seen = lines @ plain, lines @ left
-    own = _products(turns, rows, harmonics)
-    gram = own - known @ known.transpose(0, 2, 1)
-    taken = np.zeros_like(seen)
-    for k in range(seen.shape[1]):
-        pivot = gram[:, k, k]
-        there = pivot > DEPENDENT * own[:, k, k]
-        over = np.where(there, 1.0, 0.0) / np.where(there, pivot, 1.0)
-        taken[:, k] = over * seen[:, k] ** 2
-        by = over[:, None] * gram[:, k]
-        seen -= by * seen[:, k : k + 1]
-        gram -= by[:, :, None] * gram[:, k, None, :]
-    return np.asarray(np.cumsum(taken, axis=1)[:, 1::2])
-
-
-def _products(turns: FloatArray, rows: IntArray, harmonics: int) -> FloatArray:
-    """Return the inner products of sines and cosines of the harmonics, shape (F, 2 H, 2 H).
-
-    Of two waves it is half the sums of that of their difference and that of their sum, which are
-    geometric.
-    """
-    h = np.arange(1, harmonics + 1)
-    sums = np.full((len(turns), 2 * harmonics + 1), len(rows), dtype=complex)
-    each = np.exp(1j * np.outer(turns, np.arange(1, 2 * harmonics + 1)))
-    sums[:, 1:] = each ** rows[0] * (1.0 - each ** len(rows)) / (1.0 - each)
-    both = sums[:, h[:, None] + h]
-    apart = sums[:, np.abs(h[:, None] - h)]
-    apart = np.where(h[:, None] >= h, apart, apart.conj())
-    found = np.empty((len(turns), harmonics, 2, harmonics, 2))
-    found[:, :, 0, :, 0] = (apart - both).real
-    found[:, :, 1, :, 1] = (apart + both).real
-    found[:, :, 0, :, 1] = (both + apart).imag
-    found[:, :, 1, :, 0] = (both - apart).imag
-    return 0.5 * found.reshape(len(turns), 2 * harmonics, 2 * harmonics)
 
 
 def independent(columns: FloatArray) -> FloatArray:

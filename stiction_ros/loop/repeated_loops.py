@@ -4,7 +4,7 @@ Per sample and run: every PV by its equation and by what the record adds to it,
 
 .. math:: y_k = -\sum_i a_i y_{k-i} + \sum_j \sum_i b_{j,i} \chi^{(j)}_{k-i-d_j} + \epsilon_k
 
-every OP by its controller, and every stem by the law of its valve.
+every OP by its controller, whichever that is, and every stem by its law, whichever that is.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction_ros.effects.behaviour import Behaviour, FloatArray, IntArray
-from stiction_ros.identification.closed_loop.loop_run import Controllers
-from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop
+from stiction_ros.loop.linear_loops import Controllers, command
+from stiction_ros.signals.controller_recovery import smoothed
 
 BEYOND = 1e4
 """Times the size of the record from which on a run is taken as gone."""
@@ -47,17 +47,32 @@ class Equations(NamedTuple):
 class Stems:
     """The valves of R runs, which go on from the recorded OP."""
 
-    def __init__(self, laws: Laws, loop: ScaledLoop, rows: slice, sample_time: float) -> None:
-        """Let every valve, its law in %, follow the recorded OP of ``rows`` from its stem on."""
+    def __init__(
+        self,
+        laws: Laws,
+        op: FloatArray,
+        start: FloatArray,
+        units: tuple[FloatArray, FloatArray],
+        sample_time: float,
+    ) -> None:
+        """Let every valve, its law in %, follow a recorded OP from its stem on.
+
+        Args:
+            laws: of all valves.
+            op: recorded, scaled, shape (H, m).
+            start: stems at its first sample, scaled, shape (m,).
+            units: mean and scale of OP, %, shape (m,) each.
+            sample_time: s.
+        """
         self._laws, self._sample_time, self._count = laws, sample_time, 0
-        self._mean, self._scale = loop.op_mean, loop.op_scale
-        begun = (loop.stem[rows.start] * self._scale + self._mean).tolist()
+        self._mean, self._scale = units
+        begun = (start * self._scale + self._mean).tolist()
         self._memories = [
             [law.rest(at) if law else at for law, at in zip(row, begun, strict=True)]
             for row in laws
         ]
-        for op in loop.op[rows]:
-            self.step(np.repeat(op[None], len(laws), axis=0))
+        for row in op:
+            self.step(np.repeat(row[None], len(laws), axis=0))
 
     def step(self, op: FloatArray) -> FloatArray:
         """Return the stems for the next OP, scaled, shape (R, m) both."""
@@ -72,7 +87,7 @@ class Stems:
 
 
 class RecoveredControl:
-    """The controllers of R runs as recovered, in the velocity form of the closed loop."""
+    """The controllers of R runs as recovered."""
 
     def __init__(
         self, controllers: Controllers, tunings: FloatArray, sp: FloatArray, pv: FloatArray
@@ -85,32 +100,23 @@ class RecoveredControl:
             sp: shape (N, p).
             pv: recorded before the first sample that is run, shape (H, p).
         """
-        self._controllers, self._tunings, self._sp = controllers, tunings, sp
-        self._errors = np.zeros((len(tunings), len(sp), len(controllers.output)))
-        for j, lag in enumerate(controllers.lag.tolist()):
-            for k in range(lag, len(pv)):
-                self._error(k, j, pv[None])
-
-    def _error(self, k: int, j: int, pv: FloatArray) -> None:
-        """Set the filtered error that a controller acts on at sample k."""
-        output, lag, smoothing, _, _ = self._controllers
-        late, share = k - lag[j], smoothing[j] if k > lag[j] else 0.0
-        new = self._sp[late, output[j]] - pv[:, late, output[j]]
-        self._errors[:, k, j] = share * self._errors[:, k - 1, j] + (1.0 - share) * new
+        self._rows = list(zip(*(each.tolist() for each in controllers), strict=True))
+        self._sp = sp
+        self._tunings = np.ascontiguousarray(tunings.transpose(1, 2, 0))
+        self._errors = np.empty((len(controllers.output), 2, len(tunings)))
+        away = sp[: len(pv)] - pv
+        for j, (output, lag, share, _, _) in enumerate(self._rows):
+            past = smoothed(np.ascontiguousarray(away[: len(pv) - lag, output]), share)
+            self._errors[j] = past[:-3:-1, None]
 
     def __call__(self, k: int, pv: FloatArray, op: FloatArray) -> None:
         """Set OP of sample k, see :data:`Control`."""
-        for j, output in enumerate(self._controllers.output):
-            if output < 0:
-                continue
-            self._error(k, j, pv)
-            older, before, error = self._errors[:, k - 2 : k + 1, j].T
-            change = error - before
-            gain, reset, rate = self._tunings[:, j].T
-            moved = op[:, k - 1, j] + gain * change + reset * error
-            moved += rate * (change - before + older)
-            low, high = self._controllers.low[j], self._controllers.high[j]
-            op[:, k, j] = np.minimum(np.maximum(moved, low), high)
+        for j, (output, lag, share, low, high) in enumerate(self._rows):
+            if output >= 0:
+                moved = op[:, k - 1, j].copy()
+                now = self._sp[k - lag, output] - pv[:, k - lag, output]
+                command(moved, self._errors[j], self._tunings[j], now, share, low, high)
+                op[:, k, j] = moved
 
 
 def run_again(

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_loops import Kind, known
 
-from stiction_ros.identification.closed_loop.recovered_controller import (
+from stiction_ros.records.record import Record
+from stiction_ros.signals.controller_recovery import recover
+from stiction_ros.signals.recovered_controller import (
     ControllerStatus,
     LoopSignals,
     RecoveredController,
-    recover,
 )
-from stiction_ros.records.record import Record
 
 STICKY = Kind(friction=(3.0, 1.0), noise=0.05)
 
@@ -97,7 +97,7 @@ def test_standard_errors_hold_the_truth() -> None:
         rough = np.round(record.pv[:, 0] / 0.2) * 0.2
         found = recovered(record, pv=rough)
         reset = found.coefficients[1]
-        inside += abs(reset - 1.0 / 8.0) < 3.0 * found.errors[1] + 0.03 * abs(reset)
+        inside += abs(reset - 1.0 / 8.0) < 3.0 * np.sqrt(found.covariance[1, 1]) + 0.03 * abs(reset)
     assert inside >= 10
 
 

@@ -6,9 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from known_loops import DELAY, Kind, known
 
-from stiction_ros.identification.closed_loop.damping import LinearController, ringing
-from stiction_ros.identification.closed_loop.loop_run import Process
-from stiction_ros.identification.closed_loop.outside_line import (
+from stiction_ros.identification.closed_loop.damping import ringing
+from stiction_ros.loop.linear_loops import Process
+from stiction_ros.signals.outside_line import (
     NO_LINE,
     Predicted,
     beside,
@@ -72,5 +72,5 @@ def test_the_process_beside_a_wave_does_not_ring_with_it() -> None:
     assert a.shape == (3,)
     assert b.shape == (1, 3)
     process = Process(a[None], b[None], np.array([[DELAY]]), np.zeros(1))
-    rings = ringing(process, 0, 0, LinearController(np.array([1.0, 1.0 / 8.0, 0.0]), 0, 0.0))
+    rings = ringing(process, 0, 0, np.array([1.0, 1.0 / 8.0, 0.0]))
     assert all(one.growth < 0.6 for one in rings if 35.0 < one.period < 70.0)

@@ -1,24 +1,23 @@
-r"""Loops of controllers, sticky valves and a linear process, many at once, compiled.
+"""Loops of controllers, sticky valves and a linear process, many at once, compiled.
 
-Per sample and run: every PV by equation (9), every OP by the velocity form of its controller,
-
-.. math:: u_k = u_{k-1} + K \Delta e_k + K_i e_k + K_d (\Delta e_k - \Delta e_{k-1})
-
-with e behind its filter and as many samples late as the controller is, clipped to its limits,
-every stem by the law of its valve. A valve without a controller keeps its OP.
+Per sample and run: every PV by equation (9), every OP by the velocity form of its controller, every
+stem by the law of its valve. A valve without a controller keeps its OP.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from stiction_ros.compiled import compiled
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.effects.grid_kernels import slope_step
+from stiction_ros.signals.recovered_controller import RecoveredController
 
-IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+Pairs = Sequence[tuple[int, RecoveredController]]
+"""Per valve the output of its controller, −1 for none, and the controller."""
 
 BEYOND = 1e6
 """Times the size of a start from which on a run is taken as gone."""
@@ -59,6 +58,14 @@ class Controllers(NamedTuple):
     low: FloatArray
     high: FloatArray
 
+    @classmethod
+    def of(cls, pairs: Pairs) -> Controllers:
+        """Return controllers as they were recovered, each with the output that it reads."""
+        outputs, laws = zip(*pairs, strict=True)
+        low, high = np.array([law.limits for law in laws]).T.copy()
+        smoothing = np.array([law.smoothing for law in laws])
+        return cls(np.array(outputs), np.array([law.lag for law in laws]), smoothing, low, high)
+
 
 class Runs(NamedTuple):
     """What differs from run to run, R runs.
@@ -79,6 +86,43 @@ class Runs(NamedTuple):
     stem: FloatArray
     op: FloatArray
     laws: FloatArray
+
+
+@compiled
+def command(
+    op: FloatArray,
+    error: FloatArray,
+    tuning: FloatArray,
+    now: FloatArray,
+    share: float,
+    low: float,
+    high: float,
+) -> None:
+    r"""Move OP by a sample, by the velocity form of a controller.
+
+    .. math:: u_k = u_{k-1} + K \Delta e_k + K_i e_k + K_d (\Delta e_k - \Delta e_{k-1})
+
+    e is behind its filter, and OP is clipped to its limits.
+
+    Args:
+        op: of the sample before, shape (R,).
+        error: e of the sample before and of that before it, shape (2, R).
+        tuning: (K, K_i, K_d), shape (3, R).
+        now: SP − PV that the controller reads, shape (R,).
+        share: of the last value in the filter of e.
+        low, high: limits of OP.
+    """
+    for run in range(len(op)):
+        before = error[0, run]
+        e = share * before + (1.0 - share) * now[run]
+        change = e - before
+        moved = op[run] + tuning[0, run] * change
+        moved += tuning[1, run] * e
+        moved += tuning[2, run] * (change - before + error[1, run])
+        moved = low if moved < low else moved
+        op[run] = high if moved > high else moved
+        error[1, run] = before
+        error[0, run] = e
 
 
 @compiled
@@ -123,7 +167,7 @@ def run_loops(
     pv_rows = np.full((number, whole - past if pv_too else 0, outputs), np.inf)
     y, stem = np.empty((whole, outputs, LANES)), np.empty((whole, valves, LANES))
     wanted, added = np.empty((whole, outputs, LANES)), np.empty((whole, outputs, LANES))
-    command, error = np.empty((valves, LANES)), np.zeros((valves, 2, LANES))
+    u, error = np.empty((valves, LANES)), np.zeros((valves, 2, LANES))
     friction, tuning = np.empty((valves, 2, LANES)), np.empty((valves, 3, LANES))
     value, bound, memory = np.empty(LANES), np.empty(LANES), np.zeros((valves, 6, LANES))
     ends = np.empty((valves, 2, LANES))
@@ -146,11 +190,11 @@ def run_loops(
                     size = max(size, abs(y[k, i, lane]))
             bound[lane], gone[lane] = BEYOND * size, 0
             for j in range(valves):
-                command[j, lane] = runs.op[run, j]
+                u[j, lane] = runs.op[run, j]
                 at = stem[past - 1, j, lane]
                 way = np.sign(at - stem[past - 2, j, lane])  # it moves on, or rests
                 memory[j, 0, lane], memory[j, 3, lane] = at, at
-                memory[j, 1, lane], memory[j, 2, lane] = command[j, lane], way
+                memory[j, 1, lane], memory[j, 2, lane] = u[j, lane], way
                 memory[j, 4:, lane] = friction[j, 0, lane] if way == 0.0 else -1.0
                 i = controllers.output[j]
                 if i >= 0:
@@ -158,8 +202,8 @@ def run_loops(
                     share = controllers.smoothing[j]
                     e = wanted[late - 2, i, lane] - y[late - 2, i, lane] - added[late - 2, i, lane]
                     for k in range(late - 2, late + 1):
-                        now = wanted[k, i, lane] - y[k, i, lane] - added[k, i, lane]
-                        e = share * e + (1.0 - share) * now
+                        away = wanted[k, i, lane] - y[k, i, lane] - added[k, i, lane]
+                        e = share * e + (1.0 - share) * away
                         error[j, 1, lane] = error[j, 0, lane]
                         error[j, 0, lane] = e
         for k in range(past, whole):
@@ -186,33 +230,26 @@ def run_loops(
                     late, share = k - controllers.lag[j], controllers.smoothing[j]
                     low, high = controllers.low[j], controllers.high[j]
                     for lane in range(LANES):
-                        now = wanted[late, i, lane] - y[late, i, lane] - added[late, i, lane]
-                        before = error[j, 0, lane]
-                        e = share * before + (1.0 - share) * now
-                        change = e - before
-                        moved = command[j, lane] + tuning[j, 0, lane] * change
-                        moved += tuning[j, 1, lane] * e
-                        moved += tuning[j, 2, lane] * (change - before + error[j, 1, lane])
-                        moved = low if moved < low else moved
-                        command[j, lane] = high if moved > high else moved
-                        error[j, 1, lane] = before
-                        error[j, 0, lane] = e
+                        value[lane] = (
+                            wanted[late, i, lane] - y[late, i, lane] - added[late, i, lane]
+                        )
+                    command(u[j], error[j], tuning[j], value, share, low, high)
                 follows, slopes, factor = runs.laws[j, 0], runs.laws[j, 1], runs.laws[j, 2]
                 if slopes:
-                    slope_step(memory[j], command[j], friction[j, 1], ends[j])
+                    slope_step(memory[j], u[j], friction[j, 1], ends[j])
                 for lane in range(LANES):
-                    op[k, j, lane] = command[j, lane]
-                    apart = command[j, lane] - stem[k - 1, j, lane]
+                    op[k, j, lane] = u[j, lane]
+                    apart = u[j, lane] - stem[k - 1, j, lane]
                     still = abs(apart) <= friction[j, 0, lane]
                     slip = -friction[j, 1, lane] if apart > 0.0 else friction[j, 1, lane]
                     if follows:
-                        goes_on = memory[j, 2, lane] * (command[j, lane] - memory[j, 1, lane]) > 0.0
+                        goes_on = memory[j, 2, lane] * (u[j, lane] - memory[j, 1, lane]) > 0.0
                         if not goes_on:
                             memory[j, 2, lane] = 0.0 if still else np.sign(apart)
                         still = still and not goes_on
                         slip = -memory[j, 2, lane] * friction[j, 1, lane]
-                        memory[j, 1, lane] = command[j, lane]
-                    slipped = command[j, lane] + slip
+                        memory[j, 1, lane] = u[j, lane]
+                    slipped = u[j, lane] + slip
                     if factor != 1.0 and friction[j, 0, lane] > 0.0:
                         slipped = stem[k - 1, j, lane] + factor * (apart + slip)
                     stem[k, j, lane] = stem[k - 1, j, lane] if still else slipped

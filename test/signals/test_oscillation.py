@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiction_ros.identification.closed_loop.oscillation import (
+from stiction_ros.signals.oscillation import (
     LEAST_LINE,
     NEEDED_CYCLES,
     REGULAR,

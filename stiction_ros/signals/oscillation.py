@@ -24,8 +24,10 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.signals.spectral_lines import fitted_lines, taken_by_lines
 
 Stretches = Sequence[tuple[int, int]]
 
@@ -164,7 +166,7 @@ def amplitude(error: FloatArray, stretches: Stretches, period: float) -> float |
         count = round(np.floor(room / period + 1e-9) * period)
         if count < period / 2 or count < 4:
             continue
-        fitted = _line(error[last - count : last], period)
+        fitted, _ = fitted_lines(error[last - count : last], period)
         squares += count * float(fitted[1] ** 2 + fitted[2] ** 2)
         weight += count
     return float(np.sqrt(squares / weight)) if weight else None
@@ -208,6 +210,17 @@ def regularity(values: FloatArray) -> tuple[float, float]:
     return mean / (3.0 * max(float(intervals.std(ddof=1)), 1e-3 * mean)), 2.0 * mean
 
 
+def turnings(values: FloatArray, level: float) -> NDArray[np.intp]:
+    """Return the samples that are the first beyond a level on the other side than before, (T,).
+
+    Args:
+        values: shape (N,).
+        level: 0 or more, to either side of 0.
+    """
+    beyond = np.flatnonzero(np.abs(values) > level)
+    return beyond[1:][np.diff(np.signbit(values[beyond]))]
+
+
 def slow_mean(values: FloatArray, width: float) -> FloatArray:
     """Return the running mean of ``values``, shape (N,), over about ``width`` samples.
 
@@ -230,48 +243,23 @@ def _energy(values: FloatArray) -> float:
     return float(((values - values.mean()) ** 2).sum())
 
 
-def _line(values: FloatArray, period: float) -> FloatArray:
-    """Return constant, cosine and sine amplitude of the fit to ``values``."""
-    angle = 2 * np.pi / period * np.arange(len(values))
-    basis = np.column_stack([np.ones(len(values)), np.cos(angle), np.sin(angle)])
-    fitted = np.linalg.lstsq(basis, values, rcond=None)[0]
-    return np.asarray(fitted)
-
-
 def _explained(
-    error: FloatArray, stretches: Stretches, bins: np.ndarray[tuple[int], np.dtype[np.intp]], n: int
+    error: FloatArray, stretches: Stretches, bins: NDArray[np.intp], n: int
 ) -> FloatArray:
     """Return the energy, shape (F, p), that a line at each frequency takes out of the holds.
 
-    The sums of a stretch times sine and cosine come from its Fourier transform over n samples,
-    those of sine and cosine with themselves from geometric series.
-
     Args:
         bins: frequencies times n, shape (F,).
-        n: length of the transform, at least that of every stretch.
+        n: even, at least the length of every stretch.
     """
     taken = np.zeros((len(bins), error.shape[1]))
-    turn: FloatArray = np.asarray(2 * np.pi / n * bins, dtype=np.float64)
     for first, last in stretches:
         count = last - first
-        one, two = _geometric(turn, count), _geometric(2 * turn, count)
-        cc = (count + two.real) / 2 - one.real**2 / count
-        ss = (count - two.real) / 2 - one.imag**2 / count
-        cs = two.imag / 2 - one.real * one.imag / count
-        room = bins * count >= n  # one period at least
+        level, room = np.full((count, 1), count**-0.5), bins * count >= n  # one period at least
         for j in _columns(error):
             values = error[first:last, j] - error[first:last, j].mean()
-            sums = np.fft.rfft(values, n)[bins]
-            c, s = sums.real, -sums.imag
-            energy = (ss * c**2 - 2 * cs * c * s + cc * s**2) / np.maximum(cc * ss - cs**2, 1e-300)
-            taken[room, j] += energy[room]
+            taken[room, j] += taken_by_lines(values, level, n)[bins[room]]
     return taken
-
-
-def _geometric(turn: FloatArray, count: int) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-    """Return Σ exp(i turn k) over k = 0 … count − 1."""
-    half = np.exp(0.5j * turn * (count - 1))
-    return np.asarray(half * np.sin(0.5 * turn * count) / np.sin(0.5 * turn))
 
 
 def _count_swings(
@@ -294,7 +282,6 @@ def _count_swings(
         if last not in by_end:
             continue
         part = smooth[first + round(period / 4) : last] - by_end[last]
-        sides = np.sign(part[np.abs(part) > level])
-        turns = int(np.count_nonzero(np.diff(sides)))
+        turns = len(turnings(part, level))
         halves += turns + 1 if turns else 0
     return halves // 2

@@ -1,0 +1,1 @@
+"""What recorded signals say by themselves: noise, lines, cycles, stretches, the controller."""

@@ -1,0 +1,79 @@
+"""The controller that a record shows: what it is recovered from, and what was found."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+
+Stretches = list[tuple[int, int]]
+
+
+class ControllerStatus(enum.StrEnum):
+    """Whether a controller was recovered."""
+
+    OK = "ok"
+    NO_MOVES = "no_moves"
+    NO_RELATION = "no_relation"
+
+
+@dataclasses.dataclass(frozen=True)
+class RecoveredController:
+    """A PI(D) controller in velocity form, all times in samples.
+
+    Attributes:
+        status: ok, or why there is none.
+        reason: one sentence; empty when ok.
+        set_point: as recorded or found, shape (N,).
+        limits: where OP was seen to rest while the controller would have gone on; infinite
+            where it was not.
+        coefficients: (K, K_i, K_d), OP per unit of PV and sample, signed for e = SP − PV,
+            shape (3,).
+        covariance: of the coefficients from a jackknife over blocks, shape (3, 3).
+        lag: samples between PV and the OP that answers it.
+        smoothing: share of the last value in the filter of the error.
+        span: h, samples.
+        r_squared: share of the moves of OP over h samples that is explained.
+    """
+
+    status: ControllerStatus
+    reason: str
+    set_point: FloatArray
+    limits: tuple[float, float]
+    coefficients: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
+    covariance: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((3, 3)))
+    lag: int = 0
+    smoothing: float = 0.0
+    span: int = 1
+    r_squared: float = 0.0
+
+    @property
+    def gain(self) -> float:
+        """K, OP per unit of PV."""
+        return float(self.coefficients[0])
+
+    @property
+    def integral_time(self) -> float:
+        """T_i = K / K_i, samples; infinite without reset."""
+        if self.coefficients[1] == 0.0:
+            return float("inf")
+        return float(self.coefficients[0] / self.coefficients[1])
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopSignals:
+    """What a controller reads and writes.
+
+    Attributes:
+        op, pv: shape (N,).
+        sp: shape (N,), or None when not recorded.
+        stretches: first sample of each stretch in automatic and the one behind its last.
+    """
+
+    op: FloatArray
+    pv: FloatArray
+    sp: FloatArray | None
+    stretches: Stretches
