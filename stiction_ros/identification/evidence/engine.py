@@ -105,9 +105,7 @@ def concluded(
     found = _identification(record, data, part, options, best)
     closed = close_loop(record, found)
     told = [figures_of(seen, one, j, closed) for j, one in enumerate(agreed)]
-    best = tuple(
-        dataclasses.replace(one, responds=responds(seen, j)) for j, one in enumerate(best)
-    )
+    best = tuple(dataclasses.replace(one, responds=responds(seen, j)) for j, one in enumerate(best))
     judged = tuple(
         _judged(estimate, figures, partial(_stability, seen, one, j, record.sample_time))
         for j, (estimate, figures, one) in enumerate(zip(best, told, agreed, strict=True))

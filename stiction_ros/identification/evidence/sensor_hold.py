@@ -17,7 +17,7 @@ from scipy.linalg import solveh_banded
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.fit_problem import Problem
-from stiction_ros.identification.evidence.whitened import LOAD
+from stiction_ros.signals.autoregression import LOAD
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.records.record import Record
 
