@@ -17,9 +17,9 @@ from scipy.linalg import solveh_banded
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.fit_problem import Problem
-from stiction_ros.signals.autoregression import LOAD
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.records.record import Record
+from stiction_ros.signals.autoregression import LOAD
 
 ROUNDED = 2.0
 """Steps of rounding by which a rounded value may change after it has repeated: one when it crosses
