@@ -60,12 +60,14 @@ class Parts:
         triangle: seeds from a grid at slower rates.
         waves: all once more beside a wave from outside, where one may be there.
         tuning: what the controller tells of the process it was tuned for.
+        holding: rows that a sensor repeats count as not measured.
     """
 
     growing: bool = True
     triangle: bool = True
     waves: bool = True
     tuning: bool = True
+    holding: bool = True
 
 
 ALL = Parts()
