@@ -26,6 +26,7 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
+from stiction_ros.identification.evidence.sensor_hold import hold_notes
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.evidence.verdict import (
     acquits,
@@ -93,7 +94,7 @@ def identify_by_evidence(
     notes = [
         f"friction of {v}: {said}" for v, said in zip(record.valves, told, strict=True) if said
     ]
-    found = dataclasses.replace(found, notes=(*found.notes, *notes))
+    found = dataclasses.replace(found, notes=(*found.notes, *hold_notes(part), *notes))
     return dataclasses.replace(found, seconds=time.perf_counter() - begun)
 
 

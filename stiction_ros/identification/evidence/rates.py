@@ -1,5 +1,7 @@
 """One record looked at at several rates: every one, two, four and eight samples made one.
 
+Where a sensor refreshes PV at regular times only, these are one, two, four and eight refreshes.
+
 Averaging costs a clean record some of its evidence. It brings back friction that the historian has
 hidden: samples that are held or drawn between two reports carry no news, yet as rows of their own
 they tell the noise model that PV is smooth to the last digit. And it takes away what only looks
@@ -39,6 +41,7 @@ from stiction_ros.identification.evidence.search import (
     search,
     search_again,
 )
+from stiction_ros.identification.evidence.sensor_hold import refresh, restored
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.linear.response_prior import FREE
 from stiction_ros.records.record import Record
@@ -181,9 +184,11 @@ def at_all_rates(
     record: Record, options: IdentificationOptions, parts: Parts = ALL
 ) -> list[Problem]:
     """Return a record without gaps at each rate for which enough rows are left, as it is first."""
-    rates = [rate for rate in RATES if rate == 1 or len(record) // rate >= LEAST_ROWS]
+    step, _ = refresh(record)
+    rates = [step * k for k in RATES if k == 1 or len(record) // (step * k) >= LEAST_ROWS]
     told = tunings(record) if parts.tuning else ()
-    return [Problem.of(record, options, rate, told) for rate in rates]
+    measured = restored(record, options) if parts.holding else record
+    return [Problem.of(measured, options, rate, told) for rate in rates]
 
 
 def looks(record: Record, options: IdentificationOptions, parts: Parts = ALL) -> tuple[Look, ...]:
@@ -236,11 +241,17 @@ def _all_heads(problems: Sequence[Problem], found: Sequence[Found]) -> list[Cand
 
 
 def liveliest(record: Record) -> Record:
-    """Return the :data:`PART` samples in which OP moves most; all of a shorter record."""
-    if len(record) <= PART:
-        return record
-    begin = _liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
-    return record.part(begin, begin + PART)
+    """Return the :data:`PART` samples in which OP moves most; all of a shorter record.
+
+    They begin with a refresh of PV, where a sensor refreshes it at regular times.
+    """
+    begin, end = 0, len(record)
+    if len(record) > PART:
+        begin = _liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
+        end = begin + PART
+    part = record.part(begin, end)
+    _, first = refresh(part)
+    return record if (begin, first, end) == (0, 0, len(record)) else part.part(first, end - begin)
 
 
 def _liveliest_begin(op: FloatArray) -> int:

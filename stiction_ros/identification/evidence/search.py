@@ -61,6 +61,7 @@ class Parts:
         waves: all once more beside a wave from outside, where one may be there.
         tuning: what the controller tells of the process it was tuned for.
         polish: closer and closer looks round what seeds have shown.
+        holding: rows that a sensor repeats count as not measured.
     """
 
     growing: bool = True
@@ -68,6 +69,7 @@ class Parts:
     waves: bool = True
     tuning: bool = True
     polish: bool = True
+    holding: bool = True
 
 
 ALL = Parts()

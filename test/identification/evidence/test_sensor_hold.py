@@ -1,0 +1,61 @@
+"""A sensor that repeats its value is not taken for a stem that rests."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from evidence_loops import pi_loop
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
+from stiction_ros.identification.evidence.sensor_hold import held_rows, refresh, restored
+from stiction_ros.records.record import Record
+
+
+def frozen(record: Record, seed: int) -> Record:
+    """Return the record with 10 to 40 samples of PV held at random times."""
+    random, pv = np.random.default_rng(seed), record.pv.copy()
+    for row in random.integers(50, len(pv) - 50, len(pv) // 80):
+        pv[row : row + int(random.integers(10, 41))] = pv[row]
+    return dataclasses.replace(record, pv=pv)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e3))
+def test_rounding_alone_holds_nothing(seed: int, step: float) -> None:
+    walk = np.cumsum(np.random.default_rng(seed).uniform(-0.4, 0.4, 300))
+    assert not held_rows(step * np.round(walk)).any()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 12), st.integers(0, 11))
+def test_a_regular_refresh_is_seen(seed: int, step: int, first: int) -> None:
+    values = np.random.default_rng(seed).standard_normal(40)
+    pv = np.repeat(values, step)[first % step :]
+    record = Record("wireless", 1.0, ("V1",), ("PV1",), np.ones((len(pv), 1)), pv[:, None])
+    assert refresh(record) == (step, (step - first % step) % step)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_what_was_measured_stays(seed: int) -> None:
+    record = frozen(pi_loop(2.0, 1.0, samples=400), seed)
+    held = held_rows(record.pv[:, 0])
+    mended = restored(record, IdentificationOptions())
+    assert held.any()
+    assert np.array_equal(mended.pv[~held], record.pv[~held])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_sensor_that_freezes_makes_no_friction(seed: int) -> None:
+    found = identify(frozen(pi_loop(0.0, 0.0, seed=seed), seed))
+    assert not found.valves[0].verdict.has_friction
+    assert any("PV1 was stale for" in note for note in found.notes)
+
+
+def test_friction_is_found_behind_a_wireless_sensor() -> None:
+    record = pi_loop(3.0, 1.0, samples=3000, noise=0.1)
+    pv = np.repeat(record.pv[::6], 6, axis=0)[: len(record)]
+    valve = identify(dataclasses.replace(record, pv=pv)).valves[0]
+    assert valve.verdict is VerdictKind.STICKY
+    assert valve.static_interval[0] <= 3.0 <= valve.static_interval[1]
