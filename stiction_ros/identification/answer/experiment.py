@@ -70,6 +70,11 @@ def experiment_for(
 def _reason(estimate: ValveEstimate, short: float, least_moves: int, span: float) -> str:
     """Return why nothing was decided; ``short`` is what the evidence for friction lacks."""
     told = estimate.evidence
+    if not estimate.responds:
+        return (
+            f"PV does not answer OP of {estimate.name}: the stem is stuck, the valve is bypassed, "
+            "a tag is the wrong one, or OP moves too little beside the loads on PV."
+        )
     if "delta_bic" not in told:
         return "This method does not weigh friction against none."
     size = f"f_S {estimate.static_friction:.2g} %"

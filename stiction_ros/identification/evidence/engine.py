@@ -26,6 +26,7 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
+from stiction_ros.identification.evidence.response import responds
 from stiction_ros.identification.evidence.sensor_hold import hold_notes
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.evidence.verdict import (
@@ -115,7 +116,10 @@ def answered(
     heard = _Heard(record, data, part, data if part is record else prepare(part, options), options)
     looped = heard.confirmed(seen, heard.without_waves(seen, valves))
     looped = heard.acquitted(seen, looped)
-    judged = tuple(doubted(valve) for valve in looped.valves)
+    judged = tuple(
+        dataclasses.replace(doubted(valve), responds=responds(seen, j, options.confidence))
+        for j, valve in enumerate(looped.valves)
+    )
     surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
     return dataclasses.replace(
         looped,

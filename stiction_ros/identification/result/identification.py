@@ -76,6 +76,7 @@ class ValveEstimate:
         further: the law's parameters behind the first two, by their keys in YAML; empty where
             it has no others or the valve no friction.
         further_intervals: values of each that the record does not reject.
+        responds: whether PV answers this valve at all, as far as the record shows.
         band_interval: values of f_S + f_D that the record does not reject, %; None where a method
             does not look at the sum: see :attr:`sum_interval`.
     """
@@ -98,6 +99,7 @@ class ValveEstimate:
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     further_intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     band_interval: tuple[float, float] | None = None
+    responds: bool = True
 
     @property
     def sum_interval(self) -> tuple[float, float]:
@@ -138,6 +140,7 @@ class ValveEstimate:
             "name": self.name,
             "verdict": self.verdict.value,
             "band_share": self.band_share,
+            "responds": self.responds,
             "stability": None if self.stability is None else self.stability.to_json(),
             "law": self.law,
             "f_s": self.static_friction,
