@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.explanation import explained
+from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.accepted import not_rejected
 from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.echoes import echo
@@ -38,7 +39,7 @@ from stiction_ros.identification.evidence.verdict import (
 )
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.conclusion import Findings, conclude, order_row
+from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import (
     half_gains,
     is_deadband,
@@ -149,7 +150,7 @@ class _Heard:
         model, table = _process(self.small, self.options, valves, self.part)
         if self.part is not self.record:
             valves, model = _over_all(self.record, self.data, valves, model)
-        findings = Findings(model, valves, table, ())
+        findings = Findings(model, valves, table, (), None)
         concluded = conclude(self.record, self.data, findings, 0.0)
         return explained(self.record, dataclasses.replace(concluded, method="evidence"))
 

@@ -60,7 +60,6 @@ class Parts:
         triangle: seeds from a grid at slower rates.
         waves: all once more beside a wave from outside, where one may be there.
         tuning: what the controller tells of the process it was tuned for.
-        polish: closer and closer looks round what seeds have shown.
         holding: rows that a sensor repeats count as not measured.
     """
 
@@ -68,7 +67,6 @@ class Parts:
     triangle: bool = True
     waves: bool = True
     tuning: bool = True
-    polish: bool = True
     holding: bool = True
 
 
@@ -246,9 +244,8 @@ def search_valve(
         looked.look(drifting)
     if looked.met:
         looked.settle(anew=True)
-        if parts.polish:
-            looked.polish()
-            looked.settle()
+        looked.polish()
+        looked.settle()
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 
