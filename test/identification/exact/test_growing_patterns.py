@@ -148,6 +148,7 @@ def test_windows_grow_up_to_the_whole_record() -> None:
     assert all(b <= int(1.2 * a) + 1 for a, b in itertools.pairwise(lengths))
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(("plant", "seed"), [("tank", 54), ("tank", 135), ("linear", 68)])
 def test_a_needle_that_the_grids_step_over_is_found(plant: str, seed: int) -> None:
     example = example2(seed, plant, samples=620)

@@ -55,6 +55,7 @@ def test_every_loop_comes_back_with_its_reason_and_is_drawn_no_faster() -> None:
     assert {d.assessed.entry.reason for d in done} == {"has no column OP"}
 
 
+@pytest.mark.trial
 def test_killed_workers_are_replaced_and_no_loop_is_lost() -> None:
     engine = LocalEngine(2)
     keys, killed = [], 0
