@@ -62,7 +62,7 @@ from stiction_ros.identification.result.identification import (
 from stiction_ros.identification.result.stability import Look as View
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.records.record import Record
-from stiction_ros.signals.autoregression import whitened
+from stiction_ros.signals.autoregression import innovations
 
 Progress = Callable[[float], None]
 
@@ -344,7 +344,7 @@ def _half_gains(look: Look, valve: int) -> tuple[float, float]:
 
 
 def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
-    return whitened(fit.noise, fit.rest, float(fit.rest[0]))[problem.first :]
+    return innovations(fit.noise, fit.rest)[problem.first :]
 
 
 def _free_run(problem: Problem, candidate: Candidate) -> float:

@@ -11,10 +11,9 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.identification_options import IdentificationOptions
@@ -27,7 +26,7 @@ a border of rounding slowly, two when noise carries it over the next."""
 MOST_HELD = 0.95  # of the rows: a sensor that holds more leaves nothing to restore from
 
 
-def held_rows(pv: FloatArray) -> NDArray[np.bool_]:
+def held_rows(pv: FloatArray) -> BoolArray:
     """Return which rows repeat the last value before a jump that rounding cannot make, (N,).
 
     Args:
@@ -103,7 +102,7 @@ def restored(record: Record, options: IdentificationOptions) -> Record:
     return dataclasses.replace(record, pv=pv)
 
 
-def _mean_of(rest: FloatArray, held: NDArray[np.bool_], noise: FloatArray) -> FloatArray:
+def _mean_of(rest: FloatArray, held: BoolArray, noise: FloatArray) -> FloatArray:
     """Return the conditional mean of held rows of noise D(q) w = e, given the others, (H,)."""
     order, rows = len(noise) - 1, np.flatnonzero(held)
     shared = np.correlate(noise, noise, "full")
