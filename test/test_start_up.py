@@ -88,6 +88,7 @@ def test_what_is_wrong_is_told_without_loading_what_computes() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("node", ["recorder", "plant", "player"])
 def test_nodes_load_nothing_that_they_do_not_use(node: str) -> None:
     pytest.importorskip("rclpy", reason="no ROS")

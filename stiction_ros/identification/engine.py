@@ -9,20 +9,16 @@ from functools import partial
 
 import numpy as np
 
+from stiction_ros.effects import HeStiction
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.evidence.candidate import Candidate
-from stiction_ros.identification.evidence.fit_problem import Problem
-from stiction_ros.identification.evidence.further import settled as settled_further
-from stiction_ros.identification.evidence.rates import liveliest
-from stiction_ros.identification.evidence.search import NEAR, SEEDS, Parts, heads, search
-from stiction_ros.identification.exact.further_fit import settled, with_further_estimates
-from stiction_ros.identification.exact.growing_swarm import growing_swarm
-from stiction_ros.identification.exact.long_records import carried_over
-from stiction_ros.identification.exact.polish import polished
+from stiction_ros.identification.exact.further_fit import begun, settled, with_further_estimates
+from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
+from stiction_ros.identification.exact.one_step_best import one_step_best, seen
+from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.certificate import certificates
-from stiction_ros.identification.inference.conclusion import Findings, conclude, order_row
+from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.intervals import friction_intervals
 from stiction_ros.identification.inference.verdict import evidence, is_deadband, judge
 from stiction_ros.identification.problem.models import (
@@ -32,7 +28,6 @@ from stiction_ros.identification.problem.models import (
     linear_model,
     refit,
     settle_delays,
-    stem_of,
 )
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.problem.preparation import prepare, windows
@@ -42,6 +37,7 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
+from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
 from stiction_ros.identification.switching.patterns import has_cells
@@ -72,22 +68,27 @@ def identify_exact(
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    lively = liveliest(record)
-    part = data if lively is record else prepare(lively, options)
-    part, orders, linear, model, table = choose(lively, part, options)
+    part = liveliest_part(data) if has_cells(data.law) else data
+    part, orders, linear, outcome, table = choose(part, options)
     data = dataclasses.replace(data, further=part.further)
+    model = outcome.model
     report(0.4)
-    if lively is not record:
+    if part is not data:
         linear = linear_model(data, orders)
         model = carried_over(data, linear, model, orders)
     report(0.5)
     data, model = settled(data, model, orders)
     model, delays = settle_delays(data, model, orders)
-    valves, final = judged_valves(record, data, model, linear, orders, options)
+    (valves, final), one_step = at_once(
+        lambda: judged_valves(record, data, model, linear, orders, options),
+        lambda: least_one_step(record, data, model, orders, options),
+    )
+    if one_step is not None and (final.friction[:, 0] == 0.0).any():
+        one_step = also_from(one_step, record, data, (model, final), orders)
     valves = with_further_estimates(data, final, orders, valves, options.confidence)
     report(1.0)
-    told = (*ambiguities(record, delays), *certificates(valves))
-    findings = Findings(final, valves, table, told)
+    told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
+    findings = Findings(final, valves, table, told, one_step)
     plain = conclude(record, data, findings, 0.0)
     answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
@@ -135,56 +136,79 @@ def judged_valves(
     return valves, model
 
 
+def least_one_step(
+    record: Record, data: Data, model: Model, orders: Orders, options: IdentificationOptions
+) -> SearchLog | None:
+    """Return the least one-step SE, where it is asked for and the law has it."""
+    if not options.one_step_best or data.law is not HeStiction:
+        return None
+    return one_step_best(record, data, model, orders)
+
+
+def also_from(
+    found: SearchLog, record: Record, data: Data, models: tuple[Model, Model], orders: Orders
+) -> SearchLog:
+    """Return the lesser of the SE found from the first model and that from the second.
+
+    The second has no friction where the first is doubted. Where neither has any, the same
+    would be found again.
+    """
+    if np.array_equal(seen(data, models[0]), seen(data, models[1])):
+        return found
+    again = one_step_best(record, data, models[1], orders)
+    return min(found, again, key=lambda log: log.squared_error)
+
+
 def choose(
-    record: Record, data: Data, options: IdentificationOptions
-) -> tuple[Data, Orders, Model, Model, tuple[OrderRow, ...]]:
+    data: Data, options: IdentificationOptions
+) -> tuple[Data, Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
     """Return data, orders, friction-free model, the one with friction and all orders tried.
 
-    Friction is searched under any smooth process (:mod:`.evidence.search`), which needs neither
-    orders nor delays; these are chosen for the stems that it gives.
+    The data hold the law's further parameters where they begin.
     """
-    problem = Problem.of(record, options)
-    problem = dataclasses.replace(problem, further=settled_further(problem))
-    found = search(problem, Parts(polish=False))  # the exact polish is closer
-    data = dataclasses.replace(data, further=problem.further)
-    near = [one for j in range(len(data.u)) for one in heads(found, j, SEEDS, NEAR)]
-    near = sorted({id(one): one for one in near}.values(), key=lambda one: one.loss)
-    first, *others = [_begun(data, problem, one) for one in near[:SEEDS] or [found.best]]
     orders_list = windows(options)
-    models = together(*(partial(linear_model, data, n, first) for n in orders_list))
+    start = orders_list[len(orders_list) // 2]
+    linear = linear_model(data, start)
+    data = begun(data, linear, start)
+    found = search(data, linear, start)
+    if len(orders_list) == 1:
+        return data, start, linear, found, (order_row(start, found.model),)
+    models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
-    orders, model = min(rivals, key=lambda rival: rival[1].bic)
-    linear = linear_model(data, orders)
-    starts = [dataclasses.replace(other, delays=model.delays) for other in others]
-    models = [model, *together(*(partial(refit, data, one, orders, warm=False) for one in starts))]
-    model = min(linear, polished(data, orders, models), key=lambda one: one.loss)
-    if not has_cells(data.law):
-        model = _grown(data, orders, linear, model)
-    return data, orders, linear, model, tuple(order_row(*rival) for rival in rivals)
+    table = tuple(order_row(*rival) for rival in rivals)
+    orders, best = min(rivals, key=lambda rival: rival[1].bic)
+    if orders != start:
+        linear = linear_model(data, orders)
+        found = search(data, linear, orders, growing=False)
+        best = improve(data, best, orders)
+    better = min(best, found.model, key=lambda candidate: candidate.loss)
+    return data, orders, linear, dataclasses.replace(found, model=better), table
 
 
-def _grown(data: Data, orders: Orders, linear: Model, model: Model) -> Model:
-    """Return the better of a model and those that swarms on growing windows end at."""
-    grown = [growing_swarm(data, linear, orders, j) for j in range(len(data.u))]
-    return min([model, *filter(None, grown)], key=lambda one: one.loss)
+def order_row(orders: Orders, model: Model) -> OrderRow:
+    """Return the criteria of a model by which orders are compared."""
+    parameters = sum(fit.parameters for fit in model.fits)
+    return OrderRow(orders.output, orders.input, model.loss + 2.0 * parameters, model.bic)
 
 
-def _begun(data: Data, problem: Problem, found: Candidate) -> Model:
-    """Return a model, not yet fitted, with the stems of what a search met."""
-    friction, starts = found.friction * problem.span[:, None], found.starts * problem.span
-    stems = [stem_of(data, j, friction[j], float(starts[j])) for j in range(len(starts))]
-    delays = ((data.delay[0],) * len(starts),) * len(data.y)
-    return Model(friction, starts, np.array(stems), delays, ())
-
-
-def ambiguities(record: Record, delays: list[list[tuple[int, ...]]]) -> tuple[str, ...]:
-    """Return sentences on delays that explain the record equally well."""
-    return tuple(
+def ambiguities(
+    record: Record,
+    delays: list[list[tuple[int, ...]]],
+    valves: tuple[tuple[int, int], ...],
+) -> tuple[str, ...]:
+    """Return sentences on what explains the record equally well."""
+    told = [
         f"delays {', '.join(map(str, near))} of {valve} to {output} explain the record equally well"
         for output, row in zip(record.outputs, delays, strict=True)
         for valve, near in zip(record.valves, row, strict=True)
         if len(near) > 1
-    )
+    ]
+    told += [
+        f"friction in {record.valves[other]} explains the record as well as in "
+        f"{record.valves[chosen]}"
+        for chosen, other in valves
+    ]
+    return tuple(told)
 
 
 def linear_rivals(

@@ -1,10 +1,11 @@
 r"""Loops run again under what came from outside, many at once, sample by sample.
 
-Per sample and run: every PV by its equation and by what the record adds to it,
+In each sample of each run, every PV follows from its equation and from the rest ε of the record,
 
 .. math:: y_k = -\sum_i a_i y_{k-i} + \sum_j \sum_i b_{j,i} \chi^{(j)}_{k-i-d_j} + \epsilon_k
 
-every OP by its controller, whichever that is, and every stem by its law, whichever that is.
+Every OP follows from its controller, which may be of any kind. Every stem follows from the law of
+its valve, which may be any law.
 """
 
 from __future__ import annotations

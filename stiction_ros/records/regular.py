@@ -40,6 +40,9 @@ FEWEST_STAMPS = 5
 DIFFERENT = 0.5
 """Share of rows with a stamp that was there already in which OP or PV must differ, for the same."""
 
+BY_CHANCE = 1e-3
+"""Chance with which rows lost at random may pass for stamps with too few digits."""
+
 WHOLE = 1e-3
 """Share of the smallest step by which others are off its multiples in rounded stamps, at most."""
 
@@ -211,6 +214,15 @@ def _evenly(rows: IntArray) -> NDArray[np.bool_]:
     return np.asarray(np.abs(np.diff(rows) - usual) <= 1.0)
 
 
+def _chance_of_even(apart: float) -> float:
+    """Return the chance that a distance of rows lost at random is one row off the usual at most.
+
+    Such distances are geometric.
+    """
+    kept = 1.0 - 1.0 / apart
+    return float(kept ** max(np.ceil(apart - 1.0) - 1.0, 0.0) - kept ** np.floor(apart + 1.0))
+
+
 def _of_late(steps: FloatArray) -> IntArray:
     """Return how many places each step takes, shape (rows - 1,): one for all but holes.
 
@@ -247,6 +259,8 @@ def _of_rounded(given: FloatArray) -> IntArray | None:
     if len(even) < 2 or np.mean(even) < 1.0 - spoiled or np.abs(turns - whole).max() > WHOLE:
         return None
     apart = float(np.diff(long)[even].mean())
+    if _chance_of_even(apart) ** (np.count_nonzero(even) - 1) > BY_CHANCE:
+        return None
     if max(long[0], len(steps) - long[-1]) > 2.0 * apart + 1.0:  # they come in one place only
         return None
     share = 1.0 / apart

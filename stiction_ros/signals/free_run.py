@@ -1,4 +1,4 @@
-r"""Free run of one equation: what its inputs alone make of it.
+r"""Free run of one ARX equation: its output, computed from its inputs alone.
 
 .. math:: y_k = c + \sum_j \sum_{i=1}^{n_b} b_{ji} x^{(j)}_{k-d_j-i} - \sum_{i=1}^{n_a} a_i y_{k-i}
 """

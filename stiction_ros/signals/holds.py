@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 
 
 def stretches(
-    there: NDArray[np.bool_], cuts: Sequence[int] = ()
+    there: BoolArray, cuts: Sequence[int] = ()
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return where stretches of True begin, and the places behind their ends, shape (R,) each.
 

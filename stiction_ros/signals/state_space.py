@@ -1,4 +1,4 @@
-"""Free run of a state space: what its inputs and its start make of it."""
+"""Outputs of a state-space model, computed from its inputs and its initial state."""
 
 from __future__ import annotations
 

@@ -66,6 +66,7 @@ def found(place: str) -> Discrepancy:
     return find_discrepancy(model, [recorded], QUICK)
 
 
+@pytest.mark.trial
 def test_what_closes_the_gap_says_so() -> None:
     model, recorded = with_cause("process:PV1", ProcessGain(1.3))
     (effect,) = find_discrepancy(model, [recorded], QUICK).effects
@@ -106,6 +107,7 @@ def test_a_recorded_stem_says_what_its_valve_does() -> None:
     assert "explains" in look.sentence
 
 
+@pytest.mark.trial
 def test_a_stem_that_follows_points_behind_the_valve() -> None:
     recorded = record(loop().with_effect("process:PV1", ProcessGain(1.3)), stem=True)
     answer = find_discrepancy(loop(), [recorded], QUICK)

@@ -332,6 +332,7 @@ def test_loops_that_grow_without_end_are_told(
     assert "In 1 of them the loop grows without end." in embedding.note
 
 
+@pytest.mark.trial
 def test_nothing_is_said_of_a_controller_that_is_faster_than_the_record_shows(
     record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -401,6 +402,7 @@ def test_a_loop_is_run_again_by_the_law_that_was_identified(law: str) -> None:
         assert type(EmbeddingDesign.of(loop).friction) is type(friction)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("law", ["kano", "choudhury"])
 def test_the_law_of_a_model_is_embedded_where_an_op_can_be_planned(law: str) -> None:
     embedding = gain_of_model(of_law(law), samples=300).option(What.EMBEDDING)

@@ -94,7 +94,7 @@ def test_json_has_the_keys_of_the_contract() -> None:
     assert found["rate"] == {"sample_time": 1.0, "used": 1.0}
     assert found["valves"][0].keys() == {
         *("name", "verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval", "jump"),
-        *("band_interval", "band_share", "stability", "evidence", "experiment"),
+        *("band_interval", "band_share", "stability", "evidence", "experiment", "responds"),
     }
     stability = found["valves"][0]["stability"]
     assert stability["agreed"] == [look["look"] for look in stability["tried"]]
@@ -163,3 +163,23 @@ def test_profile_is_lowest_at_the_estimate() -> None:
 def test_delays_that_cannot_be_told_apart_are_named() -> None:
     notes = identify(loops.example1(1, samples=1200), THIRD_ORDER).notes
     assert any("delays 4, 5 of V1 to PV1" in note for note in notes)
+
+
+def test_friction_that_could_sit_in_either_of_two_valves_is_named() -> None:
+    record = loops.example1(0, samples=900)
+    twins = Record("twins", 1.0, ("V1", "V2"), ("PV1",), np.repeat(record.op, 2, axis=1), record.pv)
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(twins.op.shape)
+    twins = dataclasses.replace(twins, op=twins.op + noise)
+    options = dataclasses.replace(THIRD_ORDER, delay=(5, 5), one_step_best=False)
+    notes = identify(twins, options).notes
+    assert any("friction in V" in note and "as well as in V" in note for note in notes)
+
+
+@pytest.mark.parametrize("with_set_point", [True, False])
+def test_swapped_columns_are_refused(with_set_point: bool) -> None:
+    record = loops.example1(0, samples=900)
+    wrong = dataclasses.replace(
+        record, op=record.pv, pv=record.op, sp=record.sp if with_set_point else None
+    )
+    with pytest.raises(InputError, match="look swapped"):
+        identify(wrong)

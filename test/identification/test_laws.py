@@ -17,7 +17,9 @@ LAWS = [pytest.param("semi_physical", marks=pytest.mark.trial), *MOVING]
 
 
 def options(law: str) -> IdentificationOptions:
-    return IdentificationOptions("exact", output_order=3, input_order=3, law=law)
+    return IdentificationOptions(
+        "exact", output_order=3, input_order=3, law=law, one_step_best=False
+    )
 
 
 class Results(dict[str, tuple[Identification, FloatArray]]):

@@ -419,6 +419,7 @@ def test_the_mode_is_latched(graph: Graph) -> None:
     assert [m.data for m in late] == ["hold"]
 
 
+@pytest.mark.trial
 def test_a_node_says_once_whom_it_waits_for(
     graph: Graph, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

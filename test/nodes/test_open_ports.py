@@ -117,6 +117,7 @@ KNOWN = {
 }
 
 
+@pytest.mark.trial
 def test_nothing_else_of_the_package_can_listen() -> None:
     root = Path(str(stiction_ros.__file__)).parents[1]
     packages = (root / "stiction_ros", root / "studies" / "stiction_studies")

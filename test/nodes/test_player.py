@@ -225,6 +225,7 @@ def test_a_loop_begins_again(graph: Graph) -> None:
     assert stage.node.playback.rounds >= 2
 
 
+@pytest.mark.trial
 def test_a_new_rate_is_taken_while_it_plays(graph: Graph) -> None:
     stage = Stage(graph, {"/pv": JointState}, rate=0.001, topics="/pv")
     (result,) = stage.node.set_parameters([Parameter("rate", value=FAST)])
@@ -232,6 +233,7 @@ def test_a_new_rate_is_taken_while_it_plays(graph: Graph) -> None:
     stage.play({"/pv": 2100})
 
 
+@pytest.mark.trial
 def test_after_a_rest_it_goes_on_where_it_was(graph: Graph, recorded: dict[str, list[Any]]) -> None:
     stage = Stage(graph, {"/pv": JointState}, rate=2000.0, topics="/pv")
     graph.spin_until(lambda: len(stage.seen["/pv"]) > 50, "the first samples")

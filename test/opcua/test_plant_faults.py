@@ -205,6 +205,7 @@ def test_a_server_that_is_slow_by_two_seconds(trial: Trial) -> None:
     trial.judge(refused=1)
 
 
+@pytest.mark.trial
 def test_the_connection_is_cut_and_comes_back(trial: Trial) -> None:
     relay = Relay(trial.plant.port)
     try:

@@ -36,6 +36,7 @@ def test_doors_are_counted_where_another_package_calls(ways: ModuleType) -> None
     assert sys.getprofile() is None
 
 
+@pytest.mark.trial
 def test_three_calls_are_shown_and_every_exception_has_its_reason(
     ways: ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:

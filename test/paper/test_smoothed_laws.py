@@ -67,6 +67,7 @@ def test_kano_is_found_by_its_own_law(method: str) -> None:
     assert found.search.squared_error < other.search.squared_error
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("method", ["nlp", "nlp_printed", "grid"])
 def test_orders_may_differ_by_channel(method: str) -> None:
     record = loops.tank(1, samples=300)

@@ -50,6 +50,7 @@ def restarted(target: Path, bag: Path = LIVE) -> Path:
     return target
 
 
+@pytest.mark.trial
 def test_a_pause_leaves_every_sample_at_its_place(tmp_path: Path, whole: RunLog) -> None:
     run = read_run(paused(tmp_path / "bag", 400.0, 460.0))
     assert (run.swap_sample, len(run.record)) == (whole.swap_sample, len(whole.record))

@@ -12,10 +12,11 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
+from stiction_ros.identification.engine import order_row
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.laws import with_own_laws
-from stiction_ros.identification.evidence.measured_figures import figures_of, responds
+from stiction_ros.identification.evidence.measured_figures import figures_of
 from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
@@ -26,10 +27,12 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
+from stiction_ros.identification.evidence.response import responds
+from stiction_ros.identification.evidence.sensor_hold import hold_notes
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.inference.conclusion import Findings, conclude, order_row
+from stiction_ros.identification.inference.conclusion import Findings, conclude
 from stiction_ros.identification.inference.verdict import half_gains, is_deadband
 from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.judgement.probability import friction_probability, verdict_of
@@ -51,7 +54,7 @@ from stiction_ros.identification.result.identification import (
 from stiction_ros.identification.result.stability import Look as View
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.records.record import Record
-from stiction_ros.signals.autoregression import whitened
+from stiction_ros.signals.autoregression import innovations
 
 Progress = Callable[[float], None]
 
@@ -85,7 +88,7 @@ def identify_by_evidence(
     notes = [
         f"friction of {v}: {said}" for v, said in zip(record.valves, told, strict=True) if said
     ]
-    found = dataclasses.replace(found, notes=(*found.notes, *notes))
+    found = dataclasses.replace(found, notes=(*found.notes, *hold_notes(part), *notes))
     return dataclasses.replace(found, seconds=time.perf_counter() - begun)
 
 
@@ -105,7 +108,10 @@ def concluded(
     found = _identification(record, data, part, options, best)
     closed = close_loop(record, found)
     told = [figures_of(seen, one, j, closed) for j, one in enumerate(agreed)]
-    best = tuple(dataclasses.replace(one, responds=responds(seen, j)) for j, one in enumerate(best))
+    best = tuple(
+        dataclasses.replace(one, responds=responds(seen, j, options.confidence))
+        for j, one in enumerate(best)
+    )
     judged = tuple(
         _judged(estimate, figures, partial(_stability, seen, one, j, record.sample_time))
         for j, (estimate, figures, one) in enumerate(zip(best, told, agreed, strict=True))
@@ -130,7 +136,7 @@ def _identification(
     model, table = _process(small, options, valves, part)
     if part is not record:
         valves, model = _over_all(record, data, valves, model)
-    findings = Findings(model, valves, table, ())
+    findings = Findings(model, valves, table, (), None)
     return dataclasses.replace(conclude(record, data, findings, 0.0), method="evidence")
 
 
@@ -221,7 +227,7 @@ def _half_gains(look: Look, valve: int) -> tuple[float, float]:
 
 
 def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
-    return whitened(fit.noise, fit.rest, float(fit.rest[0]))[problem.first :]
+    return innovations(fit.noise, fit.rest)[problem.first :]
 
 
 def _over_all(

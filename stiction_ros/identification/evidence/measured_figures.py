@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop
-from stiction_ros.identification.evidence.candidate import Candidate
 from stiction_ros.identification.evidence.echoes import echo
-from stiction_ros.identification.evidence.fit_problem import Problem
-from stiction_ros.identification.evidence.output_fit import fit_output
 from stiction_ros.identification.evidence.rates import Agreement, Look
+from stiction_ros.identification.evidence.response import loss_without_response
 from stiction_ros.identification.judgement.figures import Figures
-from stiction_ros.identification.judgement.probability import SURE
 
 ENDLESS = 100.0  # ratio that stands for a movement that grows without end
 FEW = 2.0
@@ -61,28 +57,5 @@ def _off(ratio: float) -> float:
 
 def _gain(look: Look, valve: int) -> float:
     """Return the nats by which friction beats an ideal valve and a PV that does not answer."""
-    unanswered = _unanswered(look.problem, look.found.best, valve) - look.found.best.loss
-    return 0.5 * min(look.accepted[valve].gain, unanswered)
-
-
-def responds(seen: Sequence[Look], valve: int) -> bool:
-    """Return whether PV answers a valve: at some rate more than no answer can be told.
-
-    Either friction gains its price over a PV that does not answer, or an ideal valve is as many
-    times as likely as a verdict asks.
-    """
-    least = -2.0 * math.log(1.0 - SURE)
-    for look in seen:
-        unanswered = _unanswered(look.problem, look.found.best, valve)
-        if unanswered - look.found.best.loss > look.price:
-            return True
-        if unanswered - look.found.without[valve].loss > least:
-            return True
-    return False
-
-
-def _unanswered(problem: Problem, best: Candidate, valve: int) -> float:
-    """Return −2 log likelihood where PV does not answer a valve, the others as they are."""
-    plain = dataclasses.replace(problem, tunings=())
-    others = np.delete(best.stems, valve, axis=0)
-    return sum(fit_output(plain, i, others, (fit,)).loss for i, fit in enumerate(best.fits))
+    silent = loss_without_response(look.problem, look.found.best, valve) - look.found.best.loss
+    return 0.5 * min(look.accepted[valve].gain, silent)

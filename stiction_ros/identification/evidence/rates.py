@@ -1,5 +1,7 @@
 """One record looked at at several rates: every one, two, four and eight samples made one.
 
+Where a sensor refreshes PV at regular times only, these are one, two, four and eight refreshes.
+
 Averaging costs a clean record some of its evidence. It brings back friction that the historian has
 hidden: samples that are held or drawn between two reports carry no news, yet as rows of their own
 they tell the noise model that PV is smooth to the last digit. And it takes away what only looks
@@ -22,7 +24,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.closed_loop.tuning import tunings
 from stiction_ros.identification.evidence.accepted import Accepted, accepted
 from stiction_ros.identification.evidence.candidate import Candidate
@@ -40,11 +41,11 @@ from stiction_ros.identification.evidence.search import (
     search_again,
 )
 from stiction_ros.identification.evidence.sensor_hold import refresh, restored
+from stiction_ros.identification.exact.long_records import PART, liveliest_begin
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.linear.response_prior import FREE
 from stiction_ros.records.record import Record
 
-PART = 6000  # samples that are searched of a longer record
 RATES = (1, 2, 4, 8)
 LEAST_ROWS = 120  # that are left at a rate
 RATE_ROUNDS = 2  # in which rates hand each other what they found
@@ -242,19 +243,11 @@ def liveliest(record: Record) -> Record:
     """
     begin, end = 0, len(record)
     if len(record) > PART:
-        begin = _liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
+        begin = liveliest_begin((record.op / np.ptp(record.op, axis=0)).T)
         end = begin + PART
     part = record.part(begin, end)
-    _step, first = refresh(part)
+    _, first = refresh(part)
     return record if (begin, first, end) == (0, 0, len(record)) else part.part(first, end - begin)
-
-
-def _liveliest_begin(op: FloatArray) -> int:
-    """Return where the ``PART`` samples begin in which OP, scaled, shape (m, N), moves most."""
-    samples = op.shape[1]
-    begins = np.linspace(0, samples - PART, 2 * (samples // PART) + 1).astype(int)
-    moved = [float(op[:, at : at + PART].std(axis=1).sum()) for at in begins]
-    return int(begins[int(np.argmax(moved))])
 
 
 def samples_between_reports(record: Record) -> float:

@@ -61,7 +61,6 @@ class Parts:
         waves: all once more beside a wave from outside, where one may be there.
         tuning: what the controller tells of the process it was tuned for.
         holding: rows that a sensor repeats count as not measured.
-        polish: closer and closer looks round what seeds have shown.
     """
 
     growing: bool = True
@@ -69,7 +68,6 @@ class Parts:
     waves: bool = True
     tuning: bool = True
     holding: bool = True
-    polish: bool = True
 
 
 ALL = Parts()
@@ -246,9 +244,8 @@ def search_valve(
         looked.look(drifting)
     if looked.met:
         looked.settle(anew=True)
-        if parts.polish:
-            looked.polish()
-            looked.settle()
+        looked.polish()
+        looked.settle()
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 

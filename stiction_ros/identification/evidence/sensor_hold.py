@@ -11,10 +11,9 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.identification_options import IdentificationOptions
@@ -27,7 +26,7 @@ a border of rounding slowly, two when noise carries it over the next."""
 MOST_HELD = 0.95  # of the rows: a sensor that holds more leaves nothing to restore from
 
 
-def held_rows(pv: FloatArray) -> NDArray[np.bool_]:
+def held_rows(pv: FloatArray) -> BoolArray:
     """Return which rows repeat the last value before a jump that rounding cannot make, (N,).
 
     Args:
@@ -60,6 +59,23 @@ def refresh(record: Record) -> tuple[int, int]:
     return (step, int(fresh[0]) % step) if step > 1 else (1, 0)
 
 
+def hold_notes(record: Record) -> tuple[str, ...]:
+    """Return a sentence on each output whose sensor holds, or is refreshed at regular times.
+
+    Args:
+        record: without gaps.
+    """
+    step, _ = refresh(record)
+    if step > 1:
+        return (f"PV is refreshed every {step} samples only",)
+    shares = (100.0 * float(held_rows(column).mean()) for column in record.pv.T)
+    return tuple(
+        f"{tag} was stale for {share:.0f} % of the samples, which are taken as not measured"
+        for tag, share in zip(record.outputs, shares, strict=True)
+        if round(share) > 0
+    )
+
+
 def restored(record: Record, options: IdentificationOptions) -> Record:
     """Return a record whose held rows of PV are their conditional mean under ideal valves.
 
@@ -86,7 +102,7 @@ def restored(record: Record, options: IdentificationOptions) -> Record:
     return dataclasses.replace(record, pv=pv)
 
 
-def _mean_of(rest: FloatArray, held: NDArray[np.bool_], noise: FloatArray) -> FloatArray:
+def _mean_of(rest: FloatArray, held: BoolArray, noise: FloatArray) -> FloatArray:
     """Return the conditional mean of held rows of noise D(q) w = e, given the others, (H,)."""
     order, rows = len(noise) - 1, np.flatnonzero(held)
     shared = np.correlate(noise, noise, "full")

@@ -11,9 +11,32 @@ import dataclasses
 
 import numpy as np
 
-from stiction_ros.identification.exact.polish import look_round
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.exact.neighbourhood import REJECTED, refine
+from stiction_ros.identification.exact.search import comb
 from stiction_ros.identification.problem.models import Data, Model, refit, stem_of
 from stiction_ros.identification.problem.output_error import Orders
+
+PART = 6000
+
+
+def liveliest_part(data: Data) -> Data:
+    """Return the ``PART`` samples in which OP moves most; all of a shorter record."""
+    samples = data.u.shape[1]
+    if samples <= PART:
+        return data
+    part = slice(liveliest_begin(data.u / data.u.std(axis=1, keepdims=True)), None)
+    return dataclasses.replace(
+        data, y=data.y[:, part][:, :PART].copy(), u=data.u[:, part][:, :PART].copy()
+    )
+
+
+def liveliest_begin(op: FloatArray) -> int:
+    """Return where the ``PART`` samples begin in which OP, scaled, shape (m, N), moves most."""
+    samples = op.shape[1]
+    begins = np.linspace(0, samples - PART, 2 * (samples // PART) + 1).astype(int)
+    moved = [float(op[:, at : at + PART].std(axis=1).sum()) for at in begins]
+    return int(begins[int(np.argmax(moved))])
 
 
 def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Model:
@@ -24,7 +47,8 @@ def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Mod
         found: the part's model; its friction and delays are taken.
     """
     stems = linear.stems.copy()
-    for j in np.flatnonzero(found.friction[:, 0]).tolist():
+    sticky = [int(j) for j in np.flatnonzero(found.friction[:, 0])]
+    for j in sticky:
         stems[j] = stem_of(data, j, found.friction[j], 0.0)
     model = dataclasses.replace(
         linear,
@@ -34,4 +58,7 @@ def carried_over(data: Data, linear: Model, found: Model, orders: Orders) -> Mod
         delays=found.delays,
     )
     model = refit(data, model, orders, warm=False)
-    return min(linear, look_round(data, model, orders), key=lambda candidate: candidate.loss)
+    for j in sticky:
+        model = comb(data, model, orders, j)
+        model, _ = refine(data, model, orders, j, REJECTED)
+    return min(linear, model, key=lambda candidate: candidate.loss)

@@ -8,6 +8,7 @@ D/A at hand (:mod:`.pattern_search`).
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from stiction_ros.identification.switching.patterns import (
     has_cells,
 )
 from stiction_ros.identification.switching.rectangles import (
+    EDGES,
+    gain_meets,
     overlapping,
     remainders,
 )
@@ -68,6 +71,7 @@ def neighbourhood(
     friction: FloatArray,
     threshold: float,
     most: int,
+    known: Sequence[PatternMap] = (),
     before: PatternMap | None = None,
 ) -> PatternMap:
     """Enumerate round (f_S, f_D), outwards until all patterns at the edge are rejected.
@@ -75,6 +79,8 @@ def neighbourhood(
     Args:
         threshold: excess of the loss over the best from which a pattern is rejected.
         most: largest number of cells.
+        known: closed neighbourhoods of the same beginning; an edge that meets one of them
+            stays where it is.
         before: the closed neighbourhood that holds (f_S, f_D), under another criterion; if its
             beginning is the same, its cells are evaluated again and not listed again.
     """
@@ -94,8 +100,12 @@ def neighbourhood(
     scan, closed = search.evaluate(Cells.joined(cells)), False
     for _ in range(GROWTHS):
         wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
+        met = [
+            any(gain_meets(rectangle, wider, edge, k.rectangle) for k in known) for edge in EDGES
+        ]
+        wider = np.where(met, rectangle, wider)
         if (wider == rectangle).all():
-            closed = True
+            closed = not any(met)
             break
         strips = remainders(wider[None, :], rectangle[None, :])
         more = search.enumerate(begin, strips, most - len(scan.loss))

@@ -50,7 +50,7 @@ INSIDE = 1e-9  # of a range; how far from its edge
 
 
 class PatternSearch:
-    """Evaluates patterns of one valve everything else fixed."""
+    """Evaluates patterns of one valve under one criterion, everything else fixed."""
 
     def __init__(
         self,
@@ -60,19 +60,19 @@ class PatternSearch:
         valve: int,
         ranges: DelayRanges,
         begin: Beginning | None = None,
+        criterion: Criterion = Criterion.INNOVATIONS,
     ) -> None:
         """Build the criterion; with ``begin`` the stem before its first slip is left free."""
         self.data, self.valve = data, valve
         self.u, self.law = data.u[valve], data.law
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.ranges, self.begin = ranges, begin
-        criterion = Criterion.INNOVATIONS
+        self.ranges, self.begin, self.criterion = ranges, begin, criterion
         self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
 
     def scan(self, grid: FloatArray, starts: FloatArray | float) -> ValveScan:
-        """Scan rows (f_S, f_D), shape (G, 2), as :func:`scan_valve` does."""
-        by = [(Criterion.INNOVATIONS, self.scans)]
+        """Scan rows (f_S, f_D), shape (G, 2), by the same criterion, see :func:`scan_valve`."""
+        by = [(self.criterion, self.scans)]
         return scan_stems(self.data, self.valve, grid, starts, by, self.ranges)[0]
 
     def evaluate(self, cells: Cells) -> PatternScan:
@@ -177,7 +177,8 @@ class PatternSearch:
         for i, (scan, energy) in enumerate(zip(self.scans, energies, strict=True)):
             lags = energy.rights.shape[2]
             products[:, i, :, :, :lags], rights[:, i, :, :lags] = energy.products, energy.rights
-            scales[i] = scan.rest_energy, scan.count, energy.delays
+            counted = 0 if self.criterion is Criterion.SQUARED_ERROR else scan.count
+            scales[i] = scan.rest_energy, counted, energy.delays
         levels, second, loss, delays = best_levels(products, rights, scales, ranges)
         return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
 
@@ -201,6 +202,20 @@ class PatternSearch:
             if len(left) and (too_many or (count > FEW and count * whole > 2.0 * most * covered)):
                 return None
         return Cells.joined(met).distinct()
+
+    def some_cells(self, begin: Beginning, rectangles: FloatArray, most: int) -> PatternScan:
+        """Return cells that meet the rectangles, shape (R, 4), each once; all if they are few.
+
+        Args:
+            most: number of cells met, some of them repeatedly, from which on no more are listed.
+        """
+        inside = np.clip(rectangles, 0.0, 2.0 * self.limit)
+        met = [cells_at(self.u, begin, np.empty((0, 2)), self.law)]
+        for cells, _ in self._layers(begin, self._admissible(inside)):
+            met.append(cells)
+            if sum(len(part.bounds) for part in met) >= most:
+                break
+        return self.evaluate(Cells.joined(met).distinct())
 
     def _layers(
         self, begin: Beginning, rectangles: FloatArray

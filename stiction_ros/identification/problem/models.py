@@ -30,11 +30,15 @@ AllDelays = tuple[tuple[int, ...], ...]
 
 
 class Criterion(enum.Enum):
-    """Prefilter of a scan: which error of the current model counts; outputs add n log(SE / n)."""
+    """Prefilter of a scan, which error of the current model counts, and how outputs add up.
+
+    The first three add up n log(SE / n), ``SQUARED_ERROR`` the plain SE of one step, (12a).
+    """
 
     ONE_STEP = enum.auto()
     FREE_RUN = enum.auto()
     INNOVATIONS = enum.auto()
+    SQUARED_ERROR = enum.auto()
 
     @property
     def filtered(self) -> bool:
@@ -43,6 +47,8 @@ class Criterion(enum.Enum):
 
     def loss(self, energy: FloatArray, count: int) -> FloatArray:
         """Return what one output adds to the loss, from its SE over ``count`` samples."""
+        if self is Criterion.SQUARED_ERROR:
+            return energy
         return np.asarray(count * np.log(energy / count))
 
 

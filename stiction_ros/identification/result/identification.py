@@ -58,8 +58,6 @@ class ValveEstimate:
         further: the law's parameters behind the first two, by their keys in YAML; empty where
             it has no others or the valve no friction.
         further_intervals: values of each that the record does not reject.
-        probability: of friction that matters, 0 to 1; None where a method does not tell.
-        figures: what the probability is computed from.
         responds: whether PV answers this valve at all, as far as the record shows.
         band_interval: values of f_S + f_D that the record does not reject, %; None where a method
             does not look at the sum: see :attr:`sum_interval`.
@@ -131,8 +129,8 @@ class ValveEstimate:
             "name": self.name,
             "verdict": self.verdict.value,
             "probability": self.probability,
-            "responds": self.responds,
             "band_share": self.band_share,
+            "responds": self.responds,
             "stability": None if self.stability is None else self.stability.to_json(),
             "law": self.law,
             "f_s": self.static_friction,
@@ -223,6 +221,7 @@ class Identification:
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
         search: what the search tried and its squared error; None where a method keeps none.
+            The default search puts the friction and delays of least one-step SE here.
         orders: all orders that were compared.
         row_samples: samples that are one row where the friction was judged.
 

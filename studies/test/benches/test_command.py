@@ -52,18 +52,21 @@ def rows_of(document: dict[str, Any], start: str) -> list[dict[str, Any]]:
     return [row for row in document["rows"] if row["case"].startswith(start)]
 
 
+@pytest.mark.trial
 def test_the_document_is_the_contract_s(document: dict[str, Any]) -> None:
     assert document.keys() == {"name", "machine", "rows"}
     assert document["name"] == "identification"
     assert all(row.keys() == KEYS for row in document["rows"])
 
 
+@pytest.mark.trial
 def test_every_comparison_has_its_row(document: dict[str, Any]) -> None:
     cases = [row["case"].split(",")[0] for row in document["rows"]]
     wanted = [*["Example 1"] * 4, "N = 400", "N = 800", "m = 1", "m = 2"]
     assert cases == wanted
 
 
+@pytest.mark.trial
 def test_ratio_is_baseline_over_subject(document: dict[str, Any]) -> None:
     for row in document["rows"]:
         assert row["subject_ms"] > 0.0
@@ -71,6 +74,7 @@ def test_ratio_is_baseline_over_subject(document: dict[str, Any]) -> None:
         assert row["p99_ms"] >= row["subject_ms"]
 
 
+@pytest.mark.trial
 def test_both_methods_of_the_paper_meet_the_same_runs(document: dict[str, Any]) -> None:
     nlp, grid, *default = rows_of(document, "Example 1")
     assert nlp["subject_ms"] == grid["subject_ms"]
@@ -78,6 +82,7 @@ def test_both_methods_of_the_paper_meet_the_same_runs(document: dict[str, Any]) 
     assert [row["baseline_ms"] for row in default] == [nlp["baseline_ms"], grid["baseline_ms"]]
 
 
+@pytest.mark.trial
 def test_longer_records_are_measured_against_proportional_growth(
     document: dict[str, Any],
 ) -> None:
@@ -86,15 +91,18 @@ def test_longer_records_are_measured_against_proportional_growth(
     assert long["baseline_ms"] == pytest.approx(2.0 * short["subject_ms"])
 
 
+@pytest.mark.trial
 def test_records_that_were_left_out_are_named(document: dict[str, Any]) -> None:
     assert rows_of(document, "N = ")[-1]["note"].endswith("N = 2000 left out")
 
 
+@pytest.mark.trial
 def test_more_valves_are_measured_against_so_many_times_one(document: dict[str, Any]) -> None:
     one, two = rows_of(document, "m = ")
     assert two["baseline_ms"] == pytest.approx(2.0 * one["subject_ms"])
 
 
+@pytest.mark.trial
 def test_the_paper_s_methods_are_run_in_full_and_tell_their_work(document: dict[str, Any]) -> None:
     nlp, grid, *_ = rows_of(document, "Example 1")
     assert (nlp["baseline"], grid["baseline"]) == (

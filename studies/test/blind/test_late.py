@@ -36,6 +36,7 @@ def test_the_seed_decides_everything() -> None:
     assert one.truth == two.truth
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("seed", range(500, 504))
 def test_before_the_onset_the_loop_is_the_healthy_one(seed: int) -> None:
     late, healthy = late_loop(seed), late_loop(seed, healthy=True)

@@ -22,6 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.trial
 def test_page_figures_and_scores_are_written(folder: Path) -> None:
     names = {path.name for path in (folder / "tank_compare").iterdir()}
     assert names == {"compare.html", "compare.json", "figure6_linear.png", "figure6_linear.svg"}
@@ -43,6 +44,7 @@ def test_a_terminal_of_80_columns_cuts_nothing_off(
     assert out.count("no friction") == tables
 
 
+@pytest.mark.trial
 def test_the_scores_hold_every_controller(folder: Path) -> None:
     document: dict[str, Any] = json.loads((folder / "copy.json").read_text(encoding="utf-8"))
     linear = document["linear"]
@@ -54,6 +56,7 @@ def test_the_scores_hold_every_controller(folder: Path) -> None:
         assert column["mean"]["p99_ms"] >= column["mean"]["median_ms"] > 0.0
 
 
+@pytest.mark.trial
 def test_the_file_in_the_folder_is_the_same(folder: Path) -> None:
     inside = (folder / "tank_compare" / "compare.json").read_text(encoding="utf-8")
     assert inside == (folder / "copy.json").read_text(encoding="utf-8")

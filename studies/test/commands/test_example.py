@@ -67,6 +67,7 @@ def test_many_seeds_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(finding["total"] == 2 for finding in found["findings"])
 
 
+@pytest.mark.trial
 def test_one_seed_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["example", "healthy", "--seed", "3", "--na", "1", "--nb", "1"]) == 0
     said = capsys.readouterr().out

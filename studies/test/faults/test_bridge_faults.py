@@ -166,6 +166,7 @@ def _cases() -> list[str]:
     return [fault.name for fault in FAULTS] if whole else ["mode-taken-back-in-mid-move"]
 
 
+@pytest.mark.trial
 @pytest.mark.alone
 @pytest.mark.parametrize("name", _cases())
 def test_a_case_passes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

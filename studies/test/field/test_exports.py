@@ -30,6 +30,7 @@ def truth(plant: Path) -> list[dict[str, object]]:
     return found
 
 
+@pytest.mark.trial
 def test_the_truth_stands_beside_and_names_every_loop_once(plant: Path) -> None:
     told = truth(plant)
     assert len({loop["name"] for loop in told}) == LOOPS
@@ -39,6 +40,7 @@ def test_the_truth_stands_beside_and_names_every_loop_once(plant: Path) -> None:
     assert not list(plant.rglob("*truth*"))
 
 
+@pytest.mark.trial
 def test_no_loop_is_lost_and_those_read_are_the_recorded_ones(plant: Path) -> None:
     found = {loop.name: loop for loop in loops([plant], IntakeOptions())}
     told = truth(plant)

@@ -104,6 +104,7 @@ def test_a_curve_may_be_the_process_s() -> None:
     assert {("valve:V1", "characteristic"), ("process:PV1", "gain")} <= set(answer.alternatives)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(("share", "told"), [(1.0, True), (0.2, False)])
 def test_a_recorded_stem_tells_whose_the_curve_is(share: float, told: bool) -> None:
     data = record(loop().with_effect("valve:V1", Characteristic(4.0)), samples=700, stem=True)
@@ -113,6 +114,7 @@ def test_a_recorded_stem_tells_whose_the_curve_is(share: float, told: bool) -> N
     assert ("characteristic" in {effect.effect for effect in answer.effects}) == told
 
 
+@pytest.mark.trial
 def test_several_records_are_fitted_together() -> None:
     effect = HeStiction(4.0, 1.5)
     answer = found(recorded(effect, 1, 450), recorded(effect, 2, 450))

@@ -28,6 +28,7 @@ def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:
     assert sum(output.b["V1"]) / (1.0 + sum(output.a)) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.trial
 def test_the_range_of_delays_plays_no_part_in_what_is_said_of_the_valve() -> None:
     record = pi_loop(3.0, 1.0)
     options = [IdentificationOptions(method="evidence", delay=(0, high)) for high in (5, 20, 40)]

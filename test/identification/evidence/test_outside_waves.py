@@ -83,6 +83,7 @@ def test_friction_gains_little_beside_the_wave_that_it_stood_for() -> None:
     assert all(look.beyond_price(0) < 0.0 for look in seen[:3])
 
 
+@pytest.mark.trial
 def test_friction_is_found_beside_a_wave() -> None:
     record = waved(pi_loop(3.0, 1.0, samples=1200), 0.2)
     seen = looks(record, IdentificationOptions())

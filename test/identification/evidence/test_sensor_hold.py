@@ -48,8 +48,9 @@ def test_what_was_measured_stays(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sensor_that_freezes_makes_no_friction(seed: int) -> None:
-    valve = identify(frozen(pi_loop(0.0, 0.0, seed=seed), seed)).valves[0]
-    assert not valve.verdict.has_friction
+    found = identify(frozen(pi_loop(0.0, 0.0, seed=seed), seed))
+    assert not found.valves[0].verdict.has_friction
+    assert any("PV1 was stale for" in note for note in found.notes)
 
 
 def test_friction_is_found_behind_a_wireless_sensor() -> None:

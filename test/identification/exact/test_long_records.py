@@ -7,30 +7,32 @@ import pytest
 import simulated_loops as loops
 
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
-from stiction_ros.identification.evidence import rates
-from stiction_ros.identification.evidence.rates import liveliest
+from stiction_ros.identification.exact import long_records
+from stiction_ros.identification.exact.long_records import liveliest_part
+from stiction_ros.identification.problem.preparation import prepare
 
 
 def test_short_record_is_taken_whole() -> None:
-    record = loops.example1(0, samples=500)
-    assert liveliest(record) is record
+    data = prepare(loops.example1(0, samples=500), IdentificationOptions())
+    assert liveliest_part(data) is data
 
 
 def test_part_is_where_op_moves_most(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rates, "PART", 300)
+    monkeypatch.setattr(long_records, "PART", 300)
     record = loops.example1(0, samples=1200)
     quiet = record.op.copy()
     quiet[:, 0] *= np.where(np.arange(1200) < 800, 0.01, 1.0)
-    part = liveliest(dataclasses.replace(record, op=quiet))
-    assert part.op.shape == (300, 1)
-    begin = int(np.argmin([np.abs(quiet[i : i + 300] - part.op).max() for i in range(901)]))
+    data = prepare(dataclasses.replace(record, op=quiet), IdentificationOptions())
+    part = liveliest_part(data)
+    assert part.u.shape == (1, 300)
+    begin = int(np.argmin([np.abs(data.u[0, i : i + 300] - part.u[0]).max() for i in range(901)]))
     assert begin >= 700
-    assert (part.pv == record.pv[begin : begin + 300]).all()
+    assert (part.y == data.y[:, begin : begin + 300]).all()
 
 
 def test_conclusion_uses_all_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rates, "PART", 1300)
-    options = IdentificationOptions("exact", output_order=3, input_order=3)
+    monkeypatch.setattr(long_records, "PART", 1300)
+    options = IdentificationOptions(output_order=3, input_order=3, one_step_best=False)
     record = loops.example1(1, "equation")
     found = identify(record, options)
     valve = found.valves[0]

@@ -9,9 +9,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.identification import IdentificationOptions
+from stiction_ros.identification.exact.growing_patterns import first_slips
 from stiction_ros.identification.exact.neighbourhood import neighbourhood, refine
 from stiction_ros.identification.exact.pattern_search import PatternSearch, nearby_delays, points_of
 from stiction_ros.identification.problem.models import (
+    Criterion,
     Data,
     Model,
     linear_model,
@@ -60,8 +62,8 @@ def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
     near_truth: tuple[Data, Model, Orders], jump: float, more: float, slip: int
 ) -> None:
     data, model, orders = near_truth
-    begin = beginning_of(data.u[0], float(data.u[0, 0]), 0.1 * (slip + 1))
-    search = PatternSearch(data, model, orders, 0, ((5, 5),), begin)
+    begin = first_slips(data.u[0, :300])[slip]
+    search = PatternSearch(data, model, orders, 0, ((5, 5),), begin, Criterion.ONE_STEP)
     scan = search.evaluate(cells_at(search.u, begin, np.array([[jump, jump + more]])))
     friction, start = search.realised(scan, 0, begin)
     assume(friction[0] > 0.5 * np.ptp(search.u[: begin.first]))  # else it slipped before
@@ -88,8 +90,8 @@ def test_levels_of_a_first_slip_are_those_from_which_it_comes(
 def test_no_friction_beyond_the_limit_is_taken(near_truth: tuple[Data, Model, Orders]) -> None:
     data, model, orders = near_truth
     narrow = dataclasses.replace(data, limit=np.array([4.5]))
-    begin = beginning_of(data.u[0], float(data.u[0, 0]), 0.1)
-    search = PatternSearch(narrow, model, orders, 0, ((5, 5),), begin)
+    begin = first_slips(data.u[0, :300])[0]
+    search = PatternSearch(narrow, model, orders, 0, ((5, 5),), begin, Criterion.ONE_STEP)
     points = np.array([[0.01, 8.9], [0.5, 8.4], [2.0, 6.9], [4.4, 4.5]])
     scan = search.evaluate(cells_at(search.u, begin, points))
     for index in range(len(points)):

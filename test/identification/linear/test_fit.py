@@ -102,6 +102,7 @@ def test_every_kind_gives_gains_fits_and_a_process(kind: LinearKind) -> None:
         assert seen == pytest.approx(found.fit_free_run[i], abs=1.0)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("kind", KINDS)
 def test_loop_model_is_the_process_that_was_found(kind: LinearKind) -> None:
     record, _ = open_loop(2, 0.05)

@@ -80,6 +80,7 @@ def test_offset_and_initial_state_belong_to_the_model() -> None:
     assert run == pytest.approx(record.pv, abs=1e-4)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("criterion", list(OrderCriterion))
 def test_order_is_found(criterion: OrderCriterion) -> None:
     random = np.random.default_rng(11)

@@ -78,6 +78,7 @@ def spoilt(old: str, new: str) -> Change:
     return work
 
 
+@pytest.mark.trial
 def test_everything_that_the_monitor_told_comes_again(bag: Path) -> None:
     found = replay(bag)
     assert found.monitor is not None
@@ -111,6 +112,7 @@ def test_what_does_not_come_again_is_named(bag: Path, tmp_path: Path) -> None:
     assert found.first_difference == "gap of the window that ends at 550 s: recorded, not replayed"
 
 
+@pytest.mark.trial
 def test_the_json_tells_what_was_compared(bag: Path) -> None:
     document = json.loads(json_text(replay(bag).to_json()))
     assert document["monitor"]["looks"] == 12

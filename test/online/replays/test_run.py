@@ -251,6 +251,7 @@ def test_a_bag_without_the_controller_s_configuration_says_so(bag: Path, tmp_pat
     assert "no configuration of a controller: changes of mode are not replayed" in found.notes
 
 
+@pytest.mark.trial
 def test_a_bag_without_diagnostics_takes_its_first_pv_for_the_run_s(
     bag: Path, tmp_path: Path
 ) -> None:

@@ -84,6 +84,7 @@ def _engine(cluster: Cluster, workers: int) -> DaskEngine:
     return found[0]
 
 
+@pytest.mark.trial
 def test_a_lost_worker_loses_no_loop(cluster: Cluster, tmp_path: Path) -> None:
     first, _ = cluster.work(), cluster.work()
     engine = _engine(cluster, 2)

@@ -55,6 +55,7 @@ def test_every_loop_comes_back_with_its_reason_and_is_drawn_no_faster() -> None:
     assert {d.assessed.entry.reason for d in done} == {"has no column OP"}
 
 
+@pytest.mark.trial
 def test_killed_workers_are_replaced_and_no_loop_is_lost() -> None:
     engine = LocalEngine(2)
     keys, killed = [], 0
@@ -69,6 +70,7 @@ def test_killed_workers_are_replaced_and_no_loop_is_lost() -> None:
     assert sorted(keys) == sorted(str(k) for k in range(30))
 
 
+@pytest.mark.trial
 def test_a_loop_that_kills_its_workers_fails_alone() -> None:
     tasks = [_bad(_Then(os._exit, 9)), *_tasks(5)]
     done = {d.task.key: d.assessed.entry for d in LocalEngine(1).run(tasks, OPTIONS)}

@@ -313,7 +313,11 @@ def _answer(example: Example, found: Identification, orders: ArxOrders) -> str:
     error = squared_error(record, friction, delays, orders)
     flat = sorted({delay for line in delays for delay in line})
     told = ", ".join(map(str, flat)) if len(flat) == 1 else str([list(line) for line in delays])
-    return f"{found.method}: {_friction(found)}, delay {told}, SE {error:.6g}"
+    text = f"{found.method}: {_friction(found)}, delay {told}, SE {error:.6g}"
+    if found.method == EXACT and found.search is not None:
+        log = found.search
+        text += f" (lowest SE it met {log.squared_error:.6g} with n_a = {log.output_order})"
+    return text
 
 
 def _friction(found: Identification) -> str:

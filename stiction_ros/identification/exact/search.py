@@ -1,0 +1,386 @@
+"""Search over the valves' friction: grids first, then exact switching patterns.
+
+A valve's friction is found by scanning the triangle with everything else fixed
+(:mod:`stiction_ros.identification.problem.scan`), closer and closer round the best points, and in
+short records on growing windows (:mod:`.growing_patterns`); candidates are judged by the exact fit
+under the noise model (:mod:`stiction_ros.identification.problem.output_error`); the best ends in
+the best switching pattern of its neighbourhood (:mod:`.pattern_search`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.exact.growing_patterns import LONGEST, growing_patterns
+from stiction_ros.identification.exact.growing_swarm import growing_swarm
+from stiction_ros.identification.exact.neighbourhood import REJECTED, SAMPLES
+from stiction_ros.identification.exact.pattern_search import (
+    PatternSearch,
+    best_in_cells,
+    nearby_delays,
+    points_of,
+)
+from stiction_ros.identification.exact.polygon_search import refine_near
+from stiction_ros.identification.friction.grid import (
+    coarse_grid,
+    cross_grid,
+    even_grid,
+    finer_grid,
+)
+from stiction_ros.identification.problem.models import (
+    Criterion,
+    Data,
+    DelayRanges,
+    Model,
+    ValveScan,
+    scan_criteria,
+    scan_valve,
+    with_valve,
+)
+from stiction_ros.identification.problem.output_error import Orders
+from stiction_ros.identification.side_by_side import together
+from stiction_ros.identification.switching.patterns import has_cells
+
+STEPS = 80
+WORK = 24_000_000
+APART = 0.03
+FINEST = 0.004
+COMB = 0.0012
+FIRST_PARENTS = 20
+RIVALS = 2
+PARENTS = 6
+FITTED = 3
+SWEEPS = 5
+EXACT_SEARCH_ROUNDS = 3
+CROSS = 200
+LEAST_GAIN = 0.5
+ALIKE = 0.9
+EQUAL = 10.0
+BEGINNINGS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)  # of the stem, shares of f_S away from OP
+AWAY_STEPS = 30  # of their grids
+FURTHER = 2  # beginnings that are searched further
+
+
+@dataclasses.dataclass(frozen=True)
+class Elsewhere:
+    """One scan of stems that begin away from OP.
+
+    Until a valve first slips its stem is where it was left. When that takes long, the right
+    friction is found only from the right beginning.
+
+    Attributes:
+        starts: stem before the first sample minus first OP, %, shape (G,).
+        scan: of these.
+    """
+
+    starts: FloatArray
+    scan: ValveScan
+
+
+@dataclasses.dataclass(frozen=True)
+class FirstScan:
+    """The whole triangle of one valve under three criteria.
+
+    Attributes:
+        model: the model whose other valves and noise the scans saw.
+        valve: index.
+        scans: by criterion.
+        elsewhere: one-step scans of stems that begin away from OP.
+    """
+
+    model: Model
+    valve: int
+    scans: Mapping[Criterion, ValveScan]
+    elsewhere: tuple[Elsewhere, ...]
+
+    @property
+    def gain(self) -> float:
+        """By how much the best friction beats none, in the criterion where it does most."""
+        one_step = float(self.scans[Criterion.ONE_STEP].loss[0])
+        gains = [float(scan.loss[0] - scan.loss[1:].min()) for scan in self.scans.values()]
+        gains += [one_step - float(other.scan.loss.min()) for other in self.elsewhere]
+        return max(gains)
+
+    @property
+    def better_beginnings(self) -> list[Elsewhere]:
+        """The best scans from elsewhere that beat all that begin at OP."""
+        least = float(self.scans[Criterion.ONE_STEP].loss.min()) - EQUAL
+        better = [other for other in self.elsewhere if other.scan.loss.min() < least]
+        return sorted(better, key=lambda other: float(other.scan.loss.min()))[:FURTHER]
+
+
+def first_scan(data: Data, model: Model, orders: Orders, valve: int) -> FirstScan:
+    """Scan the whole triangle of one valve, its first row without friction."""
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    fine = np.vstack([np.zeros((1, 2)), coarse_grid(limit), even_grid(limit, STEPS)])
+    points = WORK / (data.y.shape[1] * len(BEGINNINGS))
+    away = even_grid(limit, min(AWAY_STEPS, int(np.sqrt(points))))
+    starts = [np.full(len(fine), start), *(start + share * away[:, 0] for share in BEGINNINGS)]
+    grid = np.vstack([fine, *(away for _ in BEGINNINGS)])
+    everywhere = scan_valve(
+        data, model, orders, valve, grid, np.concatenate(starts), Criterion.ONE_STEP
+    )
+    ends = np.cumsum([len(part) for part in starts])
+    elsewhere = tuple(
+        Elsewhere(part, everywhere.part(int(end) - len(part), int(end)))
+        for part, end in zip(starts[1:], ends[1:], strict=True)
+    )
+    coarse = np.vstack([np.zeros((1, 2)), coarse_grid(limit)])
+    filtered = (Criterion.FREE_RUN, Criterion.INNOVATIONS)
+    scans = scan_criteria(data, model, orders, valve, coarse, start, filtered)
+    by_criterion = dict(zip(filtered, scans, strict=True))
+    one_step = {Criterion.ONE_STEP: everywhere.part(0, len(fine))}
+    return FirstScan(model, valve, one_step | by_criterion, elsewhere)
+
+
+def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) -> Model:
+    """Return the best model over the whole triangle of one valve, never worse than before.
+
+    Args:
+        growing: take a short record in piece by piece as well, under He's law.
+    """
+    model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
+    if not has_cells(data.law):
+        grown = growing_swarm(data, model, orders, valve)
+        if grown is not None and grown.loss < model.loss:
+            return grown
+    piece_by_piece: list[Callable[[], Model]] = []
+    if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
+        piece_by_piece = [partial(growing_patterns, data, model, orders, valve)]
+
+    def from_scan(criterion: Criterion) -> Model:
+        scan = first.scans[criterion]
+        count = FIRST_PARENTS if criterion is Criterion.ONE_STEP else PARENTS
+        parents = scan.grid[scan.best(count, data.min_moves, 0.5 * APART * limit)]
+        return descend(data, model, orders, valve, parents, criterion, data.delays, False)
+
+    def from_elsewhere(other: Elsewhere) -> Model:
+        chosen = other.scan.best(FIRST_PARENTS, data.min_moves, 0.5 * APART * limit)
+        if not chosen:
+            return model
+        start = model.start.copy()
+        start[valve] = other.starts[chosen[0]]
+        moved, parents = dataclasses.replace(model, start=start), other.scan.grid[chosen]
+        ranges, criterion = data.delays, Criterion.ONE_STEP
+        return descend(data, moved, orders, valve, parents, criterion, ranges, False)
+
+    rivals = together(
+        *piece_by_piece,
+        *(partial(from_scan, criterion) for criterion in first.scans),
+        lambda: _from_fitted(data, first, orders),
+        *(partial(from_elsewhere, other) for other in first.better_beginnings),
+    )
+    promising = sorted(rivals, key=lambda candidate: candidate.loss)[:RIVALS]
+    closer = together(
+        *(
+            partial(comb, data, rival, orders, valve)
+            for rival in promising
+            if rival.friction[valve, 0] > 0.0
+        )
+    )
+    return min([model, *closer], key=lambda candidate: candidate.loss)
+
+
+def _from_fitted(data: Data, first: FirstScan, orders: Orders) -> Model:
+    """Search round the best points of the one-step scan with the noise of their own fits.
+
+    Near a pattern that is narrow, the noise of a model without it hides it.
+    """
+    model, valve, scan = first.model, first.valve, first.scans[Criterion.ONE_STEP]
+    apart = APART * float(data.limit[valve])
+    start = float(model.start[valve])
+    fitted = [
+        with_valve(data, model, orders, valve, scan.grid[i], start, scan.delays[i], warm=False)
+        for i in scan.best(FITTED, data.min_moves, apart)
+    ]
+    if not fitted:
+        return model
+    best = min(fitted, key=lambda candidate: candidate.loss)
+    parents, ranges = best.friction[valve][None, :], nearby_delays(data, best, valve)
+    return descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
+
+
+def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+    """Improve one valve's friction under the model's own noise until nothing changes."""
+    if model.friction[valve, 0] == 0.0:
+        return model
+    limit = float(data.limit[valve])
+    best, _ = refine_near(data, model, orders, valve, REJECTED)
+    for _ in range(SWEEPS):
+        before, friction = best.loss, best.friction[valve]
+        jumps, reverses = neighbouring_lines(data, best, orders, valve)
+        cross = cross_grid(jumps, reverses, limit, CROSS)
+        grid = np.vstack([coarse_grid(limit), cross])
+        scan = scan_valve(data, best, orders, valve, grid, best.start[valve])
+        chosen = grid[scan.best(PARENTS - 2, data.min_moves, APART * limit)]
+        parents = np.vstack([friction, chosen])
+        ranges = nearby_delays(data, best, valve)
+        best = descend(data, best, orders, valve, parents, Criterion.INNOVATIONS, ranges)
+        if best.loss > before - LEAST_GAIN:
+            break
+        best = comb(data, best, orders, valve)
+        best, _ = refine_near(data, best, orders, valve, REJECTED)
+    return best
+
+
+def neighbouring_lines(
+    data: Data, model: Model, orders: Orders, valve: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return J and S of the model and, where the law has cells, just beyond its cell."""
+    friction = model.friction[valve]
+    (jump, reverse), limit = points_of(friction[None, :])[0], float(data.limit[valve])
+    if not has_cells(data.law):
+        return np.array([jump]), np.array([reverse])
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    _, cells = best_in_cells(search, friction[None, :], float(model.start[valve]))
+    jl, jh, sl, sh = np.clip(cells.bounds[0], 0.0, 2.0 * limit)
+    beyond = [
+        np.clip(0.3 * (high - low), 1e-4 * limit, 3e-3 * limit)
+        for low, high in ((jl, jh), (sl, sh))
+    ]
+    return (
+        np.array([jl - beyond[0], jump, jh + beyond[0]]),
+        np.array([sl - beyond[1], reverse, sh + beyond[1]]),
+    )
+
+
+def descend(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    parents: FloatArray,
+    criterion: Criterion,
+    ranges: DelayRanges,
+    warm: bool = True,
+) -> Model:
+    """Scan finer and finer round several parents (f_S, f_D); return the better model.
+
+    Args:
+        parents: shape (G, 2).
+        ranges: delays scanned, per output.
+        warm: start the exact fit from that of ``model``.
+    """
+    rows, delays = zoom(data, model, orders, valve, parents, criterion, ranges)
+    if not len(rows):
+        return model
+    start = float(model.start[valve])
+    rival = with_valve(data, model, orders, valve, rows[0], start, delays[0], warm=warm)
+    return min(model, rival, key=lambda candidate: candidate.loss)
+
+
+def zoom(
+    data: Data,
+    model: Model,
+    orders: Orders,
+    valve: int,
+    parents: FloatArray,
+    criterion: Criterion,
+    ranges: DelayRanges,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the best rows (f_S, f_D) of ever finer grids round the parents, and delays.
+
+    Returns:
+        Rows, best first, shape (G, 2), G = 0 when the valve moves too seldom in all of them,
+        and delays per output, shape (G, p).
+    """
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    nothing = np.empty((0, 2)), np.empty((0, len(data.y)), dtype=int)
+    if not len(parents):
+        return nothing
+    patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
+    if has_cells(data.law):
+        parents, _ = best_in_cells(patterns, parents, start)
+    step = APART * limit
+    while step > FINEST * limit:
+        step /= 3.0
+        grid = finer_grid(parents, step, limit)
+        scan = patterns.scan(grid, start)
+        chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
+        if not chosen:
+            return nothing
+        parents, delays = grid[chosen], scan.delays[chosen]
+        if has_cells(data.law):
+            parents, cells = best_in_cells(patterns, parents, start)
+            order = np.argsort(cells.loss, kind="stable")
+            parents, delays = parents[order], cells.delays[order]
+    return parents, delays
+
+
+def comb(data: Data, model: Model, orders: Orders, valve: int) -> Model:
+    """Try a dense grid round the model and refine its best points; return the better model.
+
+    With many slips the right switching pattern can be narrower than 0.1 % of the span and
+    its neighbours much worse than a wrong pattern further off.
+    """
+    limit, start = float(data.limit[valve]), float(model.start[valve])
+    search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
+    step = COMB * limit * min(1.0, SAMPLES / data.u.shape[1])
+    grid, half, best = model.friction[valve][None, :], 15, model
+    for _ in range(2):
+        grid = finer_grid(grid, step, limit, half)
+        scan = search.scan(grid, start)
+        chosen = scan.best(PARENTS, data.min_moves, 2.0 * step)
+        grid, half, step = grid[chosen], 3, step / 3.0
+    for index in chosen[:2]:
+        friction, delays = scan.grid[index], scan.delays[index]
+        rival = with_valve(data, model, orders, valve, friction, start, delays)
+        best = min(best, rival, key=lambda candidate: candidate.loss)
+    return best
+
+
+@dataclasses.dataclass(frozen=True)
+class SearchOutcome:
+    """Where a search ended.
+
+    Attributes:
+        model: the best model.
+        rivals: pairs (valve with friction, valve whose friction explains the record as well).
+    """
+
+    model: Model
+    rivals: tuple[tuple[int, int], ...] = ()
+
+
+def search(data: Data, model: Model, orders: Orders, growing: bool = True) -> SearchOutcome:
+    """Coordinate search over all valves: the most promising first, until nothing changes.
+
+    Args:
+        growing: take a short record in piece by piece as well, under He's law
+            (:mod:`.growing_patterns`).
+    """
+    left, rivals = list(range(len(data.u))), []
+    while left:
+        scans = together(*(partial(first_scan, data, model, orders, valve) for valve in left))
+        first = max(scans, key=lambda scan: scan.gain)
+        found = first_search(data, orders, first, growing)
+        model = improve_valve(data, found, orders, first.valve)
+        left.remove(first.valve)
+        for scan in scans:
+            if scan is not first and scan.gain > ALIKE * first.gain > EQUAL:
+                other = first_search(data, orders, scan, growing)
+                other = improve_valve(data, other, orders, scan.valve)
+                if other.loss < model.loss + EQUAL:
+                    rivals.append((first.valve, scan.valve))
+    if np.count_nonzero(model.friction[:, 0]) > 1:
+        model = improve(data, model, orders)
+    return SearchOutcome(model, tuple(rivals))
+
+
+def improve(data: Data, model: Model, orders: Orders) -> Model:
+    """Improve the friction of one sticky valve after the other until nothing changes."""
+    for _ in range(EXACT_SEARCH_ROUNDS):
+        gains = [0.0]
+        for valve in np.flatnonzero(model.friction[:, 0]):
+            better = improve_valve(data, model, orders, int(valve))
+            gains.append(model.loss - better.loss)
+            model = better
+        if max(gains) < LEAST_GAIN:
+            break
+    return model
