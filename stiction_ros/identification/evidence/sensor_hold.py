@@ -29,6 +29,9 @@ MOST_HELD = 0.95  # of the rows: a sensor that holds more leaves nothing to rest
 def held_rows(pv: FloatArray) -> BoolArray:
     """Return which rows repeat the last value before a jump that rounding cannot make, (N,).
 
+    The step of rounding is the least difference of any two values: where values are not rounded it
+    is next to nothing, and all repeats are held, as by a sensor that reports by exception.
+
     Args:
         pv: one output, shape (N,).
     """
@@ -36,7 +39,7 @@ def held_rows(pv: FloatArray) -> BoolArray:
     still = moves <= 1e-9 * max(float(np.ptp(pv)), 1e-300)
     if still.all():
         return np.ones(len(pv), dtype=bool)
-    step = float(moves[~still].min())
+    step = float(np.diff(np.unique(pv)).min())
     ends = np.append(np.flatnonzero(~still), len(moves))  # moves that end a run of repeats
     jumps = np.append(moves[ends[:-1]] > ROUNDED * step * (1.0 + 1e-6), False)
     run = np.searchsorted(ends, np.arange(len(moves)))
