@@ -102,6 +102,7 @@ def test_nodes_load_nothing_that_they_do_not_use(node: str) -> None:
     assert not loaded(code)[1] & HEAVY
 
 
+@pytest.mark.trial
 def test_an_identification_loads_no_slow_part_of_scipy() -> None:
     code = (
         "import sys\n"

@@ -76,6 +76,7 @@ def test_a_node_that_fits_nothing_compiles_nothing() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.trial
 def test_casadi_is_left_alone_by_all_but_the_nonlinear_programme() -> None:
     code = (
         "import sys, stiction_ros.cli.main, stiction_ros.online.estimator.live; "

@@ -25,6 +25,7 @@ def moving() -> Identification:
     return identify(loops.example1(2, samples=700, valve=valve))
 
 
+@pytest.mark.trial
 def test_a_law_that_explains_pv_better_is_named_and_its_figures_are_true(
     moving: Identification,
 ) -> None:
