@@ -36,7 +36,6 @@ def figures_of(seen: Sequence[Look], agreed: Agreement, valve: int, closed: Clos
     beyond = 0.5 * min(agreed.gain, 2.0 * max(gains))
     return Figures(
         gain=beyond if agreed.alike else min(beyond, 0.0),
-        possible=max(material),
         ruled_out=-min(material),
         repeats=0.5 * repeated / (max(gains) + FEW),
         one_step_gain=0.5 * (output.alone.plain - output.after.plain),

@@ -31,18 +31,12 @@ class Figures:
         "two rates of sampling do not both show it",
         1,
     )
-    possible: float = _figure(
-        "nats",
-        "by which the best friction that would matter beats an ideal valve, at the rate most for "
-        "it",
-        "no rate of sampling that shows the process gains much by it",
-        1,
-    )
     ruled_out: float = _figure(
         "nats",
         "by which an ideal valve beats the best friction that would matter, at the rate most "
         "against it",
         "one rate of sampling speaks against it",
+        -1,
     )
     repeats: float = _figure(
         "ratio",

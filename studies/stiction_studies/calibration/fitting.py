@@ -23,7 +23,6 @@ well, and logistic regression on the same figures found half as many at the same
 FEWEST = 12  # loops in a leaf
 SHRUNK = 1.0  # penalty of the squared values of leaves
 FOLDS = 8
-ONLY_CUTS = "ruled_out"  # of the figures: it decides between healthy and undecided alone
 BINS = 10  # of probability, in which it is held against what is true
 
 
@@ -46,7 +45,7 @@ def fitted(rows: Sequence[Judged], without: str | None = None) -> Model:
     """
     from sklearn.ensemble import HistGradientBoostingClassifier  # type: ignore[import-untyped]
 
-    names = [name for name in definitions() if name not in (without, ONLY_CUTS)]
+    names = [name for name in definitions() if name != without]
     features = np.array([[row.figures.to_json()[name] for name in names] for row in rows])
     truth = np.array([row.friction for row in rows])
     worlds = [row.world for row in rows]

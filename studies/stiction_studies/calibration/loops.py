@@ -24,8 +24,8 @@ class KnownLoop:
     friction: bool | None
 
 
-def _plain(seed: int, quiet: bool = False) -> KnownLoop:
-    loop = plain_loop(seed, quiet=quiet)
+def _plain(seed: int, quiet: bool = False, cascade: bool = False) -> KnownLoop:
+    loop = plain_loop(seed, quiet=quiet, cascade=cascade)
     return KnownLoop(loop.record, loop.friction)
 
 
@@ -42,4 +42,5 @@ WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {
     "field": _field,
     "plain": _plain,
     "quiet": functools.partial(_plain, quiet=True),
+    "cascade": functools.partial(_plain, cascade=True),
 }

@@ -19,7 +19,7 @@ from stiction_ros.records.record import Record
 LAWS = ("he", "kano", "choudhury", "mechanics", "deadband")
 SENSORS = ("plain", "stale", "wireless", "exception", "rounded")
 LOADS = ("walk", "coloured", "steps", "sine", "square", "triangle", "drifting_cycle")
-CYCLES = LOADS[3:]
+MASTERS = ("walk", "coloured", "steps", "sine")
 SUBSTEPS = 40  # of the stem's mechanics in a sample
 HUSH, LITTLE = 0.2, 0.1  # of noise and load on a quiet loop: a valve makes a plain limit cycle
 MANY = 6  # slips from which a record shows friction
@@ -59,7 +59,11 @@ class PlainLoop:
 
 
 def plain_loop(
-    seed: int, law: str | None = None, sensor: str | None = None, quiet: bool = False
+    seed: int,
+    law: str | None = None,
+    sensor: str | None = None,
+    quiet: bool = False,
+    cascade: bool = False,
 ) -> PlainLoop:
     """Return the loop of a seed.
 
@@ -68,8 +72,9 @@ def plain_loop(
         law: of the valve, of :data:`LAWS`, ``none`` or ``stuck``; drawn where None.
         sensor: of :data:`SENSORS`; drawn where None.
         quiet: whether little but the valve moves the loop.
+        cascade: whether a master moves SP and the record has no SP.
     """
-    random = np.random.default_rng([seed, 4711, int(quiet)])
+    random = np.random.default_rng([seed, 4711, int(quiet) + 2 * int(cascade)])
     drawn = random.choice(["none", "stuck", *LAWS], p=[0.47, 0.03, 0.14, 0.1, 0.1, 0.1, 0.06])
     law = law or str(drawn)
     kept = str(random.choice(SENSORS, p=[0.5, 0.14, 0.12, 0.12, 0.12]))
@@ -91,19 +96,24 @@ def plain_loop(
     size = LITTLE * size if quiet else size
     noise = _noise(random, count) * abs(gain) * 0.05 * max(band, 1.0)
     noise *= hush * random.uniform(0.2, 1.0)
-    moves = _set_points(random, count, abs(gain) * max(band, 2.0))
+    swing = abs(gain) * max(band, 2.0)
+    if cascade:
+        master = str(random.choice(MASTERS))
+        moves = swing * _log(random, 0.1, 1.0) * _load(random, master, count, 3.0 * (lag + delay))
+    else:
+        moves = _set_points(random, count, swing)
     push = np.zeros(count)
     push[:50] = 2.0 * band  # sets a cycle going
     op, stem, pv = loop.run(size * outside + push, noise, moves, Sensor(sensor, random, gain))
     span = float(np.subtract(*np.percentile(op, [98.0, 2.0])))
     record = Record(
-        name=f"{'quiet' if quiet else 'plain'}{seed:05d}",
+        name=f"{'quiet' if quiet else 'cascade' if cascade else 'plain'}{seed:05d}",
         sample_time=1.0,
         valves=("V1",),
         outputs=("PV1",),
         op=(50.0 + op)[:, None],
         pv=(20.0 + pv)[:, None],
-        sp=(20.0 + moves)[:, None],
+        sp=None if cascade else (20.0 + moves)[:, None],
     )
     slips = _slips(stem, max(0.25 * (2.0 * static - band), 0.02 * band))
     return PlainLoop(
