@@ -23,7 +23,6 @@ from stiction_ros.signals.autoregression import LOAD
 ROUNDED = 2.0
 """Steps of rounding by which a rounded value may change after it has repeated: one when it crosses
 a border of rounding slowly, two when noise carries it over the next."""
-MOST_HELD = 0.95  # of the rows: a sensor that holds more leaves nothing to restore from
 
 
 def held_rows(pv: FloatArray) -> BoolArray:
@@ -89,7 +88,7 @@ def restored(record: Record, options: IdentificationOptions) -> Record:
         options: of the fit.
     """
     held = np.array([held_rows(column) for column in record.pv.T])
-    held[held.mean(axis=1) > MOST_HELD] = False
+    held[held.all(axis=1)] = False
     if refresh(record)[0] > 1 or not held.any():
         return record
     pv, rows = record.pv.copy(), np.arange(len(record))

@@ -82,11 +82,12 @@ def verdict_of(probability: float, figures: Figures, deadband: bool) -> VerdictK
 
     Args:
         probability: of friction.
-        figures: a valve is healthy only where the record also rules out friction that would matter.
+        figures: a valve is healthy only where the record also rules out friction that would
+            matter: an ideal valve must be 1 / (1 − :data:`SURE`) times as likely at each rate.
         deadband: whether the friction has no jump.
     """
     if probability >= SURE:
         return VerdictKind.BACKLASH if deadband else VerdictKind.STICKY
-    if probability <= 1.0 - SURE and figures.ruled_out > 0.0:
+    if probability <= 1.0 - SURE and figures.ruled_out >= -math.log(1.0 - SURE):
         return VerdictKind.HEALTHY
     return VerdictKind.UNDECIDED
