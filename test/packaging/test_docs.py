@@ -22,7 +22,9 @@ LINES_OF_README = 160
 WORDS, WORDS_OF_PAGE = 36_000, 3_000
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 every_text = pytest.mark.parametrize(
-    "path", [ROOT / "README.md", *PAGES], ids=lambda path: str(path.relative_to(ROOT))
+    "path",
+    [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES],
+    ids=lambda path: str(path.relative_to(ROOT)),
 )
 
 
