@@ -181,3 +181,18 @@ def test_the_first_program_of_the_readme_runs(
     stiction_ros.write_csv(stiction_ros.simulate(model, samples=600), "history.csv")
     exec(compile(block.group(2), "README.md", "exec"), {})
     assert capsys.readouterr().out.startswith("V1 sticky ")
+
+
+@pytest.mark.trial
+def test_the_first_export_is_read_as_the_page_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / "docs" / "first_loop.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    made, dry_run = list(commands(text))[:2]
+    assert main(made) == 0
+    capsys.readouterr()
+    assert main(dry_run) == 0
+    shown = next(block for language, block in BLOCK.findall(text) if not language)
+    assert capsys.readouterr().out == shown
