@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
 import subprocess
@@ -76,6 +77,17 @@ def test_every_command_of_a_page_is_understood(
         assert "usage: stiction " + name in shown
         for option in (word for word in rest if word.startswith("--")):
             assert option.partition("=")[0] in shown or name == "demo", inline
+
+
+@every_text
+def test_the_names_that_programs_of_a_page_import_exist(path: Path) -> None:
+    for language, block in BLOCK.findall(path.read_text(encoding="utf-8")):
+        if language == "python":
+            tree = ast.parse(block)
+            tree.body = [
+                line for line in tree.body if isinstance(line, ast.Import | ast.ImportFrom)
+            ]
+            exec(compile(tree, path.name, "exec"), {})
 
 
 @pytest.mark.trial
