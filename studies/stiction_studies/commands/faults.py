@@ -34,7 +34,7 @@ def add(commands: Any) -> None:
         help="put faults into a running graph and judge what becomes of it",
         description="Start the nodes of a loop as processes, put one fault into it, and hold "
         "what is seen against what is expected: before and after the swap, in both paces. "
-        "docs/faults.md tells all of them, docs/connect.md those with --opcua.",
+        "docs/faults.md tells all of them, docs/opcua.md those with --opcua.",
     )
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument(

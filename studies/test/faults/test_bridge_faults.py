@@ -18,7 +18,7 @@ from stiction_studies.faults.bridge.case import Seen, judge
 from stiction_studies.faults.bridge.catalogue import FAULTS, find, table
 from stiction_studies.faults.observation import BagFound, Shown
 
-PAGE = Path(__file__).parents[3] / "docs" / "connect.md"
+PAGE = Path(__file__).parents[3] / "docs" / "opcua.md"
 ALLOWED = Allowed(low=35.0, high=65.0, rate=0.05, sample_time=60.0, speed=600.0)
 FAULT = BridgeFault("trouble", "is overcome", nothing, "trouble")
 STEADY = dataclasses.replace(FAULT, taken_over=False)
