@@ -22,6 +22,7 @@ LOADS = ("walk", "coloured", "steps", "sine", "square", "triangle", "drifting_cy
 MASTERS = ("walk", "coloured", "steps", "sine")
 SUBSTEPS = 40  # of the stem's mechanics in a sample
 HUSH, LITTLE = 0.2, 0.1  # of noise and load on a quiet loop: a valve makes a plain limit cycle
+LEAD = 500  # samples before the record, in which a cycle settles
 MANY = 6  # slips from which a record shows friction
 MATTERS = 0.1  # band over the range of OP, least of a friction that matters
 
@@ -79,7 +80,7 @@ def plain_loop(
     law = law or str(drawn)
     kept = str(random.choice(SENSORS, p=[0.5, 0.14, 0.12, 0.12, 0.12]))
     sensor = sensor or kept
-    count = int(random.integers(900, 3000))
+    count = LEAD + int(random.integers(900, 3000))
     kind = str(random.choice(["first", "second", "level"], p=[0.4, 0.35, 0.25]))
     lag, delay = _log(random, 3.0, 25.0), int(random.integers(0, 7))
     gain = _log(random, 0.3, 3.0) * float(random.choice([-1.0, 1.0]))
@@ -104,7 +105,8 @@ def plain_loop(
         moves = _set_points(random, count, swing)
     push = np.zeros(count)
     push[:50] = 2.0 * band  # sets a cycle going
-    op, stem, pv = loop.run(size * outside + push, noise, moves, Sensor(sensor, random, gain))
+    told = loop.run(size * outside + push, noise, moves, Sensor(sensor, random, gain))
+    op, stem, pv = (signal[LEAD:] for signal in told)
     span = float(np.subtract(*np.percentile(op, [98.0, 2.0])))
     record = Record(
         name=f"{'quiet' if quiet else 'cascade' if cascade else 'plain'}{seed:05d}",
@@ -113,7 +115,7 @@ def plain_loop(
         outputs=("PV1",),
         op=(50.0 + op)[:, None],
         pv=(20.0 + pv)[:, None],
-        sp=None if cascade else (20.0 + moves)[:, None],
+        sp=None if cascade else (20.0 + moves[LEAD:])[:, None],
     )
     slips = _slips(stem, max(0.25 * (2.0 * static - band), 0.02 * band))
     return PlainLoop(

@@ -26,7 +26,7 @@ def wave(shape: str, period: float, samples: int = 900) -> np.ndarray:
 
 
 def told(one: Known) -> Identification:
-    return explained(one.record, one.found)
+    return explained(one.record, one.found, close_loop(one.record, one.found))
 
 
 def cause(one: Known) -> Cause:
@@ -53,8 +53,8 @@ def test_a_friction_that_is_found_is_a_cause_however_little_is_beyond_its_price(
     valve = dataclasses.replace(
         one.found.valves[0], verdict=VerdictKind(verdict), evidence={"delta_bic": 1.0}
     )
-    found = explained(one.record, dataclasses.replace(one.found, valves=(valve,)))
-    told = found.outputs[0].cause
+    found = dataclasses.replace(one.found, valves=(valve,))
+    told = explained(one.record, found, close_loop(one.record, found)).outputs[0].cause
     assert told is not None
     assert (told.kind is CauseKind.VALVE) is made
 
