@@ -94,7 +94,8 @@ def test_json_has_the_keys_of_the_contract() -> None:
     assert found["rate"] == {"sample_time": 1.0, "used": 1.0}
     assert found["valves"][0].keys() == {
         *("name", "verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval", "jump"),
-        *("band_interval", "band_share", "stability", "evidence", "experiment", "responds", "probability"),
+        *("band_interval", "band_share", "stability", "evidence", "experiment", "responds"),
+        "probability",
     }
     stability = found["valves"][0]["stability"]
     assert stability["agreed"] == [look["look"] for look in stability["tried"]]
