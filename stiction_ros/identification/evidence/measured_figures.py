@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,20 +37,12 @@ def figures_of(seen: Sequence[Look], agreed: Agreement, valve: int, closed: Clos
         gain=beyond if agreed.alike else min(beyond, 0.0),
         ruled_out=-min(material),
         repeats=0.5 * repeated / (max(gains) + FEW),
-        one_step_gain=0.5 * (output.alone.plain - output.after.plain),
         loop_gone=loop.gone,
-        loop_closer=_off(loop.moved_without) - _off(loop.moved_with),
         moves=float(np.count_nonzero(np.diff(agreed.look.found.best.stems[valve]))),
         controller_fit=0.0 if loop.controller is None else loop.controller.r_squared,
-        held=float(agreed.held),
         band_share=min(loop.band_share, ENDLESS),
         cycle_share=0.0 if output.oscillation is None else output.oscillation.share,
     )
-
-
-def _off(ratio: float) -> float:
-    """Return by how much a movement differs from the recorded one, as the size of a logarithm."""
-    return abs(math.log(min(max(ratio, 1.0 / ENDLESS), ENDLESS)))
 
 
 def _gain(look: Look, valve: int) -> float:

@@ -45,23 +45,10 @@ class Figures:
         "PV also repeats itself a turn later, as beside another loop that cycles",
         -1,
     )
-    one_step_gain: float = _figure(
-        "nats",
-        "by which friction beats an ideal valve in the one-step prediction of PV",
-        "one step ahead PV is predicted as well without it",
-        1,
-    )
     loop_gone: float = _figure(
         "share",
         "of the simulated loop's movement that goes away without the friction",
         "the simulated loop moves nearly as much without it",
-        1,
-    )
-    loop_closer: float = _figure(
-        "log ratio",
-        "by which the simulated loop's movement is closer to the recorded one with the friction "
-        "than with an ideal valve",
-        "with an ideal valve the simulated loop moves as recorded, too",
         1,
     )
     moves: float = _figure(
@@ -71,12 +58,6 @@ class Figures:
     )
     controller_fit: float = _figure(
         "R²", "of OP's moves by the recovered controller", "the controller is hardly known"
-    )
-    held: float = _figure(
-        "0 or 1",
-        "whether the controller would hold the process found beside the friction",
-        "the process found beside it is one that the controller would not hold",
-        1,
     )
     band_share: float = _figure(
         "ratio",
