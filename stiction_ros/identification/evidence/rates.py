@@ -121,10 +121,6 @@ class Look:
             if tuning is not None and tuning.valve == valve
         )
 
-    def speaks(self, valve: int) -> bool:
-        """Return whether the process beside the best friction is one that the controller holds."""
-        return self.is_held(valve, self.found.best)
-
     def sees_process(self, valve: int) -> bool:
         """Return whether what this rate takes for the process is the one that is controlled.
 
@@ -152,18 +148,16 @@ class Agreement:
             likelihood.
         alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
             have a say.
-        held: whether both speak of processes that the controller holds.
     """
 
     look: Look
     gain: float
     alike: bool
-    held: bool = True
 
     @classmethod
     def alone(cls, look: Look, valve: int) -> Agreement:
         """Return what one rate says, its word taken for as much as that of two."""
-        return cls(look, look.beyond_price(valve), look.covers(valve), held=look.speaks(valve))
+        return cls(look, look.beyond_price(valve), look.covers(valve))
 
 
 def price_beside(wave_gain: float | None) -> float:
@@ -269,15 +263,14 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
         return Agreement.alone(seen[0], valve)
-    say, speak, pairs = _with_a_say(seen, valve), [look.speaks(valve) for look in seen], []
+    say, pairs = _with_a_say(seen, valve), []
     for k, two in enumerate(itertools.pairwise(seen)):
         bands = [look.accepted[valve].band for look in two]
         low, high = max(band[0] for band in bands), min(band[1] for band in bands)
         gains = [look.beyond_price(valve) for look in two]
         alike = low <= ALIKE * high and say[k] and say[k + 1]
         more = gains.index(max(gains))
-        held = speak[k] and speak[k + 1]
-        pairs.append(Agreement(two[more], min(gains), alike, held))
+        pairs.append(Agreement(two[more], min(gains), alike))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
 
 
