@@ -159,9 +159,10 @@ def _headline(found: Any, verdict: Mapping[str, Any]) -> str:
     (low, high), (least, most) = verdict["f_s_interval"], verdict["f_d_interval"]
     said += (
         f": {verdict['verdict']}, f_S {verdict['f_s']:.3g} % ({low:.3g} to {high:.3g}), "
-        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g}), "
-        f"P(friction) {verdict['probability']:.2f}"
+        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g})"
     )
+    if verdict["probability"] is not None:
+        said += f", P(friction) {verdict['probability']:.2f}"
     if verdict["verdict"] == "undecided":
         said += (
             ". The record does not decide whether the valve has friction: half of the drawn loops "
