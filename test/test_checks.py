@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from stiction_ros import HeStiction
-from stiction_ros.checks import LONGEST, number, shown
+from stiction_ros.checks import LONGEST, number, one_of, shown
+from stiction_ros.control.result import ControlMode
 from stiction_ros.control_settings import ControlSettings
 from stiction_ros.errors import InputError
 from stiction_ros.loop.yaml_reading import Section
@@ -55,3 +56,18 @@ def test_settings_files_and_behaviours_say_the_same_of_the_same_mistake() -> Non
             make()
         said.append(error.value.what)
     assert set(said) == {"-1 is out of range"}
+
+
+def test_a_choice_is_taken_by_its_word_or_refused_with_the_closest() -> None:
+    assert one_of("hold", ControlMode, "mode") is ControlMode.HOLD
+    assert one_of(ControlMode.HOLD, ("embedding", "hold"), "mode") == "hold"
+    with pytest.raises(InputError) as error:
+        one_of("Embeding", ControlMode, "mode")
+    assert str(error.value) == (
+        "mode: unknown value 'Embeding'; use unaware | embedding | inversion | hold; did you mean "
+        "embedding?"
+    )
+    many = [f"FIC{number}" for number in range(100)]
+    for wrong, told in ((None, "FIC19 | and 80 more$"), (["FIC1"], "value ")):
+        with pytest.raises(InputError, match=told):
+            one_of(wrong, many, "op")
