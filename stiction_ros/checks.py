@@ -79,6 +79,14 @@ def one_of(value: object, choices: Iterable[T], where: str) -> T:
     raise InputError(f"unknown value {shown(value)}", where=where, fix=fix)
 
 
+def of_kind(value: object, kind: type[T], where: str) -> T:
+    """Return ``value``; raise an InputError where it is not of a ``kind``, named by ``where``."""
+    if not isinstance(value, kind):
+        fix = f"give {kind.__name__}(…)"
+        raise InputError(f"{type(value).__name__} is no {kind.__name__}", where=where, fix=fix)
+    return value
+
+
 def shown(value: Any) -> str:
     """Return ``value`` as an error repeats it: not more than ``LONGEST`` characters."""
     text = repr(value)

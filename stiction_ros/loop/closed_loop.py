@@ -35,7 +35,7 @@ class ClosedLoopRun:
     """
 
     record: Record
-    pv_clean: FloatArray
+    pv_clean: FloatArray = dataclasses.field(repr=False)
 
 
 def simulate_closed_loop(

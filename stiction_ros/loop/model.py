@@ -95,7 +95,14 @@ class LoopModel:
     controller: PiTuning | None
     provenance: tuple[Mapping[str, Any], ...]
     instruments: tuple[Instrument, ...]
-    document: Mapping[str, Any] = dataclasses.field(repr=False)
+    document: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        process = f"{self.process.kind} from {', '.join(self.valve_names)}"
+        return (
+            f"<LoopModel {self.name}: {process} to {', '.join(self.outputs)}, "
+            f"samples of {self.sample_time:g} s>"
+        )
 
     @classmethod
     def load(cls, path: Path | str) -> LoopModel:

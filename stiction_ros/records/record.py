@@ -218,6 +218,13 @@ class Record:
         mask.flags.writeable = False
         object.__setattr__(self, "mask", mask if mask.any() else None)
 
+    def __repr__(self) -> str:
+        signals = [f"OP of {', '.join(self.valves)}", f"PV of {', '.join(self.outputs)}"]
+        signals += [key for key in ("sp", "stem") if getattr(self, key) is not None]
+        cut = f" in {len(self.gaps) + 1} segments" if self.gaps else ""
+        size = f"{len(self)} samples of {self.sample_time:g} s{cut}"
+        return f"<Record {self.name}: {size}; {', '.join(signals)}>"
+
     def __len__(self) -> int:
         return len(self.op)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import time
 from collections.abc import Callable
 
 import numpy as np
 
+from stiction_ros.checks import of_kind
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear.data import (
@@ -33,6 +35,7 @@ from stiction_ros.identification.linear.subspace import (
     fit_state_space,
 )
 from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
+from stiction_ros.intake.record_file import record_of
 from stiction_ros.records.record import Record
 from stiction_ros.signals.velocity_form import explained
 
@@ -98,7 +101,7 @@ class LinearOptions:
 
 
 def fit_linear(
-    record: Record,
+    record: Record | str | os.PathLike[str],
     options: LinearOptions | None = None,
     stem: FloatArray | None = None,
     progress: Progress | None = None,
@@ -106,7 +109,7 @@ def fit_linear(
     """Fit a linear model of a record, without friction unless ``stem`` brings it.
 
     Args:
-        record: what was measured.
+        record: what was measured, or the path of a file or bag of one loop.
         options: None for the defaults.
         stem: stem positions, shape (N, m), %, such as those of an identified friction; None
             takes OP.
@@ -128,7 +131,8 @@ def fit_linear(
         ([[0.8]], [[2]])
     """
     begun = time.perf_counter()
-    options = options or LinearOptions()
+    record = record_of(record)
+    options = LinearOptions() if options is None else of_kind(options, LinearOptions, "options")
     report = progress or (lambda share: None)
     data = prepare_linear(record, stem)
     if options.kind is LinearKind.STATE_SPACE:
