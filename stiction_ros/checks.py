@@ -55,13 +55,14 @@ def number(
     return value if whole else float(value)
 
 
-def one_of(value: object, choices: Iterable[T], where: str) -> T:
+def one_of(value: object, choices: Iterable[T], where: str, what: str = "value") -> T:
     """Return the choice that ``value`` is: a member of an enumeration also for its text.
 
     Args:
         value: of any type.
         choices: all that are allowed.
         where: argument or key, for the error.
+        what: it should be.
 
     Raises:
         InputError: it is none of them; the closest one is named.
@@ -76,14 +77,14 @@ def one_of(value: object, choices: Iterable[T], where: str) -> T:
     asked = f"; did you mean {folded[near[0]]}?" if near else ""
     more = [f"and {len(words) - LISTED} more"] if len(words) > LISTED else []
     fix = f"use {' | '.join([*words[:LISTED], *more])}{asked}"
-    raise InputError(f"unknown value {shown(value)}", where=where, fix=fix)
+    raise InputError(f"unknown {what} {shown(value)}", where=where, fix=fix)
 
 
-def of_kind(value: object, kind: type[T], where: str) -> T:
+def of_kind(value: object, kind: type[T], where: str, fix: str = "") -> T:
     """Return ``value``; raise an InputError where it is not of a ``kind``, named by ``where``."""
     if not isinstance(value, kind):
-        fix = f"give {kind.__name__}(…)"
-        raise InputError(f"{type(value).__name__} is no {kind.__name__}", where=where, fix=fix)
+        given, wanted = type(value).__name__, kind.__name__
+        raise InputError(f"{given} is no {wanted}", where=where, fix=fix or f"give {wanted}(…)")
     return value
 
 

@@ -55,7 +55,7 @@ def find_discrepancy(
         >>> print(found.verdict, *[effect.effect for effect in found.effects])
         named stiction
     """
-    of_kind(model, LoopModel, "model")
+    of_kind(model, LoopModel, "model", "give LoopModel.load(path)")
     given = [records] if isinstance(records, Record | str | os.PathLike) else records
     measured = [record_of(record) for record in given]
     with one_thread():

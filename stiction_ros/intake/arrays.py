@@ -13,7 +13,7 @@ import numpy as np
 from stiction_ros.checks import one_of, shown
 from stiction_ros.errors import InputError, foreign
 from stiction_ros.intake.assembly import Found, loop_of
-from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions, OpUnit, TimeUnit
+from stiction_ros.intake.intake_options import LETTERS, CsvColumns, IntakeOptions, OpUnit, TimeUnit
 from stiction_ros.intake.sheets.cells import Cells
 from stiction_ros.intake.sheets.layout import named_columns
 from stiction_ros.intake.sheets.sheet import PIECE, Piece, Sheet
@@ -24,12 +24,6 @@ from stiction_ros.records.csv_names import column_name
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 from stiction_ros.texts import plural
-
-Columns = str | Sequence[str] | Mapping[str, str]
-"""One column, one for each valve or output, or tag to column."""
-
-_LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}
-"""Signal to what the tags of its valves or outputs begin with, where none are given."""
 
 EMPTY = frozenset(("None", "nan", "NaN", "NaT", "<NA>"))
 """What missing values are as texts."""
@@ -112,7 +106,7 @@ def record_from_arrays(
     columns: dict[str, Any] = {"t": times}
     named: dict[str, dict[str, str]] = {}
     for key, table in given.items():
-        of = own[_LETTERS[key]]
+        of = own[LETTERS[key]]
         if table.shape != (count, len(of)):
             turned = table.shape[0] != count == table.shape[1]
             raise InputError(
@@ -129,7 +123,7 @@ def record_from_arrays(
 
 def record_from_frame(
     frame: Any,
-    columns: Mapping[str, Columns | None],
+    columns: Mapping[str, Any],
     time: Any,
     *,
     name: str,
@@ -159,10 +153,13 @@ def record_from_frame(
         own = str(getattr(index, "name", None) or "t")
         every = {own: index} | every
         time = own if time is None else time
-    named = {key: _named(given, key, every) for key, given in columns.items() if given is not None}
+    chosen = CsvColumns(**columns, time=time)
+    for key in columns:
+        for column in (getattr(chosen, key) or {}).values():
+            one_of(column, every, key, "column")
     if isinstance(time, str):
-        one_of(time, every, "time")
-    return _record(name, every, CsvColumns(**named, time=time), options)
+        one_of(time, every, "time", "column")
+    return _record(name, every, chosen, options)
 
 
 def _record(
@@ -221,11 +218,3 @@ def _table(values: Any, key: str) -> Any:
             f"has shape {found.shape}", where=key, fix="give shape (N,), or (N, k) for k signals"
         )
     return found[:, None] if found.ndim == 1 else found
-
-
-def _named(given: Columns, key: str, every: Mapping[str, Any]) -> dict[str, str]:
-    """Return tag to column; without tags V1, V2, … and PV1, PV2, …."""
-    if not isinstance(given, Mapping):
-        every_one = [given] if isinstance(given, str) else given
-        given = {f"{_LETTERS[key]}{k + 1}": column for k, column in enumerate(every_one)}
-    return {str(tag): str(one_of(column, every, key)) for tag, column in given.items()}

@@ -143,7 +143,7 @@ def test_wrong_arrays_get_a_sentence(given: tuple[Any, ...], told: str) -> None:
 @pytest.mark.parametrize(
     ("frame", "told"),
     [
-        ({"OP": OP, "flow": PV}, "op: unknown value 'op'; use OP | flow; did you mean OP?"),
+        ({"OP": OP, "flow": PV}, "op: unknown column 'op'; use OP | flow; did you mean OP?"),
         ({"op": OP, "flow": PV[1:]}, "columns differ in length"),
         ({"op": OP, "flow": PV, "t": ["foo"] * COUNT}, "60 stamps of 60 not understood"),
         (OP, "ndarray has no columns"),

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stiction_ros.checks import of_kind
+from stiction_ros.checks import of_kind, one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear.data import (
@@ -79,6 +79,12 @@ class LinearOptions:
     method: SubspaceMethod = SubspaceMethod.CVA
 
     def __post_init__(self) -> None:
+        for key, kind in (
+            ("kind", LinearKind),
+            ("criterion", OrderCriterion),
+            ("method", SubspaceMethod),
+        ):
+            object.__setattr__(self, key, one_of(getattr(self, key), kind, key))
         space = self.kind is LinearKind.STATE_SPACE
         polynomial = (self.output_order, self.input_order, self.noise_order)
         if space and any(value is not None for value in polynomial):
