@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -28,8 +29,16 @@ from stiction_ros.texts import plural
 EMPTY = frozenset(("None", "nan", "NaN", "NaT", "<NA>"))
 """What missing values are as texts."""
 
+_WORDS: Mapping[str, type[enum.StrEnum]] = {
+    "op_unit": OpUnit,
+    "time_unit": TimeUnit,
+    "dates": DateOrder,
+}
+
 _AS_ARGUMENTS = (
     (re.compile(r",? or (?:the tag|tags) with --tags F| \(or a row for this file in --tags\)"), ""),
+    (re.compile(r"--(?=(?:sp|stem) names)"), ""),
+    (re.compile(r"--auto\b"), "automatic"),
     (re.compile(r"--(op|pv|sp|stem) (\w+)=(\w+)"), r"\1={'\2': '\3'}"),
     (re.compile(r"--([a-z]+)-([a-z]+) ([\w-]+)"), r"\1_\2='\3'"),
     (re.compile(r"--([a-z]+) (\w+)"), r"\1='\2'"),
@@ -53,19 +62,16 @@ class ColumnSheet(Sheet):
 
     def __init__(self, name: str, columns: Mapping[str, Any]) -> None:
         self.path, self.name = Path(name), name
-        self.layout = named_columns([" ".join(str(key).split()) for key in columns])
-        self._cells = [_cells(values, str(key)) for key, values in columns.items()]
-        lengths = {len(cells) for cells in self._cells}
-        if len(lengths) > 1:
-            said = ", ".join(
-                f"{key} {len(cells)}" for key, cells in zip(columns, self._cells, strict=True)
-            )
-            raise InputError(f"the columns differ in length: {said}", where=name)
-        self._count = lengths.pop() if lengths else 0
+        self.layout = named_columns([" ".join(key.split()) for key in columns])
+        self._cells = [_cells(values, key) for key, values in columns.items()]
+        lengths = [len(cells) for cells in self._cells]
+        self._count = max(lengths, default=0)
+        if min(lengths, default=0) < self._count:
+            said = ", ".join(f"{key} {n}" for key, n in zip(columns, lengths, strict=True))
+            raise InputError(f"the columns differ in length: {said}")
 
     def pieces(self, rows: int | None = None) -> Iterator[Piece]:
-        size = rows or PIECE
-        for first in range(0, self._count, size):
+        for first in range(0, self._count, size := rows or PIECE):
             last = min(first + size, self._count)
             yield [cells[first:last] for cells in self._cells], np.arange(first, last)
 
@@ -74,9 +80,8 @@ def record_from_arrays(
     time: Any,
     signals: Mapping[str, Any],
     tags: Mapping[str, Sequence[str] | None],
-    *,
     name: str,
-    options: Mapping[str, Any],
+    op_unit: str | None,
 ) -> Record:
     """Return :meth:`stiction_ros.records.record.Record.from_arrays`.
 
@@ -85,49 +90,45 @@ def record_from_arrays(
         signals: arrays of op, pv, sp and stem, as there.
         tags: given tags of the valves, ``V``, and the outputs, ``PV``.
         name: of the record.
-        options: how to read it, by the names of its arguments.
+        op_unit: as there.
     """
-    there = {key: values for key, values in signals.items() if values is not None}
-    given = {key: _table(values, key) for key, values in ({"op": None, "pv": None} | there).items()}
-    own = {
-        letter: tags[letter] or [f"{letter}{k + 1}" for k in range(given[key].shape[1])]
-        for key, letter in (("op", "V"), ("pv", "PV"))
-    }
     step = np.ndim(time) == 0
-    if step and not (np.issubdtype(np.asarray(time).dtype, np.number) and 0 < time < np.inf):
+    if step and not (np.asarray(time).dtype.kind in "iuf" and 0 < time < np.inf):
         raise InputError(
             f"{shown(time)} is neither times nor a positive sample time in seconds",
             where="time",
             fix="give the time of each sample in seconds, as dates, or one sample time",
         )
-    count = len(given["op"])
-    times = time * np.arange(count) if step else time
-    count = count if step else len(times)
-    columns: dict[str, Any] = {"t": times}
+    with foreign("op"):
+        count = max(np.shape(signals["op"]), default=0) if step else len(time)
+    columns: dict[str, Any] = {"t": time * np.arange(count) if step else time}
     named: dict[str, dict[str, str]] = {}
-    for key, table in given.items():
-        of = own[LETTERS[key]]
-        if table.shape != (count, len(of)):
-            turned = table.shape[0] != count == table.shape[1]
+    for key, values in signals.items():
+        if values is None and key in ("sp", "stem"):
+            continue
+        with foreign(key):
+            table = np.asarray(values)
+        table = table[:, None] if table.ndim == 1 else table
+        letter, of = LETTERS[key], named.get({"sp": "pv", "stem": "op"}.get(key, key))
+        own = tags[letter] or of or [f"{letter}{k + 1}" for k in range((*table.shape, 1, 1)[1])]
+        if table.shape != (count, len(own)):
+            turned = table.ndim == 2 and table.shape[0] != count == table.shape[1]
             raise InputError(
-                f"shape {table.shape} does not fit {count} samples of {plural(len(of), 'signal')}",
+                f"shape {table.shape} does not fit {plural(count, 'sample')}, one a row, of "
+                f"{plural(len(own), 'signal')}",
                 where=key,
-                fix=f"one row a sample: give {key}.T" if turned else "give one row a sample",
+                fix=f"give {key}.T" if turned else "",
             )
-        named[key] = {tag: column_name(key, tag) for tag in of}
+        named[key] = {tag: column_name(key, tag) for tag in own}
         columns |= zip(named[key].values(), table.T, strict=True)
-    found = _record(name, columns, CsvColumns(**named, time="t"), {**options, "time_unit": "s"})
+    options = {"op_unit": op_unit, "time_unit": TimeUnit.SECONDS}
+    found = _record(name, columns, CsvColumns(**named, time="t"), options)
     exact = step and np.isclose(found.sample_time, time)
     return dataclasses.replace(found, sample_time=float(time)) if exact else found
 
 
 def record_from_frame(
-    frame: Any,
-    columns: Mapping[str, Any],
-    time: Any,
-    *,
-    name: str,
-    options: Mapping[str, Any],
+    frame: Any, columns: Mapping[str, Any], time: Any, name: str, options: Mapping[str, Any]
 ) -> Record:
     """Return :meth:`stiction_ros.records.record.Record.from_dataframe`.
 
@@ -148,17 +149,14 @@ def record_from_frame(
     every = {str(key): frame[key] for key in keys}
     index = getattr(frame, "index", None)
     if time is not None and not isinstance(time, str):
-        every, time = {"t": time} | {k: v for k, v in every.items() if k != "t"}, "t"
+        every, time = every | {"t": time}, "t"
     elif index is not None and np.asarray(index).dtype.kind not in "iu":  # whole ones count rows
         own = str(getattr(index, "name", None) or "t")
-        every = {own: index} | every
-        time = own if time is None else time
+        every, time = every | {own: index}, time or own
     chosen = CsvColumns(**columns, time=time)
-    for key in columns:
-        for column in (getattr(chosen, key) or {}).values():
-            one_of(column, every, key, "column")
-    if isinstance(time, str):
-        one_of(time, every, "time", "column")
+    named = [(key, name) for key in columns for name in (getattr(chosen, key) or {}).values()]
+    for key, column in [*named, *([("time", time)] if time else [])]:
+        one_of(column, every, key, "column")
     return _record(name, every, chosen, options)
 
 
@@ -167,10 +165,10 @@ def _record(
 ) -> Record:
     """Return the longest good record of columns; errors speak of arguments, not of options."""
     given = {key: value for key, value in options.items() if value is not None}
-    kinds = {"op_unit": OpUnit, "time_unit": TimeUnit, "dates": DateOrder}
-    for key, kind in kinds.items():
-        if key in given:
-            given[key] = one_of(given[key], kind, key)
+    for key in _WORDS.keys() & given.keys():
+        given[key] = one_of(given[key], _WORDS[key], key)
+    if "automatic" in given:
+        given["automatic"] = tuple(np.atleast_1d(given["automatic"]).tolist())
     wanted = IntakeOptions(columns=chosen, **given)
     try:
         with foreign(name):
@@ -180,9 +178,8 @@ def _record(
             loop = loop_of(Found(name, name, tuple(own), named=True), wanted)
             found = longest_part(loop.parts)
     except InputError as error:
-        raise InputError(
-            _as_arguments(error.what), where=error.where, fix=_as_arguments(error.fix)
-        ) from None
+        what, fix = map(_as_arguments, (error.what, error.fix))
+        raise InputError(what, where=error.where, fix=fix) from None
     return dataclasses.replace(found, notes=tuple(map(_as_arguments, found.notes)))
 
 
@@ -198,23 +195,8 @@ def _cells(values: Any, key: str) -> Cells:
     if found.ndim != 1:
         raise InputError(f"has shape {found.shape}, not one value a row", where=key)
     if found.dtype.kind == "m":
-        return np.asarray(found / np.timedelta64(1, "s"), dtype=np.float64)
-    if found.dtype.kind == "M":
-        return found
-    if found.dtype.kind in "biuf":
-        return found.astype(np.float64)
-    texts = [str(value) for value in found.tolist()]
+        found = found / np.timedelta64(1, "s")
+    if found.dtype.kind in "Mbiuf":
+        return found if found.dtype.kind == "M" else found.astype(np.float64)
+    texts = map(str, found.tolist())
     return ["" if text in EMPTY else text for text in texts]
-
-
-def _table(values: Any, key: str) -> Any:
-    """Return a signal of shape (N,) or (N, k) as (N, k)."""
-    try:
-        found = np.asarray(values)
-    except ValueError as error:
-        raise InputError(f"is no array ({error})", where=key) from None
-    if found.ndim not in (1, 2):
-        raise InputError(
-            f"has shape {found.shape}", where=key, fix="give shape (N,), or (N, k) for k signals"
-        )
-    return found[:, None] if found.ndim == 1 else found

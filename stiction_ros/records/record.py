@@ -135,13 +135,8 @@ class Record:
         """
         from stiction_ros.intake.arrays import record_from_arrays  # stands above, and loads slowly
 
-        return record_from_arrays(
-            time,
-            {"op": op, "pv": pv, "sp": sp, "stem": stem},
-            {"V": valves, "PV": outputs},
-            name=name,
-            options={"op_unit": op_unit},
-        )
+        signals = {"op": op, "pv": pv, "sp": sp, "stem": stem}
+        return record_from_arrays(time, signals, {"V": valves, "PV": outputs}, name, op_unit)
 
     @classmethod
     def from_dataframe(
@@ -153,12 +148,8 @@ class Record:
         time: Any = None,
         *,
         stem: str | list[str] | Mapping[str, str] | None = None,
-        sample_time: float | None = None,
-        op_unit: str | None = None,
-        time_unit: str | None = None,
-        dates: str | None = None,
-        auto: Sequence[str] | None = None,
         name: str = "record",
+        **reading: Any,
     ) -> Record:
         """Return the record of some columns of a table, read as those of a file are.
 
@@ -172,12 +163,11 @@ class Record:
             time: column of the times, or the times themselves, shape (N,), in s or as dates; None
                 takes an index of dates, durations or decimal seconds, or a column such as ``time``.
             stem: as ``op``, of measured stem positions, %, or None.
-            sample_time: s, where the table holds no times.
-            op_unit: of OP where it is not in %, such as ``share``, ``ma`` or ``0-10v``.
-            time_unit: of times that are numbers, such as ``ms``.
-            dates: ``dmy`` or ``mdy``, where dates that are texts do not tell.
-            auto: what the mode shows in automatic.
             name: for messages and reports.
+            reading: what the table does not tell: ``sample_time`` in s where it holds no times;
+                ``op_unit`` as :meth:`from_arrays`; ``time_unit`` of times that are numbers, such
+                as ``ms``; ``dates``, ``dmy`` or ``mdy``, of dates that are texts; ``automatic``,
+                what the mode shows in automatic.
 
         Raises:
             InputError: no such column, times that cannot be made regular, no good samples.
@@ -191,19 +181,8 @@ class Record:
         """
         from stiction_ros.intake.arrays import record_from_frame  # stands above, and loads slowly
 
-        return record_from_frame(
-            frame,
-            {"op": op, "pv": pv, "sp": sp, "stem": stem},
-            time,
-            name=name,
-            options={
-                "sample_time": sample_time,
-                "op_unit": op_unit,
-                "time_unit": time_unit,
-                "dates": dates,
-                "automatic": None if auto is None else tuple(auto),
-            },
-        )
+        columns = {"op": op, "pv": pv, "sp": sp, "stem": stem}
+        return record_from_frame(frame, columns, time, name, reading)
 
     def _check_mask(self, count: int) -> None:
         if self.mask is None:

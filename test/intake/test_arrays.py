@@ -109,7 +109,7 @@ def test_a_mode_counts_as_in_a_file() -> None:
     mode = ["AUTO"] * 40 + ["MAN"] * 20
     frame = {"time": 5.0 * np.arange(COUNT), "op": OP, "pv": PV, "mode": mode}
     assert len(Record.from_dataframe(frame, "op", "pv")) == 40
-    assert len(Record.from_dataframe(frame, "op", "pv", auto=["MAN"])) == 20
+    assert len(Record.from_dataframe(frame, "op", "pv", automatic="MAN")) == 20
 
 
 def test_another_unit_of_op_is_said() -> None:
@@ -122,14 +122,15 @@ def test_another_unit_of_op_is_said() -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ((1.0, OP[None], PV), r"op: shape .* 60 samples of|pv: shape .*"),
-        ((STAMPS, OP[None], PV), r"op: shape \(1, 60\) .*: give op.T"),
+        ((1.0, OP[None], PV), r"op: shape \(1, 60\) does not fit .*; give op.T"),
+        ((STAMPS, OP[None], PV), r"op: shape \(1, 60\) .*; give op.T"),
         ((1.0, OP, PV[1:]), r"pv: shape \(59, 1\) does not fit 60 samples"),
-        ((1.0, OP, None), r"pv: has shape \(\); give shape \(N,\)"),
+        ((1.0, OP, None), r"pv: shape \(\) does not fit 60 samples, one a row, of 1 signal"),
         ((0.0, OP, PV), "time: 0.0 is neither times nor a positive sample time"),
         (("t", OP, PV), "time: 't' is neither"),
-        ((1.0, OP, [[1.0], [2.0, 3.0]]), "pv: is no array"),
+        ((1.0, OP, [[1.0], [2.0, 3.0]]), "pv: cannot be read"),
         ((1.0, OP, np.full(COUNT, np.nan)), "PV1.PV holds no number"),
+        ((1.0, OP, PV, np.c_[PV, PV]), r"sp: shape \(60, 2\) .* of 1 signal"),
         ((1.0, OP, OP), "one signal is given twice"),
         (([], [], []), "0 rows of data"),
     ],
@@ -154,3 +155,8 @@ def test_wrong_frames_get_a_sentence(frame: Any, told: str) -> None:
     with pytest.raises(InputError, match=told.replace("|", r"\|")) as error:
         Record.from_dataframe(frame, "op", "flow")
     assert "--" not in str(error.value)
+
+
+def test_set_points_are_those_of_the_outputs() -> None:
+    with pytest.raises(InputError, match="record: sp names PV2; it needs one column for each of"):
+        Record.from_dataframe({"t": STAMPS, "op": OP, "pv": PV}, "op", "pv", {"PV2": "pv"})
