@@ -13,7 +13,7 @@ import yaml
 
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.loop.places import append_effect
 from stiction_ros.loop.yaml_effects import at_place, read_effects
 from stiction_ros.loop.yaml_process import Instrument, read_instruments, read_process
@@ -181,6 +181,56 @@ class LoopModel:
             read_instruments(section, process.outputs),
             copy.deepcopy(dict(document)),
         )
+
+    @classmethod
+    def from_system(
+        cls,
+        system: Any,
+        sample_time: float | None = None,
+        *,
+        dead_time: float = 0.0,
+        name: str = "loop",
+        valves: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        **sections: Any,
+    ) -> LoopModel:
+        """Return the loop with a linear process and ideal valves of 0 to 100 %.
+
+        Args:
+            system: from stems, %, to PV: a system of scipy.signal or python-control, ``(num,
+                den)`` with the highest power of s first, or ``(A, B, C, D)``; time in s. One that
+                is not discrete by its ``dt`` is sampled with its stems held between samples.
+            sample_time: s; None takes that of a discrete system.
+            dead_time: of all inputs, s.
+            name: tag of the loop.
+            valves: tags of the inputs, V1, V2, … by default.
+            outputs: tags of the outputs, PV1, PV2, … by default.
+            sections: of the YAML mapping, such as ``controller`` or ``operating_point``.
+
+        Raises:
+            InputError: no linear system, one that answers at once, or no sample time.
+
+        Examples:
+            >>> from stiction_ros import HeStiction, LoopModel, simulate
+            >>> tuning = {"kind": "pi", "gain": 1.0, "integral_time": 8.0}
+            >>> loop = LoopModel.from_system(([0.8], [8.0, 1.0]), 1.0, controller=tuning)
+            >>> sticky = loop.with_valve_effects({"V1": [HeStiction(4.0, 1.5)]})
+            >>> len(simulate(sticky, samples=300))
+            300
+        """
+        from stiction_ros.loop.systems import process_of
+
+        with foreign("system"):
+            read = process_of(system, sample_time, dead_time, valves, outputs)
+        step, tags, names, process = read
+        document = {
+            "loop": name,
+            "sample_time": step,
+            "valves": [{"name": tag, "limits": [0.0, 100.0], "effects": []} for tag in tags],
+            "process": process,
+            "operating_point": {"op": dict.fromkeys(tags, 50.0), "pv": dict.fromkeys(names, 0.0)},
+        }
+        return cls.from_mapping(document | sections, name)
 
     @property
     def valve_names(self) -> tuple[str, ...]:

@@ -23,8 +23,9 @@ from stiction_ros.processes import (
     StirredTank,
     TankParameters,
 )
+from stiction_ros.processes.sampled import Sampled, beside, companion, held
 
-_KINDS = ("arx", "state_space", "stirred_tank")
+_KINDS = ("arx", "state_space", "transfer_function", "stirred_tank")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +51,8 @@ def read_process(
         process = _read_arx(section, point, valves)
     elif kind == "state_space":
         process = _read_state_space(section, point, valves)
+    elif kind == "transfer_function":
+        process = _read_transfer_functions(section, point, valves, sample_time)
     else:
         process = _read_tank(section, point, valves, sample_time)
     section.finish()
@@ -101,11 +104,48 @@ def _read_state_space(section: Section, point: Section, valves: tuple[str, ...])
     a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
     e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
     op0, pv0 = _read_point(point, valves, names)
+    late = section.section("delay", {})
+    delays = [late.integer(valve, 0) for valve in valves]
+    late.finish()
     try:
+        if any(delays) and b.shape == (len(a), len(valves)) and c.shape[1] == len(a):
+            taps = np.zeros((max(delays) + 1, *b.shape))
+            for j, delay in enumerate(delays):
+                taps[delay, :, j] = b[:, j]
+            a, b, c = Sampled(a, taps, c).with_past()
+            e = np.pad(e, ((0, len(a) - len(e)), (0, 0)))
         model = LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
         return StateSpaceProcess(model, valves, names, noise, measured)
     except InputError as error:
         raise error.within(section.where) from None
+
+
+def _read_transfer_functions(
+    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
+) -> Process:
+    names, noise, channels = [], [], {}
+    for i, entry in enumerate(section.sections("outputs")):
+        names.append(entry.text("name"))
+        noise.append(_read_noise(entry))
+        _read_elsewhere(entry)
+        num, den = entry.section("num"), entry.section("den")
+        late = entry.section("dead_time", {})
+        for j, valve in enumerate(valves):
+            if valve not in num:
+                continue
+            try:
+                a, b, c = companion(num.numbers(valve), den.numbers(valve))
+            except InputError as error:
+                raise error.within(f"{entry.where}.{valve}") from None
+            dead_time = late.number(valve, 0.0, low=0.0)
+            channels[i, j] = held(a, b, c, dead_time, sample_time)
+        for each in (num, den, late, entry):
+            each.finish()
+    whole = beside(channels, len(names), len(valves)).with_past()
+    op0, pv0 = _read_point(point, valves, tuple(names))
+    rest = np.zeros((len(whole[0]), 0)), np.zeros(len(whole[0]))
+    model = LinearModel(*whole, *rest, op0, pv0)
+    return StateSpaceProcess(model, valves, tuple(names), tuple(noise))
 
 
 def _read_tank(
