@@ -186,26 +186,23 @@ class LoopModel:
     def from_system(
         cls,
         system: Any,
-        sample_time: float | None = None,
-        *,
+        sample_time: float,
         dead_time: float = 0.0,
         name: str = "loop",
-        valves: Sequence[str] | None = None,
-        outputs: Sequence[str] | None = None,
         **sections: Any,
     ) -> LoopModel:
-        """Return the loop with a linear process and ideal valves of 0 to 100 %.
+        """Return the loop of a linear process behind ideal valves V1, V2, … of 0 to 100 %.
 
         Args:
-            system: from stems, %, to PV: a system of scipy.signal or python-control, ``(num,
-                den)`` with the highest power of s first, or ``(A, B, C, D)``; time in s. One that
-                is not discrete by its ``dt`` is sampled with its stems held between samples.
-            sample_time: s; None takes that of a discrete system.
-            dead_time: of all inputs, s.
+            system: from stems, %, to PV: a state space or the transfer function of one valve of
+                scipy.signal or python-control, ``(num, den)`` with the highest power of s first,
+                or ``(A, B, C, D)``; time in s. One that is not discrete by its ``dt`` is sampled
+                with its stems held between samples.
+            sample_time: s.
+            dead_time: of all inputs, s; of a state space whole samples.
             name: tag of the loop.
-            valves: tags of the inputs, V1, V2, … by default.
-            outputs: tags of the outputs, PV1, PV2, … by default.
-            sections: of the YAML mapping, such as ``controller`` or ``operating_point``.
+            sections: of the YAML mapping, such as ``controller`` or ``operating_point``, which
+                else is 50 % and a PV of 0.
 
         Raises:
             InputError: no linear system, one that answers at once, or no sample time.
@@ -221,14 +218,14 @@ class LoopModel:
         from stiction_ros.loop.systems import process_of
 
         with foreign("system"):
-            read = process_of(system, sample_time, dead_time, valves, outputs)
-        step, tags, names, process = read
+            process = process_of(system, sample_time, dead_time)
+        valves = list(process.get("delay", ("V1",)))
         document = {
             "loop": name,
-            "sample_time": step,
-            "valves": [{"name": tag, "limits": [0.0, 100.0], "effects": []} for tag in tags],
+            "sample_time": sample_time,
+            "valves": [{"name": tag, "limits": [0.0, 100.0], "effects": []} for tag in valves],
             "process": process,
-            "operating_point": {"op": dict.fromkeys(tags, 50.0), "pv": dict.fromkeys(names, 0.0)},
+            "operating_point": {"op": dict.fromkeys(valves, 50.0)},
         }
         return cls.from_mapping(document | sections, name)
 

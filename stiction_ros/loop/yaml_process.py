@@ -23,7 +23,7 @@ from stiction_ros.processes import (
     StirredTank,
     TankParameters,
 )
-from stiction_ros.processes.sampled import Sampled, beside, companion, held
+from stiction_ros.processes.sampled import equation, held
 
 _KINDS = ("arx", "state_space", "transfer_function", "stirred_tank")
 
@@ -47,12 +47,13 @@ def read_process(
 ) -> Process:
     """Build the process; ``point`` is the loop's operating point, read for linear kinds."""
     kind = section.choice("kind", _KINDS)
-    if kind == "arx":
+    if kind == "transfer_function":
+        section = _as_arx(section, valves, sample_time)
+        section.choice("kind", _KINDS)
+    if kind in ("arx", "transfer_function"):
         process = _read_arx(section, point, valves)
     elif kind == "state_space":
         process = _read_state_space(section, point, valves)
-    elif kind == "transfer_function":
-        process = _read_transfer_functions(section, point, valves, sample_time)
     else:
         process = _read_tank(section, point, valves, sample_time)
     section.finish()
@@ -108,44 +109,39 @@ def _read_state_space(section: Section, point: Section, valves: tuple[str, ...])
     delays = [late.integer(valve, 0) for valve in valves]
     late.finish()
     try:
-        if any(delays) and b.shape == (len(a), len(valves)) and c.shape[1] == len(a):
-            taps = np.zeros((max(delays) + 1, *b.shape))
-            for j, delay in enumerate(delays):
-                taps[delay, :, j] = b[:, j]
-            a, b, c = Sampled(a, taps, c).with_past()
-            e = np.pad(e, ((0, len(a) - len(e)), (0, 0)))
+        for j, delay in enumerate(delays):
+            for _ in range(delay):  # the stem of a sample before is one more state
+                a = np.block([[a, b[:, j : j + 1]], [np.zeros((1, len(a) + 1))]])
+                b = np.pad(b, ((0, 1), (0, 0)))
+                b[:, j] = np.eye(len(b))[-1]
+                c, e = np.pad(c, ((0, 0), (0, 1))), np.pad(e, ((0, 1), (0, 0)))
         model = LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
         return StateSpaceProcess(model, valves, names, noise, measured)
     except InputError as error:
         raise error.within(section.where) from None
 
 
-def _read_transfer_functions(
-    section: Section, point: Section, valves: tuple[str, ...], sample_time: float
-) -> Process:
-    names, noise, channels = [], [], {}
-    for i, entry in enumerate(section.sections("outputs")):
-        names.append(entry.text("name"))
-        noise.append(_read_noise(entry))
-        _read_elsewhere(entry)
-        num, den = entry.section("num"), entry.section("den")
-        late = entry.section("dead_time", {})
-        for j, valve in enumerate(valves):
+def _as_arx(section: Section, valves: tuple[str, ...], sample_time: float) -> Section:
+    """Return the section of continuous transfer functions as one of ARX equations."""
+    outputs = []
+    for entry in section.sections("outputs"):
+        num, den, late = entry.section("num"), entry.section("den"), entry.section("dead_time", {})
+        channels = {}
+        for valve in valves:
             if valve not in num:
                 continue
+            dead_time = late.number(valve, 0.0, low=0.0)
             try:
-                a, b, c = companion(num.numbers(valve), den.numbers(valve))
+                channels[valve] = held(
+                    num.numbers(valve), den.numbers(valve), dead_time, sample_time
+                )
             except InputError as error:
                 raise error.within(f"{entry.where}.{valve}") from None
-            dead_time = late.number(valve, 0.0, low=0.0)
-            channels[i, j] = held(a, b, c, dead_time, sample_time)
-        for each in (num, den, late, entry):
+        for each in (num, den, late):
             each.finish()
-    whole = beside(channels, len(names), len(valves)).with_past()
-    op0, pv0 = _read_point(point, valves, tuple(names))
-    rest = np.zeros((len(whole[0]), 0)), np.zeros(len(whole[0]))
-    model = LinearModel(*whole, *rest, op0, pv0)
-    return StateSpaceProcess(model, valves, tuple(names), tuple(noise))
+        kept = {k: v for k, v in entry.values.items() if k not in ("num", "den", "dead_time")}
+        outputs.append(kept | equation(channels))
+    return Section({**section.values, "outputs": outputs}, section.where)
 
 
 def _read_tank(
