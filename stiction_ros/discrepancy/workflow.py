@@ -52,8 +52,8 @@ def find_discrepancy(
         >>> schedule = SetPoints.load(find_config("flow.set_points.yaml"), truth.outputs)
         >>> record = simulate(truth, schedule, samples=800)
         >>> found = find_gap(truth.with_ideal_valves(), [record], GapOptions(quick=True))
-        >>> print(found.verdict, *[effect.effect for effect in found.effects])
-        named stiction
+        >>> found
+        <Discrepancy named: stiction at valve:V1>
     """
     of_kind(model, LoopModel, "model", "give LoopModel.load(path)")
     given = [records] if isinstance(records, Record | str | os.PathLike) else records

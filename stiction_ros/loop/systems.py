@@ -37,9 +37,11 @@ def process_of(system: Any, sample_time: float, dead_time: float) -> dict[str, A
     if len(arrays) == 2:
         parts = [np.atleast_1d(np.squeeze(array)) for array in arrays]
         if dt or any(part.ndim > 1 for part in parts):
-            said = "a discrete one" if dt else "several of them"
-            fix = "give a state space, or write kind: transfer_function in YAML"
-            raise InputError(f"takes no transfer function that is {said}", where="system", fix=fix)
+            said = "a discrete transfer function" if dt else "several transfer functions"
+            fix = (
+                f"give a state space, or write kind: {'arx' if dt else 'transfer_function'} in YAML"
+            )
+            raise InputError(f"{said} cannot be taken", where="system", fix=fix)
         ratio = {"num": parts[0].tolist(), "den": parts[1].tolist(), "dead_time": late}
         entry = {"name": "PV1"} | {key: {"V1": value} for key, value in ratio.items()}
         return {"kind": "transfer_function", "outputs": [entry]}

@@ -116,8 +116,14 @@ def test_a_delay_in_state_space_is_that_of_arx() -> None:
         (np.eye(2), "system: ndarray is no linear system"),
         ((["a"], [1.0, 2.0]), "system: cannot be read"),
         ((np.eye(2), np.ones((3, 1)), np.ones((1, 2)), 0.0), "system: cannot be read"),
-        (([[[1.0]], [[2.0]]], [[[5.0, 1.0]], [[6.0, 1.0]]]), "function that is several of them"),
-        (of_control(1.0, num=[0.1], den=[1.0, -0.9]), "system: takes no .* is a discrete one"),
+        (
+            ([[[1.0]], [[2.0]]], [[[5.0, 1.0]], [[6.0, 1.0]]]),
+            "system: several transfer functions cannot be taken",
+        ),
+        (
+            of_control(1.0, num=[0.1], den=[1.0, -0.9]),
+            "system: a discrete .* cannot be taken; .* kind: arx",
+        ),
         (of_control(2.0, A=0.9, B=0.1, C=1.0, D=0.0), "sample_time: the system has 2 s, not 1 s"),
         (of_control(1.0, A=0.9, B=0.1, C=1.0, D=0.0), "dead_time: 0.5 s are no whole number"),
     ],
