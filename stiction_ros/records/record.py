@@ -82,9 +82,8 @@ class Record:
                 continue
             values = np.array(values, dtype=float)
             if values.shape != (count, len(tags)):
-                raise InputError(
-                    f"{key} has shape {values.shape}, not {(count, len(tags))}", where=self.name
-                )
+                said = f"{key} has shape {values.shape}, not {(count, len(tags))}"
+                raise InputError(said, where=self.name, fix="Record.from_arrays takes vectors, too")
             if not np.isfinite(values).all():
                 wrong = ~np.isfinite(values).all(axis=1)
                 wrong &= True if bad is None else ~bad

@@ -160,3 +160,15 @@ def test_wrong_frames_get_a_sentence(frame: Any, told: str) -> None:
 def test_set_points_are_those_of_the_outputs() -> None:
     with pytest.raises(InputError, match="record: sp names PV2; it needs one column for each of"):
         Record.from_dataframe({"t": STAMPS, "op": OP, "pv": PV}, "op", "pv", {"PV2": "pv"})
+
+
+def test_frames_of_pandas_are_read() -> None:
+    pandas = pytest.importorskip("pandas")
+    index = pandas.DatetimeIndex(STAMPS, tz="UTC")
+    frame = pandas.DataFrame({"op": OP, "pv": PV}, index=index).convert_dtypes()
+    frame.loc[index[7], "pv"] = pandas.NA
+    record = Record.from_dataframe(frame, "op", "pv")
+    assert (record.start, record.sample_time) == (1714557600.0, 5.0)
+    assert [note.partition(":")[0] for note in record.notes[:1]] == ["pv"]
+    again = Record.from_arrays(index, frame["op"], frame[["op", "pv"]].fillna(0.0) + 1.0)
+    assert again.pv.shape == (COUNT, 2)

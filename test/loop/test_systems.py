@@ -139,3 +139,12 @@ def test_wrong_numbers_and_sections_get_a_sentence() -> None:
         LoopModel.from_system(LAG, None)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="unknown key 'contoller'"):
         LoopModel.from_system(LAG, 1.0, contoller={})
+
+
+def test_systems_of_python_control_are_read() -> None:
+    control = pytest.importorskip("control")
+    lag = control.tf([0.8], [8.0, 1.0])
+    for system in (lag, control.ss(lag), control.c2d(control.ss(lag), 1.0)):
+        assert step(LoopModel.from_system(system, 1.0)) == pytest.approx(
+            -0.8 * np.expm1(-TIME / 8.0)
+        )

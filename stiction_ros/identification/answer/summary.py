@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -29,9 +30,9 @@ def summary(found: Identification) -> str:
     """Return what was found in plain sentences, lines of 80 columns."""
     lines = [f"{_size(found)}, {spoken(found.samples * found.sample_time)} of operation"]
     if found.reason:
-        lines.append(f"The fit is not to be trusted: {found.reason}")
+        lines += _wrapped(f"The fit is not to be trusted: {found.reason}", indent="")
     for j, valve in enumerate(found.valves):
-        lines += ["", f"{valve.name} is {valve.verdict}{_frictions(valve)}"]
+        lines += ["", *_wrapped(f"{valve.name}: {valve.verdict}{_frictions(valve)}", indent="")]
         said = (why(found, j), materiality(valve))
         lines += _wrapped(" ".join(filter(None, said)))
         lines += _wrapped(f"What to do next: {next_step(found, j)}")
@@ -77,10 +78,11 @@ def as_html(found: Identification) -> str:
 def as_table(found: Identification) -> Any:
     """Return a table of the valves for a console of rich."""
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(*HEAD, title=found.reason or _size(found), title_justify="left")
+    table = Table(*HEAD, title=Text(found.reason or _size(found)), title_justify="left")
     for cells in rows(found):
-        table.add_row(*cells)
+        table.add_row(*map(Text, cells))
     return table
 
 
@@ -93,8 +95,9 @@ def _frictions(valve: ValveEstimate) -> str:
         return ""
     static, dynamic = valve.static_interval, valve.dynamic_interval
     return (
-        f": f_S {valve.static_friction:.3g} % ({static[0]:.3g} to {static[1]:.3g} %), "
-        f"f_D {valve.dynamic_friction:.3g} % ({dynamic[0]:.3g} to {dynamic[1]:.3g} %)"
+        f"; f_S {valve.static_friction:.3g} % ({static[0]:.3g} to {static[1]:.3g} %), "
+        f"f_D {valve.dynamic_friction:.3g} % ({dynamic[0]:.3g} to {dynamic[1]:.3g} %), "
+        f"law {valve.law}"
     )
 
 
@@ -102,8 +105,8 @@ def _process(found: Identification, output: OutputModel) -> str:
     """Return gain and delay of an output, and how well its free run fits."""
     told = []
     for valve, taps in output.b.items():
-        rest = 1.0 + sum(output.a)
-        gain = f"gain {sum(taps) / rest:.3g} per % of" if rest else "integrates"
+        level = math.isclose(sum(output.a), -1.0)
+        gain = "integrates" if level else f"gain {sum(taps) / (1.0 + sum(output.a)):.3g} per % of"
         delay = output.delay.get(valve, 0) * found.sample_time
         told.append(f"{gain} {valve}, delay {delay:g} s")
     fit = f"free-run fit {output.fit_free_run:.0f} %"

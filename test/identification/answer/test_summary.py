@@ -18,7 +18,7 @@ from stiction_ros.identification.result.identification import (
     VerdictKind,
 )
 
-NAME = "<FV&1>"
+NAME = "<FV&1>[b]"
 
 
 def answer(verdict: VerdictKind = VerdictKind.STICKY, valves: int = 1) -> Identification:
@@ -71,7 +71,7 @@ def test_its_summary_is_one_screen_of_sentences_with_units(kind: VerdictKind) ->
     assert len(lines) <= 24
     assert max(map(len, lines)) <= 80
     assert lines[0] == "600 samples of 2 s, 1200 s of operation"
-    assert f"{NAME} is {kind}" in text
+    assert f"{NAME}: {kind}" in text
     assert ("f_S 4.02 % (3.9 to 4.1 %)" in text) == (kind is not VerdictKind.HEALTHY)
     assert "What to do next: " in text
     assert f"FT1: gain 0.8 per % of {NAME}, delay 4 s; free-run fit 93 %" in text
@@ -84,17 +84,17 @@ def test_an_integrator_has_no_gain_and_a_failed_fit_a_reason() -> None:
     level = dataclasses.replace(output, a=(-1.0,), cause=None)
     told = dataclasses.replace(found, outputs=(level,), reason="it wanders", notes=()).summary()
     assert "The fit is not to be trusted: it wanders" in told
-    assert "FT1: integrates <FV&1>, delay 4 s" in told
+    assert "FT1: integrates <FV&1>[b], delay 4 s" in told
 
 
 def test_its_tables_have_a_row_for_each_valve_and_escape_names() -> None:
     found = answer(valves=2)
     page = found._repr_html_()
     assert page.count("<tr>") == 3
-    assert page.count("<td>&lt;FV&amp;1&gt;</td><td>sticky</td><td>4.02</td>") == 2
+    assert page.count("<td>&lt;FV&amp;1&gt;[b]</td><td>sticky</td><td>4.02</td>") == 2
     assert NAME not in page
     target = io.StringIO()
     Console(file=target, width=80).print(found)
     shown = target.getvalue()
-    assert shown.count("3.9 to 4.1") == 2
+    assert shown.count("3.9 to 4.1") == shown.count(NAME) == 2
     assert "100%" in shown
