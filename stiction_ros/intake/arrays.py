@@ -154,7 +154,7 @@ def record_from_frame(
         own = str(getattr(index, "name", None) or "t")
         every, time = every | {own: index}, time or own
     chosen = CsvColumns(**columns, time=time)
-    named = [(key, name) for key in columns for name in (getattr(chosen, key) or {}).values()]
+    named = [(key, col) for key in columns for col in (getattr(chosen, key) or {}).values()]
     for key, column in [*named, *([("time", time)] if time else [])]:
         one_of(column, every, key, "column")
     return _record(name, every, chosen, options)
