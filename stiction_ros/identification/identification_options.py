@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from stiction_ros.checks import one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
@@ -94,16 +95,9 @@ class IdentificationOptions:
         return "he" if self.law == AUTO else self.law
 
     def __post_init__(self) -> None:
-        if self.method not in METHOD_NAMES:
-            raise InputError(
-                f"unknown value {self.method!r}",
-                where="method",
-                fix=f"use {' | '.join(METHOD_NAMES)}",
-            )
-        if self.kind is not None and self.kind not in LOOP_KINDS:
-            raise InputError(
-                f"unknown kind {self.kind!r}", where="kind", fix=f"use {' | '.join(LOOP_KINDS)}"
-            )
+        one_of(self.method, METHOD_NAMES, "method")
+        if self.kind is not None:
+            one_of(self.kind, LOOP_KINDS, "kind", "kind")
         low, high = self.delay
         if not 0 <= low <= high:
             raise InputError(

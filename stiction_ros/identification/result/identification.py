@@ -85,6 +85,10 @@ class ValveEstimate:
     figures: Figures | None = None
     responds: bool = True
 
+    def __repr__(self) -> str:
+        frictions = f"f_S {self.static_friction:.3g} %, f_D {self.dynamic_friction:.3g} %"
+        return f"<ValveEstimate {self.name}: {self.verdict}, {frictions}, law {self.law}>"
+
     @property
     def is_likely(self) -> bool:
         """Whether friction is found, or more likely than not."""
@@ -232,6 +236,10 @@ class Identification:
         >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
         >>> found.status.value, found.samples, found.stem.shape
         ('ok', 400, (400, 1))
+        >>> found
+        <Identification ok: V1 sticky; 400 samples>
+        >>> print(found.summary().splitlines()[0])
+        400 samples of 1 s, 400 s of operation
     """
 
     status: FitStatus
@@ -247,6 +255,26 @@ class Identification:
     search: SearchLog | None = None
     orders: tuple[OrderRow, ...] = ()
     row_samples: int = 1
+
+    def __repr__(self) -> str:
+        valves = ", ".join(f"{valve.name} {valve.verdict}" for valve in self.valves)
+        return f"<Identification {self.status}: {valves or self.reason}; {self.samples} samples>"
+
+    def summary(self) -> str:
+        """Return verdicts, frictions, what to do next and the process as text of 80 columns."""
+        from stiction_ros.identification.answer.summary import summary  # stands above
+
+        return summary(self)
+
+    def _repr_html_(self) -> str:
+        from stiction_ros.identification.answer.summary import as_html  # stands above
+
+        return as_html(self)
+
+    def __rich__(self) -> Any:
+        from stiction_ros.identification.answer.summary import as_table  # stands above
+
+        return as_table(self)
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""

@@ -58,7 +58,7 @@ def report_record(
     Examples:
         >>> from stiction_ros import IdentificationOptions, LoopModel
         >>> from stiction_ros import find_config, identify, report_record, simulate
-        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=400)
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=200)
         >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
         >>> report_record(record, found, "report.html").name
         'report.html'
@@ -120,7 +120,28 @@ def evidence_table(valves: Sequence[ValveEstimate]) -> str:
 def draw_record(
     record: Record, identification: Identification, parts: Sequence[Record] = ()
 ) -> tuple[Drawing, ...]:
-    """Draw four cycles, PV against OP, signals with stems, valve curves, free run and responses."""
+    """Draw four cycles, PV against OP, signals with stems, valve curves, free run and responses.
+
+    Args:
+        record: that was looked at.
+        identification: of this record.
+        parts: all parts of the source that it is from, when there are several.
+
+    Returns:
+        Drawings: each has a ``name``, a ``title``, a ``caption`` and its ``figure`` of matplotlib,
+        and shows itself in a notebook.
+
+    Raises:
+        ValueError: the identification has an output that the record has not.
+
+    Examples:
+        >>> from stiction_ros import IdentificationOptions, LoopModel
+        >>> from stiction_ros import draw_record, find_config, identify, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=200)
+        >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
+        >>> [drawing.name for drawing in draw_record(record, found)][:3]
+        ['cycles', 'pv_op', 'signals']
+    """
     window = Window.of(record, identification)
     with style():
         drawn = [
