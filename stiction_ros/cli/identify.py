@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -85,7 +86,7 @@ def add(commands: Any) -> None:
         "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
     )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument("--out", metavar="DIR", help="write report.html and figures there")
+    parser.add_argument("--out", metavar="DIR", help="write the page report.html there")
     parser.set_defaults(run=run)
 
 
@@ -150,15 +151,15 @@ def _write_model(record: Record, found: Identification, target: str) -> None:
 
 def _print(document: Mapping[str, Any], found: Identification) -> None:
     console = Console()
-    table = Table(title=f"{document['record']}: {found.samples} samples", title_justify="left")
+    console.print(f"{document['record']}: {found.samples} samples")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     further = _further(found)
     for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval"):
         table.add_column(name)
     for head in further.values():
         table.add_column(head)
         table.add_column("interval")
-    table.add_column("moves")
-    table.add_column("band")
+    table.add_column("OP lost")
     for valve in found.valves:
         table.add_row(
             valve.name,
@@ -168,8 +169,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
             f"{valve.dynamic_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
             *(cell for key in further for cell in _cells(valve, key)),
-            str(valve.moves),
-            f"{100 * valve.band_share:.0f} % of OP" if valve.band_share > 0.0 else "",
+            f"{100 * valve.band_share:.0f} %" if valve.band_share > 0.0 else "",
         )
     console.print(table)
     if found.row_samples > 1:
@@ -219,6 +219,6 @@ def _cause(cause: Cause) -> str:
     if cause.kind is CauseKind.NONE or cause.period is None:
         return f"cause {cause.kind}. {cause.sentence}"
     return (
-        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.1f}, "
-        f"amplitude {cause.amplitude:.3g}. {cause.sentence}"
+        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.3g} "
+        f"(above 1 is regular), amplitude {cause.amplitude:.3g}. {cause.sentence}"
     )

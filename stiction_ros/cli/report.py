@@ -33,7 +33,8 @@ def add(commands: Any) -> None:
         "--out",
         default="report.html",
         metavar="F.html",
-        help="the page, or a folder that gets figures and summary.json too (default: report.html)",
+        help="the page, or a folder for the page; for a run also figures and summary.json "
+        "(default: report.html)",
     )
     parser.set_defaults(run=run)
 

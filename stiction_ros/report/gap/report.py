@@ -12,6 +12,7 @@ from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
 from stiction_ros.discrepancy.answer.preview import preview
 from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.effects import FloatArray
+from stiction_ros.pages.frame import framed, text
 from stiction_ros.report.drawing import (
     BLUE,
     GREEN,
@@ -32,7 +33,7 @@ from stiction_ros.report.gap.effects import (
     preview_drawing,
 )
 from stiction_ros.report.gap.words import CONTROLLER, called, candidate_of, named_figures, plain
-from stiction_ros.report.page import Cell, embedded, folded, number, page, table, text
+from stiction_ros.report.page import Cell, embedded, folded, number, table
 
 SHOWN = 12  # candidates in the picture
 SHOWS = 1.1  # times the declared noise from which what the sensor adds to it is told
@@ -71,7 +72,7 @@ def gap_page(found: Discrepancy, drawings: Sequence[Drawing]) -> str:
     headline = _headline(found)
     parts = [
         f"<h1>{text(headline)}</h1>",
-        f'<p class="kicker">{text(names)}: {len(found.runs)} samples of '
+        f'<p class="soft">{text(names)}: {len(found.runs)} samples of '
         f"{found.runs.sample_time:g} s; verdict {text(found.verdict)}</p>",
         '<div class="cards">' + "".join(effect_card(effect) for effect in found.effects) + "</div>",
         *(pictures.get(f"effect_{k + 1}", "") for k in range(len(found.effects))),
@@ -91,7 +92,7 @@ def gap_page(found: Discrepancy, drawings: Sequence[Drawing]) -> str:
     if listed:
         parts.append("<h2>What was not considered</h2>" + _listed(listed))
     parts += [folded("The loop model with what was found", found.model_after.to_yaml())]
-    return page(f"{names}: {headline}", parts)
+    return framed(f"{names}: {headline}", parts)
 
 
 def _headline(found: Discrepancy) -> str:

@@ -7,15 +7,7 @@ from typing import Any
 
 from stiction_ros.effects import Stiction, behaviours
 from stiction_ros.identification import VerdictKind
-from stiction_ros.report.page import (
-    Cell,
-    card,
-    duration,
-    interval,
-    number,
-    percent,
-    table,
-)
+from stiction_ros.report.page import Cell, card, duration, interval, number, percent, table
 from stiction_ros.report.run.story import Story
 
 KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}

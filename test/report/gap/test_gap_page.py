@@ -95,7 +95,7 @@ def test_it_shows_what_the_effect_does_and_what_would_decide(said: str, page: Pa
 def test_an_effect_is_listed_once_in_each_look(page: Path) -> None:
     assert page.name == "report.html"
     for look in page.read_text(encoding="utf-8").split("the candidates</h2>")[1:]:
-        names = re.findall(r'<tr><td class="text">([^<]*)</td>', look.split("</table>")[0])
+        names = re.findall(r'<tr><td class="t">([^<]*)</td>', look.split("</table>")[0])
         assert len(names) > 5
         assert len(set(names)) == len(names)
 
