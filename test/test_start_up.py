@@ -32,7 +32,6 @@ WRONG = (
     ["study", "nowhere"],
     ["study-change", "nowhere"],
     ["study-control", "--cases", "none"],
-    ["study-wear", "nowhere"],
     ["faults", "--only", "none"],
     ["soak"],
     ["example", "3"],

@@ -21,11 +21,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
             "the estimator's monitor over loops in which an effect sets in half-way",
         ),
         (
-            "study-wear",
-            "commands.wear",
-            "IAE against moves of the stem, over controllers and the worth of a move",
-        ),
-        (
             "faults",
             "commands.faults",
             "put faults into a running graph and judge what becomes of it",
