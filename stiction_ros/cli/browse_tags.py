@@ -19,7 +19,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "browse-tags",
-        help="make a tag map by browsing a control system (OPC UA)",
         description="Find everything that has a PV and an OP under one name, FIC101.PV or a "
         "folder FIC101 with a variable PV, and write a tag map that listens to it.",
     )

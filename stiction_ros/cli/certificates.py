@@ -19,7 +19,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "certificates",
-        help="certificates of the link to a control system (OPC UA)",
         description="Make our certificate and key, pin the certificate of a server, show one.",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)

@@ -42,7 +42,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "completion",
-        help="a script by which a shell ends commands and options at Tab",
         description="Print a script by which a shell ends commands and options at Tab. For bash: "
         'eval "$(stiction completion bash)", in ~/.bashrc to have it always; zsh the same in '
         "~/.zshrc; for fish: stiction completion fish | source.",
@@ -90,6 +89,7 @@ def _known(parser: argparse.ArgumentParser, path: tuple[str, ...]) -> Iterator[_
         if isinstance(action, argparse._SubParsersAction):
             below = dict(action.choices)
             actions = {one.dest: one.help or "" for one in action._choices_actions}
+            actions |= getattr(parser, "texts", {})  # of the commands themselves
             continue
         words = tuple(map(str, action.choices or ()))
         if not action.option_strings:

@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "convert",
-        help="convert a record between CSV and bag",
         description="Write a record in another form: OUT ending in .csv becomes a CSV file, "
         "anything else a rosbag2 directory. Rows whose times are slightly irregular are "
         "a sample each; a record with gaps, or of several runs, becomes OUT_1, OUT_2 and so on. "

@@ -30,7 +30,6 @@ def add(commands: Any) -> None:
     opcua, compare = extensions.part("demo opcua"), extensions.part("demo --compare")
     parser = commands.add_parser(
         "demo",
-        help="run a live loop: cycle, identify, swap, record, report",
         description="Start plant, controller, estimator and recorder as processes; let the loop "
         "cycle; identify the friction; swap the controller; record all traffic; write the report.",
     )

@@ -26,9 +26,7 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     plant = extensions.part("experiment plant")
     text = PRBS if plant is None else f"{PRBS} {plant.DESCRIPTION}"
-    parser = commands.add_parser(
-        "experiment", help="simulate an identification experiment", description=text
-    )
+    parser = commands.add_parser("experiment", description=text)
     names = ("prbs",) if plant is None else ("prbs", "plant")
     parser.add_argument("name", metavar=f"{{{','.join(names)}}}", help="the experiment")
     parser.add_argument(

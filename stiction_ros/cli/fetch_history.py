@@ -21,7 +21,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "fetch-history",
-        help="read history from a control system (OPC UA) into CSV records",
         description="Read the history of the loops of a tag map, page by page, and write one CSV "
         "record a loop. A call that was broken off goes on where it stopped.",
     )

@@ -32,7 +32,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "fit-linear",
-        help="fit a linear model, for a controller that knows no friction",
         description="Fit a linear model from OP to PV and write it as a loop model. Exit code 1 "
         "when there is no stable model.",
     )

@@ -48,7 +48,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "gain",
-        help="what service, embedding or retuning would bring",
         description="Simulate what would help a loop: a serviced valve, a controller that knows "
         "the friction, another tuning, or nothing. A record is identified first and the "
         "controller of the record is the baseline; a model needs a controller of its own.",

@@ -44,7 +44,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "gap",
-        help="find, name and add the effect that a simulation misses",
         description="Compare a loop model with records of its loop, name the physical effect that "
         "it lacks, add it and measure the gap again. Exit codes: 0 named or none, 3 ambiguous, "
         "4 unknown, 5 untestable.",

@@ -45,7 +45,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
-        help="identify friction and process from a record",
         description="Identify the friction of every valve and the process behind it from "
         "controller output and measurement, and say which valve sticks. Of a record with gaps "
         "or of several runs the longest good part is taken.",

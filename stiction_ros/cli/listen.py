@@ -20,7 +20,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "listen",
-        help="fill the windows of all loops in the graph, in one process",
         description="Read pv and op_applied of every loop in the ROS graph and write one CSV "
         "record a loop, which identify takes. Nothing is published.",
     )

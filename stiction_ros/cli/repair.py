@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "repair",
-        help="finish a bag whose recorder was killed, or salvage a damaged one",
         description="Finish the files of a bag that its recorder did not close, save what is "
         "whole of damaged ones (these stay beside the new ones as *.mcap.damaged), and write "
         "metadata.yaml anew. A whole bag is left as it is.",

@@ -17,7 +17,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "replay",
-        help="run estimator and controller over a bag as they ran live",
         description="Run estimator and controller over a recorded bag without ROS, with the "
         "settings that they told on ~/config, and compare every fit, op and change of mode with "
         "the recorded ones. Exit code 1 when anything differs.",

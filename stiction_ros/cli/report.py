@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "report",
-        help="make the report of a bag or a record",
         description="Make a self-contained HTML report of a bag, or of a CSV record.",
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")

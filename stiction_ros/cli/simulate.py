@@ -22,7 +22,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "simulate",
-        help="simulate a loop model under its own controller",
         description="Run a loop model in closed loop under the controller that it records "
         "(controller: {kind: pi, …}) and write OP, PV, SP and the true stem position.",
     )

@@ -40,7 +40,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "survey",
-        help="every loop of a plant, ranked by what to service first",
         description="Judge every loop in files and folders of exports and list the valves to "
         "service first, with a page for each loop. A loop that cannot be judged stands in the "
         "list with its reason and stops no other.",

@@ -58,7 +58,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study-change",
-        help="run a scenario whose sticky valve changes after the swap, without ROS",
         description="Run a scenario's live loop over many seeds by the core, without ROS; once the "
         "controller knows the friction, the valve changes: serviced (no friction is left), "
         "little (f_S .2 %, f_D .1 %), grown (f_S half as large again), both (f_D as well), or "

@@ -108,7 +108,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "example",
-        help="identify a loop whose truth is known, and compare",
         description="Make a record whose truth is known, identify it and print both side by "
         "side: the paper's Examples 1 and 2, or loops without friction that oscillate for "
         "another reason. With --seeds: how often the identification is right.",

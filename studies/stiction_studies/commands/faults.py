@@ -31,17 +31,16 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "faults",
-        help="put faults into a running graph and judge what becomes of it",
         description="Start the nodes of a loop as processes, put one fault into it, and hold "
         "what is seen against what is expected: before and after the swap, in both paces. "
+        "Without --only and --all print the table of all faults. "
         "docs/faults.md tells all of them, docs/opcua.md those with --opcua.",
     )
-    which = parser.add_mutually_exclusive_group(required=True)
+    which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--only", action="append", metavar="NAME", help="this fault; may be repeated"
     )
     which.add_argument("--all", action="store_true", help="every fault (up to an hour)")
-    which.add_argument("--list", action="store_true", help="print the table of all faults")
     parser.add_argument(
         "--opcua",
         action="store_true",
@@ -76,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         return faults_opcua.run(options)
     from stiction_studies.faults.catalogue import FAULTS, find, table
 
-    if options.list:
+    if not (options.all or options.only):
         print(table(), end="")
         return 0
     faults = FAULTS if options.all else tuple(find(name) for name in options.only)

@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study-monitor",
-        help="the estimator's monitor over loops in which an effect sets in half-way",
         description="Run the monitor over long loops drawn by seed. From the middle on one effect "
         "acts, or none with --healthy. Print alarms and what was named.",
     )

@@ -20,7 +20,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "paper",
-        help="every figure and table of the paper, printed beside ours",
         description="Draw the paper's figures and print its tables, the printed number beside "
         "ours, as one page. With --success: count how often a method finds the friction.",
     )

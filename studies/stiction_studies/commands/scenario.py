@@ -54,7 +54,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study",
-        help="run a scenario over many seeds, without ROS",
         description="Run a scenario's live loop over many seeds by the core, without ROS, and "
         "print what was identified and what the swap gained. Exit code 1 when a run with "
         "sticky valves was not swapped, or one with ideal valves was.",

@@ -26,7 +26,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "soak",
-        help="a long run with the real nodes: missed samples, growth of memory",
         description="Run the nodes of a scenario as processes for hours. Fails when a sample was "
         "missed, or when a node's memory has grown since a tenth of the run (docs/faults.md).",
     )
