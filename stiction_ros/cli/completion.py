@@ -42,11 +42,11 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "completion",
-        description="Print a script by which a shell ends commands and options at Tab. For bash: "
+        description="Print a script that completes commands and options at Tab. For bash: "
         'eval "$(stiction completion bash)", in ~/.bashrc to have it always; zsh the same in '
         "~/.zshrc; for fish: stiction completion fish | source.",
     )
-    parser.add_argument("shell", choices=SHELLS, help="which shell")
+    parser.add_argument("shell", choices=SHELLS, help="the shell")
     parser.set_defaults(run=run)
 
 

@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser)
     parser.add_argument(
-        "--iso", action="store_true", help="time stamps in ISO 8601 (UTC) in a CSV file"
+        "--iso", action="store_true", help="write times of a CSV file in ISO 8601 (UTC)"
     )
     parser.set_defaults(run=run)
 

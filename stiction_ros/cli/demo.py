@@ -39,7 +39,9 @@ def add(commands: Any) -> None:
         metavar="SCENARIO",
         help="tank, siso, or a file (default: both)" + (OPCUA_HELP if opcua else ""),
     )
-    parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
+    parser.add_argument(
+        "--out", default="out", metavar="DIR", help="folder of the results (default: out)"
+    )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
     parser.add_argument(
         "--speed",

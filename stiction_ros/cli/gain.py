@@ -58,9 +58,15 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser)
     add_law(parser)
-    parser.add_argument("--valve", metavar="TAG", help="of several valves (default: widest band)")
-    parser.add_argument("--set-points", metavar="F", help="schedule, for a model")
-    parser.add_argument("--samples", type=int, metavar="N", help="of a run, for a model (2000)")
+    parser.add_argument(
+        "--valve",
+        metavar="TAG",
+        help="the valve, where there are several (default: that with the widest band)",
+    )
+    parser.add_argument("--set-points", metavar="F", help="schedule of set-points, with a model")
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="number of samples of a run, with a model (2000)"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run, law=None)
 

@@ -52,28 +52,28 @@ def add(commands: Any) -> None:
         "inputs",
         nargs="+",
         metavar="FILE",
-        help="MODEL RECORD…; with --fit-linear RECORD… alone (CSV files or bags)",
+        help="the loop model, then records (CSV files or bags); records alone with --fit-linear",
     )
     add_columns(parser)
     add_intake(parser)
     parser.add_argument(
         "--fit-linear",
         action="store_true",
-        help="there is no model yet: fit a linear one to the longest record",
+        help="fit a linear model to the longest record, where there is no model yet",
     )
     parser.add_argument(
         "--delay",
         type=delay_range,
         default=(0, 10),
         metavar="LO:HI",
-        help="delays tried by --fit-linear, samples (0:10)",
+        help="delays that --fit-linear tries, samples (0:10)",
     )
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="no bootstrap: stored threshold, intervals by likelihood",
+        help="take stored thresholds and intervals by likelihood, without a bootstrap",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the bootstraps (0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the bootstraps (0)")
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument(
         "--out", metavar="DIR", help="write report.html and model_after.loop.yaml there"

@@ -56,29 +56,34 @@ def add(commands: Any) -> None:
         "--na",
         type=output_orders,
         metavar="N[,N]",
-        help="order n_a (default: by BIC); methods of the paper also one for each output",
+        help="order n_a of the process (default: by BIC); methods of the paper take one order, "
+        "or one for each output",
     )
     parser.add_argument(
         "--nb",
         type=input_orders,
         metavar="N[,N][/N,N]",
-        help="order n_b (default: n_a); methods of the paper also one for each valve, a row of "
-        "them for each output",
+        help="order n_b of the process (default: n_a); methods of the paper take one order, or "
+        "one for each valve in a row for each output",
     )
     parser.add_argument(
-        "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
+        "--delay",
+        type=delay_range,
+        default=(0, 10),
+        metavar="LO:HI",
+        help="delays to try, samples (0:10)",
     )
     add_law(parser)
     parser.add_argument(
         "--kind",
         choices=searches.LOOP_KINDS,
-        help="what the loop controls: the process found is held against it, as a note",
+        help="what the loop controls; a note says whether the process found fits it",
     )
     parser.add_argument(
         "--method",
         default="evidence",
         choices=searches.METHODS,
-        help="search (default: evidence)",
+        help="method of identification (default: evidence)",
     )
     add_search_options(parser)
     parser.add_argument(

@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
         "--compression",
         default="zstd",
         choices=COMPRESSIONS,
-        help="of files that are rewritten (default: zstd)",
+        help="compression of files that are rewritten (default: zstd)",
     )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run)

@@ -22,7 +22,9 @@ def add(commands: Any) -> None:
         "the recorded ones. Exit code 1 when anything differs.",
     )
     parser.add_argument("bag", metavar="BAG", help="rosbag2 directory or .mcap file")
-    parser.add_argument("--namespace", metavar="NS", help="of the loop, when there are several")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="namespace of the loop, where a bag holds several loops"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run)
 

@@ -29,9 +29,11 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--set-points", metavar="F", help="schedule of set-points (default: the operating point)"
     )
-    parser.add_argument("--samples", type=int, default=SAMPLES, metavar="N", help=f"({SAMPLES})")
     parser.add_argument(
-        "--seed", type=int, default=SEED, metavar="S", help=f"of the noise ({SEED})"
+        "--samples", type=int, default=SAMPLES, metavar="N", help=f"number of samples ({SAMPLES})"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=SEED, metavar="S", help=f"seed of the noise ({SEED})"
     )
     parser.add_argument(
         "--out",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from pathlib import Path
 
@@ -81,6 +82,19 @@ def test_help_lists_each_command_once_in_short_lines(capsys: pytest.CaptureFixtu
     assert groups == ["usage", "find", "decide", "act", "live", "plant", "makers"]
     grouped = [name for names in GROUPS.values() for name in names]
     assert sorted([*grouped, "completion"]) == sorted(COMMANDS)
+
+
+def test_every_option_says_what_it_is() -> None:
+    below = [parser()]
+    while below:
+        one = below.pop()
+        for action in one._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                below += action.choices.values()
+            else:
+                said = (action.help or "").split(" (")[0]
+                assert len(said) > 2, (one.prog, action.dest)
+                assert not said.startswith(("of ", "(", "default")), (one.prog, action.dest)
 
 
 def test_identify_lists_the_friction_laws(capsys: pytest.CaptureFixture[str]) -> None:

@@ -64,9 +64,15 @@ def add(commands: Any) -> None:
         "unchanged. Exit code 1 when a run did not do what is asked.",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
-    parser.add_argument("--change", choices=CHANGES, default="serviced", help="(serviced)")
     parser.add_argument(
-        "--seeds", type=seed_range, default=(11, 30), metavar="A:B", help="inclusive (11:30)"
+        "--change", choices=CHANGES, default="serviced", help="how the valve changes (serviced)"
+    )
+    parser.add_argument(
+        "--seeds",
+        type=seed_range,
+        default=(11, 30),
+        metavar="A:B",
+        help="seeds from A to B (11:30)",
     )
     add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write every run; - for stdout")

@@ -73,7 +73,11 @@ def add(commands: Any) -> None:
         "case misses what is asked of it.",
     )
     parser.add_argument(
-        "--seeds", type=seed_range, default=(101, 110), metavar="A:B", help="inclusive (101:110)"
+        "--seeds",
+        type=seed_range,
+        default=(101, 110),
+        metavar="A:B",
+        help="seeds from A to B (101:110)",
     )
     known = ", ".join(choices.CONTROL_CASES)
     parser.add_argument("--cases", metavar="A,B", help=f"some of {known}")

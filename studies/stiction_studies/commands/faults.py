@@ -37,25 +37,23 @@ def add(commands: Any) -> None:
         "docs/faults.md tells all of them, docs/opcua.md those with --opcua.",
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument(
-        "--only", action="append", metavar="NAME", help="this fault; may be repeated"
-    )
+    which.add_argument("--only", action="append", metavar="NAME", help="one fault; may be repeated")
     which.add_argument("--all", action="store_true", help="every fault (up to an hour)")
     parser.add_argument(
         "--opcua",
         action="store_true",
-        help="those between a control system and its bridge, in place of those of the loop",
+        help="faults between a control system and its bridge, in place of faults of the loop",
     )
-    parser.add_argument("--pace", choices=[p.value for p in Pace], help="in this pace alone")
+    parser.add_argument("--pace", choices=[p.value for p in Pace], help="only in this pace")
     parser.add_argument(
-        "--phase", choices=[p.value for p in Phase], help="on this side of the swap"
+        "--phase", choices=[p.value for p in Phase], help="only on this side of the swap"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the noise (1)")
     parser.add_argument(
-        "--speed", type=float, default=25.0, metavar="N", help="of realtime pace (25)"
+        "--speed", type=float, default=25.0, metavar="N", help="speed in realtime pace (25)"
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="keep logs and bags of cases that fail here (out/faults)"
+        "--out", metavar="DIR", help="folder for logs and bags of cases that fail (out/faults)"
     )
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="loops that run at a time (1)"

@@ -60,7 +60,11 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
     parser.add_argument(
-        "--seeds", type=seed_range, default=(11, 20), metavar="A:B", help="inclusive (11:20)"
+        "--seeds",
+        type=seed_range,
+        default=(11, 20),
+        metavar="A:B",
+        help="seeds from A to B (11:20)",
     )
     parser.add_argument("--ideal-valves", action="store_true", help="valves that follow OP")
     add_jobs(parser)

@@ -36,15 +36,18 @@ def add(commands: Any) -> None:
         metavar="SCENARIO",
         help="siso, tank, or a file (siso)",
     )
-    parser.add_argument("--hours", type=float, metavar="H", help="wall time")
+    parser.add_argument("--hours", type=float, metavar="H", help="hours of wall time")
     parser.add_argument("--samples", type=int, metavar="N", help="samples, in place of hours")
     parser.add_argument(
-        "--pace", choices=[p.value for p in Pace], default="lockstep", help="(lockstep)"
+        "--pace",
+        choices=[p.value for p in Pace],
+        default="lockstep",
+        help="pace of the loop (lockstep)",
     )
     parser.add_argument(
-        "--speed", type=float, default=100.0, metavar="N", help="of realtime pace (100)"
+        "--speed", type=float, default=100.0, metavar="N", help="speed in realtime pace (100)"
     )
-    parser.add_argument("--out", metavar="DIR", help="keep bag and logs here")
+    parser.add_argument("--out", metavar="DIR", help="folder for bag and logs")
     parser.add_argument("--json", metavar="F", help="write the figures; - for stdout")
     parser.set_defaults(run=run)
 
