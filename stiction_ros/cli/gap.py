@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -27,6 +28,7 @@ from stiction_ros.errors import InputError, storing
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.records.parts import longest_part, only_part
+from stiction_ros.texts import symbol
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
@@ -145,26 +147,30 @@ def _print(found: Discrepancy) -> None:
     names = ", ".join(record.name for record in found.runs.records)
     console.print(f"{names}: {found.verdict}", markup=False)
     if found.effects:
-        table = Table("effect", "figure", "value", "95 %", "ΔBIC", "closes", "or")
+        table = Table(
+            *("effect", "figure", "value", "95 %", "ΔBIC", "closes"),
+            box=SIMPLE_HEAD,
+            pad_edge=False,
+        )
         for effect in found.effects:
-            others = ", ".join(f"{place} {name}" for place, name in effect.alternatives)
             for k, (key, value) in enumerate(effect.parameters.items()):
                 ends = effect.intervals.get(key)
                 table.add_row(
                     f"{effect.place} {effect.title}" if k == 0 else "",
-                    key,
+                    symbol(key),
                     f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
                     "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
                     f"{effect.delta_bic:.0f}" if k == 0 else "",
                     _share(effect.closed) if k == 0 else "",
-                    others if k == 0 else "",
                 )
         console.print(table)
     elif found.alternatives:
         console.print("one of: " + ", ".join(f"{p} {e}" for p, e in found.alternatives))
     for effect in found.effects:
-        if effect.sentence:
-            console.print(f"{effect.place} {effect.title}: {effect.sentence}", markup=False)
+        others = " or ".join(f"{place} {name}" for place, name in effect.alternatives)
+        told = [effect.sentence, f"it may also be {others}" if others else ""]
+        if said := "; ".join(filter(None, told)):
+            console.print(f"{effect.place} {effect.title}: {said}", markup=False)
     for change in found.process_changes:
         said = f"process to {change.output}: {change.what} {change.value:.4g} {change.unit}"
         console.print(said.removesuffix(" 1"), markup=False)
@@ -192,7 +198,7 @@ def _share(closed: float) -> str:
 
 def _gaps(found: Discrepancy) -> Table:
     title = f"gap on held-out samples; closed {100.0 * found.closed:.0f} % of its excess"
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for head in ("output", "free run", "after", "noise", "one step", "after", "noise"):
         table.add_column(head, justify="left" if head == "output" else "right")
     for before, after in zip(found.before, found.after, strict=True):

@@ -34,6 +34,7 @@ from stiction_ros.cli.shared.searches import (
 )
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
+from stiction_ros.texts import symbol
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification, ValveEstimate
@@ -203,7 +204,8 @@ def _further(found: Identification) -> dict[str, str]:
     heads = {}
     for valve in found.valves:
         for entry in find_law(valve.law).parameters()[2:] if valve.further else ():
-            heads[entry.key] = entry.key if entry.unit == "1" else f"{entry.key} {entry.unit}"
+            name = symbol(entry.key)
+            heads[entry.key] = name if entry.unit == "1" else f"{name} {entry.unit}"
     return heads
 
 

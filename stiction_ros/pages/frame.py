@@ -86,6 +86,7 @@ figure img { display: block; width: 100%; height: auto; background: #fff;
 .plot .pv { stroke: var(--pv); } .plot .op { stroke: var(--op); }
 .plot .stem { stroke: var(--stem); } .plot .sp { stroke: var(--sp); stroke-dasharray: 5 3; }
 .plot .free { stroke: var(--free); } .plot .ink { stroke: var(--ink); }
+.plot .shade { fill: var(--soft); opacity: .14; }
 .plot .whole { stroke: var(--soft); stroke-width: .7; }
 .plot .diagonal { stroke: var(--soft); stroke-dasharray: 4 4; }
 .key { display: flex; flex-wrap: wrap; gap: 3px 16px; font-size: .9rem; margin: 2px 0; }
@@ -109,7 +110,9 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   figure img { filter: invert(.91) hue-rotate(180deg); } }
 @media (max-width: 760px) {
   main { padding: 18px 14px 44px; }
-  figure img { width: 640px; } dl { display: block; } dd { margin: 0 0 6px; }
+  figure img { width: 640px; }
+  figure:has(img) figcaption::before { content: "Move the picture sideways. "; }
+  dl { display: block; } dd { margin: 0 0 6px; }
   table.list thead { display: none; }
   table.list, table.list tbody { display: block; } table.list { font-size: .92rem; }
   table.list tr { display: grid; grid-template-columns: 1fr 1fr; gap: 0 14px; padding: 9px 0;
@@ -121,7 +124,7 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   table.list td::before { content: attr(data-label) " "; color: var(--soft); font-weight: 400; }
   table.list .name, table.list td.wordy, table.list td.trend { grid-column: 1 / -1; }
   table.list td.trend svg { display: inline-block; margin-left: 6px; }
-  .plot:not(.square) text { font-size: 24px; }
+  .plot:not(.square) text { font-size: 22px; }
   .plot .x text:nth-child(even) { display: none; }
   table.list td { order: 1; } table.list .name { order: 0; }
 }

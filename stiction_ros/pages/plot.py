@@ -17,7 +17,7 @@ from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import DAY, HOUR
 
 WIDTH, HEIGHT = 960, 280
-LEFT, RIGHT, TOP, BOTTOM = 72, 8, 8, 32
+LEFT, RIGHT, TOP, BOTTOM = 96, 8, 8, 32
 """Size of a figure and its margins, units of its own: a phone shows it at a third, and the figures
 on its axes twice as large."""
 
@@ -29,6 +29,9 @@ MOST = 3000
 
 ROOM = 0.04
 """Share of the range that is left free above and below."""
+
+KINDS = ("pv", "op", "stem", "free", "sp", "ink")
+"""Colours of curves that are of one kind."""
 
 CALENDAR = [
     *(1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800),
@@ -142,7 +145,12 @@ class Curve:
 
 
 def over_time(
-    title: str, time: FloatArray, curves: Sequence[Curve], axis: str, start: float = 0.0
+    title: str,
+    time: FloatArray,
+    curves: Sequence[Curve],
+    axis: str,
+    start: float = 0.0,
+    shade: Sequence[tuple[float, float]] = (),
 ) -> str:
     """Return a figure of curves over one time, which the script of the page can zoom.
 
@@ -152,6 +160,7 @@ def over_time(
         curves: values that are not finite leave a gap.
         axis: name and unit of what goes up, HTML.
         start: of the record; dates are shown where it is one, s since 1970.
+        shade: begin and end of stretches that are shaded, in the unit of ``time``.
     """
     low, high = _range([curve.values for curve in curves])
     wide, tall = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
@@ -160,7 +169,11 @@ def over_time(
     unit, size = ("date", 1.0) if dated else _unit(span)
     begin = (start if dated else 0.0) + float(time[0]) / size
     end = begin + span / size
-    lines = []
+    lines = [
+        f'<rect x="{(a - time[0]) / span * wide:.1f}" y="0" height="{tall}" class="shade" '
+        f'width="{(b - a) / span * wide:.1f}"/>'
+        for a, b in shade
+    ]
     for curve in curves:
         x = (time - time[0]) / span * wide
         y = (high - curve.values) / (high - low) * tall

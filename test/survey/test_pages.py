@@ -160,7 +160,7 @@ def test_figures_of_one_time_are_zoomed_together_and_come_back(loop_file: Path) 
     """
     acted = probe(loop_file, 1400, dark=False, act=act)["acted"]
     wide = float(acted["before"][0].split()[2])
-    assert float(acted["zoomed"][0].split()[2]) == pytest.approx(0.2 * 960 / 880 * wide, rel=0.02)
+    assert float(acted["zoomed"][0].split()[2]) == pytest.approx(0.2 * 960 / 856 * wide, rel=0.02)
     assert acted["zoomed"][1] == acted["zoomed"][0]  # OP goes with PV
     assert acted["back"] == acted["before"]
     assert acted["shown"]

@@ -10,7 +10,7 @@ from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.effects import behaviours
 from stiction_ros.report.page import number
-from stiction_ros.texts import HOUR, spoken
+from stiction_ros.texts import HOUR, spoken, symbol
 
 DIGITS = 3  # of a figure without an interval
 CONTROLLER = {
@@ -88,7 +88,7 @@ def figures_with_units(effect: FoundEffect) -> list[str]:
             between = f", 95 % between {number(ends[0], digits)} and {number(ends[1], digits)}"
         if unit == "s" and value >= HOUR:
             shown += f" ({spoken(value)})"
-        said = f"{key} = {number(value, digits)}{shown}{between}"
+        said = f"{symbol(key)} = {number(value, digits)}{shown}{between}"
         meaning = meanings.get(key, "")
         lines.append(said + (f": {meaning}" * bool(meaning)))
     return lines
@@ -117,5 +117,7 @@ def named_figures(found: Discrepancy, fit: CandidateFit) -> str:
     parts = []
     for entry in behaviour.parameters():
         unit = "" if entry.unit == "1" or "signal" in entry.unit else f" {entry.unit}"
-        parts.append(f"{entry.key} {number(float(getattr(behaviour, entry.attribute)))}{unit}")
+        parts.append(
+            f"{symbol(entry.key)} {number(float(getattr(behaviour, entry.attribute)))}{unit}"
+        )
     return ", ".join(parts)

@@ -11,7 +11,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.pages.plot import SCRIPT, Curve, over_time
+from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, over_time
 from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
@@ -22,9 +22,6 @@ from stiction_ros.report.shapes import free_run, settling, step_response
 from stiction_ros.texts import finite
 
 UNITS = Units("PV units", "% of travel")
-COLOURS = ("stem", "op", "pv", "sp", "free", "ink")
-"""Of the curves of several valves."""
-
 _MEANING = {
     "delta_bic": "BIC by which friction beats the best model without it",
     "variance_ratio": "innovation variance without friction over that with it",
@@ -185,7 +182,7 @@ def _responses(record: Record, found: Identification) -> str:
             np.arange(float(length)) * record.sample_time,
             [
                 Curve(f"{valve} → {model['name']}", kind, step_response(model, valve, length))
-                for valve, kind in zip(record.valves, itertools.cycle(COLOURS), strict=False)
+                for valve, kind in zip(record.valves, itertools.cycle(KINDS), strict=False)
             ],
             f"{text(model['name'])} (PV units)",
         )
