@@ -59,7 +59,7 @@ th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t, tbody th { text-align: left; }
 tbody th { color: inherit; vertical-align: top; }
-.name, td.wordy { overflow-wrap: break-word; } td.wordy { min-width: 14ch; }
+.name { overflow-wrap: break-word; } td.wordy { overflow-wrap: anywhere; min-width: 14ch; }
 ::placeholder { color: var(--soft); opacity: 1; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 16px; font-size: .92rem; }
 dt { font-weight: 600; } dd { margin: 0; max-width: 80ch; }

@@ -103,7 +103,7 @@ class Columns:
             ("t name", "loop"),
             ("t s", "valve"),
             ("t", "cycles by"),
-            ("", "OP lost"),
+            ("s", "OP lost"),
             ("s", "friction f_S"),
             ("", "confidence"),
             ("s", "period"),
