@@ -76,7 +76,8 @@ def embedded(drawing: Drawing) -> str:
 
 def folded(title: str, content: str) -> str:
     """Return preformatted text that opens on a click."""
-    return f"<details><summary>{text(title)}</summary><pre>{text(content.rstrip())}</pre></details>"
+    shown = f'<pre tabindex="0">{text(content.rstrip())}</pre>'
+    return f"<details><summary>{text(title)}</summary>{shown}</details>"
 
 
 def number(value: object, digits: int = 3) -> str:

@@ -10,6 +10,8 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 _BEFORE = """<script>
@@ -126,3 +128,20 @@ def probe(page: Path, width: int, *, dark: bool, act: str = "") -> dict[str, Any
     assert found is not None, done.stderr[-2000:]
     seen: dict[str, Any] = json.loads(html.unescape(found[1]))
     return seen
+
+
+needs_browser = pytest.mark.skipif(chromium() is None, reason="no Chromium is installed")
+
+
+def check(seen: dict[str, Any], width: int, dark: bool) -> None:
+    """Assert that a page can be read at a width, in light or dark, by eye, keyboard and ear."""
+    assert seen["width"] == width
+    assert seen["dark"] is dark
+    assert (seen["paper"] < 0.2) is dark
+    assert seen["scroll"] <= width, seen["wide"]
+    assert seen["wide"] == [], seen["wide"]
+    assert seen["said"] == [], seen["said"]
+    assert seen["empty"] == 0
+    assert seen["pale"] == [], seen["pale"]
+    assert seen["broken"] == [], seen["broken"]
+    assert seen["fetched"] == [], seen["fetched"]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import chromium, probe
+from browser import check, needs_browser, probe
 from made import GAIN, entry, identification, record
 
 from stiction_ros.survey.entry import Entry, Status
@@ -17,8 +17,6 @@ from stiction_ros.survey.pages.trend import Earlier, trend_of, with_trend
 from stiction_ros.survey.pages.unit import with_unit
 from stiction_ros.survey.pages.words import in_op_unit, period
 from stiction_ros.survey.survey import Survey
-
-needs_browser = pytest.mark.skipif(chromium() is None, reason="no Chromium is installed")
 
 EARLIER = (
     Earlier("2023-11-02 03:04+00:00", {"FIC-101.A": 1.0, "OLD1": None}),
@@ -58,25 +56,12 @@ def loop_file(tmp_path: Path) -> Path:
     return page
 
 
-def _check(seen: dict[str, Any], width: int, dark: bool) -> None:
-    assert seen["width"] == width
-    assert seen["dark"] is dark
-    assert (seen["paper"] < 0.2) is dark
-    assert seen["scroll"] <= width, seen["wide"]
-    assert seen["wide"] == []
-    assert seen["said"] == []
-    assert seen["empty"] == 0
-    assert seen["pale"] == []
-    assert seen["broken"] == []
-    assert seen["fetched"] == []
-
-
 @needs_browser
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [1400, 390])
 def test_the_list_is_readable(list_file: Path, width: int, dark: bool) -> None:
     seen = probe(list_file, width, dark=dark)
-    _check(seen, width, dark)
+    check(seen, width, dark)
     for words in ("2 valves to look at", "<b>TIC</b>", "its stamps are <wrong>", "likely source"):
         assert words in seen["text"]
 
@@ -102,7 +87,7 @@ def test_a_list_with_all_columns_and_the_longest_words_is_readable(
     earlier = (Earlier("2023-11-02 03:04+00:00", {row.name: 0.0735123 for row in rows}),)
     page = tmp_path / "survey.html"
     page.write_text(list_page(Survey("local", 2, 12.0, rows, ()), earlier), encoding="utf-8")
-    _check(probe(page, width, dark=False), width, dark=False)
+    check(probe(page, width, dark=False), width, dark=False)
 
 
 @needs_browser
@@ -110,7 +95,7 @@ def test_a_list_with_all_columns_and_the_longest_words_is_readable(
 @pytest.mark.parametrize("width", [1400, 390])
 def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool) -> None:
     seen = probe(loop_file, width, dark=dark)
-    _check(seen, width, dark)
+    check(seen, width, dark)
     for words in ("The valve sticks", "3 values were held", "m³/h", "service the valve"):
         assert words in seen["text"]
 
