@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 OPCUA = "opcua"
 OPCUA_HELP = "; opcua: the tank behind a control system"
 
+SCORES = {"amplitude": "amplitude", "offset": "offset", "iae_per_hour": "IAE per hour"}
+"""Scores of a phase that are printed, and what they are called."""
+
 
 def add(commands: Any) -> None:
     """Add the command to the parser."""
@@ -136,13 +139,13 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
         table.add_column(column)
     phases = summary["phases"]
     for output in phases.get("before", {}):
-        for key in ("amplitude", "offset", "iae_per_hour"):
+        for key in SCORES:
             values = [
                 phases.get(phase, {}).get(output, {}).get(key)
                 for phase in ("before", "after", "stiction_free")
             ]
             cells = ["–" if value is None else f"{value:.4g}" for value in values]
-            table.add_row(output, key, *cells)
+            table.add_row(output, SCORES[key], *cells)
     for valve, label, told in work_rows(summary, ("before", "after", "stiction_free")):
         table.add_row(valve, label, *("–" if value is None else f"{value:.4g}" for value in told))
     console.print(table)

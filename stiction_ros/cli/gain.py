@@ -150,7 +150,7 @@ def show(found: Any, verdict: Mapping[str, Any]) -> None:
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()
-    for name in ("", "measure", "now", "then", "5 to 95 % of the drawn loops"):
+    for name in ("option", "measure", "now", "then", "5 to 95 % of the drawn loops"):
         table.add_column(name)
     for option in found.options:
         for row in _rows(found.now, option):

@@ -143,6 +143,8 @@ def _write(found: Discrepancy, directory: Path) -> None:
 
 
 def _print(found: Discrepancy) -> None:
+    from stiction_ros.report.gap.words import called, plain
+
     console = Console()
     names = ", ".join(record.name for record in found.runs.records)
     console.print(f"{names}: {found.verdict}", markup=False)
@@ -156,7 +158,7 @@ def _print(found: Discrepancy) -> None:
             for k, (key, value) in enumerate(effect.parameters.items()):
                 ends = effect.intervals.get(key)
                 table.add_row(
-                    f"{effect.place} {effect.title}" if k == 0 else "",
+                    called(effect.place, effect.effect) if k == 0 else "",
                     symbol(key),
                     f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
                     "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
@@ -165,22 +167,24 @@ def _print(found: Discrepancy) -> None:
                 )
         console.print(table)
     elif found.alternatives:
-        console.print("one of: " + ", ".join(f"{p} {e}" for p, e in found.alternatives))
+        console.print("one of: " + ", ".join(called(*name) for name in found.alternatives))
     for effect in found.effects:
-        others = " or ".join(f"{place} {name}" for place, name in effect.alternatives)
+        others = " or ".join(called(*name) for name in effect.alternatives)
         told = [effect.sentence, f"it may also be {others}" if others else ""]
         if said := "; ".join(filter(None, told)):
-            console.print(f"{effect.place} {effect.title}: {said}", markup=False)
+            law = "" if effect.law is None else f" (law {effect.law})"
+            name = called(effect.place, effect.effect)
+            console.print(f"{name}{law}: {plain(said)}", markup=False)
     for change in found.process_changes:
         said = f"process to {change.output}: {change.what} {change.value:.4g} {change.unit}"
         console.print(said.removesuffix(" 1"), markup=False)
     console.print(_gaps(found))
     for sentence in found.where:
-        console.print(f"where: {sentence}", markup=False)
+        console.print(f"where: {plain(sentence)}", markup=False)
     if found.experiment:
         console.print(f"to learn more: {found.experiment}", markup=False)
     if found.untestable:
-        listed = ", ".join(f"{t.place} {t.effect}" for t in found.untestable)
+        listed = ", ".join(called(t.place, t.effect) for t in found.untestable)
         console.print(f"not testable here: {listed}", markup=False)
     if found.not_considered:
         reasons: dict[str, set[str]] = {}

@@ -159,12 +159,11 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
     console.print(f"{document['record']}: {found.samples} samples")
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     further = _further(found)
-    for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval"):
-        table.add_column(name)
-    for head in further.values():
-        table.add_column(head)
-        table.add_column("interval")
-    table.add_column("OP lost")
+    table.add_column("valve", overflow="fold")
+    heads = ["verdict", "f_S %", "interval", "f_D %", "interval"]
+    for name in (*heads, *(each for head in further.values() for each in (head, "interval"))):
+        table.add_column(name, no_wrap=True)
+    table.add_column("OP lost", no_wrap=True)
     for valve in found.valves:
         table.add_row(
             valve.name,

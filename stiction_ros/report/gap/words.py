@@ -35,6 +35,7 @@ _SHORT = {
     "sensor": "the sensor of {tag}",
 }
 _PLACE = re.compile(rf"\b({'|'.join(_SHORT)}):(\w+)")
+_FRICTION = re.compile(r"\bf_[sd]\b")
 _WORDS = {
     "pole": "slower process",
     "bias_step": "step of the calibration",
@@ -61,7 +62,8 @@ def word_of(effect: str) -> str:
 
 def plain(sentence: str) -> str:
     """Return a sentence with the places of loop models, such as ``valve:V1``, in words."""
-    return _PLACE.sub(lambda found: _SHORT[found[1]].format(tag=found[2]), sentence)
+    said = _PLACE.sub(lambda found: _SHORT[found[1]].format(tag=found[2]), sentence)
+    return _FRICTION.sub(lambda found: symbol(found[0]), said)
 
 
 def called(place: str, effect: str) -> str:
