@@ -61,7 +61,6 @@ if TYPE_CHECKING:
     from stiction_ros.records.csv_writer import write_csv as write_csv
     from stiction_ros.records.record import Record as Record
     from stiction_ros.records.run.record_to_bag import write_bag as write_bag
-    from stiction_ros.report.record.report import draw_record as draw_record
     from stiction_ros.report.record.report import report_record as report_record
 
 __version__ = "0.1.0"
@@ -90,7 +89,6 @@ _HOMES = {
     "SetPoints": "loop.set_points",
     "StepResult": "control.result",
     "VerdictKind": "identification.result.identification",
-    "draw_record": "report.record.report",
     "find_config": "config_files",
     "find_gap": "discrepancy.workflow:find_discrepancy",
     "fit_linear": "identification.linear.fit",
@@ -129,7 +127,6 @@ __all__ = [
     "StepResult",
     "VerdictKind",
     "__version__",
-    "draw_record",
     "effects",
     "find_config",
     "find_gap",

@@ -48,7 +48,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "gain",
-        help="what service, embedding or retuning would bring",
         description="Simulate what would help a loop: a serviced valve, a controller that knows "
         "the friction, another tuning, or nothing. A record is identified first and the "
         "controller of the record is the baseline; a model needs a controller of its own.",
@@ -59,9 +58,15 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser)
     add_law(parser)
-    parser.add_argument("--valve", metavar="TAG", help="of several valves (default: widest band)")
-    parser.add_argument("--set-points", metavar="F", help="schedule, for a model")
-    parser.add_argument("--samples", type=int, metavar="N", help="of a run, for a model (2000)")
+    parser.add_argument(
+        "--valve",
+        metavar="TAG",
+        help="the valve, where there are several (default: that with the widest band)",
+    )
+    parser.add_argument("--set-points", metavar="F", help="schedule of set-points, with a model")
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="number of samples of a run, with a model (2000)"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run, law=None)
 
@@ -139,7 +144,7 @@ def show(found: Any, verdict: Mapping[str, Any]) -> None:
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()
-    for name in ("", "measure", "now", "then", "5 to 95 % of the drawn loops"):
+    for name in ("option", "measure", "now", "then", "5 to 95 % of the drawn loops"):
         table.add_column(name)
     for option in found.options:
         for row in _rows(found.now, option):

@@ -10,13 +10,29 @@ from stiction_ros.opcua.security import SECURITY, Credentials
 def add_session(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how a session is secured."""
     group = parser.add_argument_group("session")
-    group.add_argument("--security", choices=SECURITY, default=SECURITY[0])
-    group.add_argument("--certificate", default="", metavar="F", help="ours, DER")
-    group.add_argument("--private-key", default="", metavar="F", help="ours, PEM, mode 600")
-    group.add_argument("--server-certificate", default="", metavar="F", help="pinned, DER")
-    group.add_argument("--user", default="", metavar="NAME")
-    group.add_argument("--password-file", default="", metavar="F", help="mode 600")
-    group.add_argument("--password-variable", default="", metavar="NAME", help="of the environment")
+    group.add_argument(
+        "--security", choices=SECURITY, default=SECURITY[0], help="security of the messages"
+    )
+    group.add_argument("--certificate", default="", metavar="F", help="our certificate, DER")
+    group.add_argument(
+        "--private-key", default="", metavar="F", help="our private key, PEM, mode 600"
+    )
+    group.add_argument(
+        "--server-certificate",
+        default="",
+        metavar="F",
+        help="pinned certificate of the server, DER",
+    )
+    group.add_argument("--user", default="", metavar="NAME", help="name of the user")
+    group.add_argument(
+        "--password-file", default="", metavar="F", help="file with the password, mode 600"
+    )
+    group.add_argument(
+        "--password-variable",
+        default="",
+        metavar="NAME",
+        help="environment variable with the password",
+    )
 
 
 def credentials_of(options: argparse.Namespace) -> Credentials:

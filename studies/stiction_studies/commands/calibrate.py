@@ -35,15 +35,32 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "calibrate",
-        help="fit the probability of friction to simulated loops",
         description="Identify simulated loops, fit the probability to their figures, and hold "
         "each loop against what is fitted to others.",
     )
-    parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS), metavar="NAME")
-    parser.add_argument("--seeds", type=seed_range, default=SEEDS, metavar="A:B", help="(0:399)")
-    parser.add_argument("--log", type=Path, metavar="F", help="keep figures there, and go on there")
-    parser.add_argument("--out", type=Path, metavar="F.json", help="write the trees there")
-    parser.add_argument("--ablate", action="store_true", help="also leave out each figure in turn")
+    parser.add_argument(
+        "--worlds",
+        nargs="+",
+        choices=WORLDS,
+        default=list(WORLDS),
+        metavar="NAME",
+        help="worlds of simulated loops (all)",
+    )
+    parser.add_argument(
+        "--seeds", type=seed_range, default=SEEDS, metavar="A:B", help="seeds from A to B (0:399)"
+    )
+    parser.add_argument(
+        "--log",
+        type=Path,
+        metavar="F",
+        help="file that keeps the figures, and from which a run goes on",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="F.json", help="write the fitted trees to this file"
+    )
+    parser.add_argument(
+        "--ablate", action="store_true", help="fit again without each figure in turn"
+    )
     add_jobs(parser)
     parser.set_defaults(run=run)
 

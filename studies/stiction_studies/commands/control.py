@@ -67,14 +67,17 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study-control",
-        help="the exact embedding on the tank when friction or inputs are not as known",
         description="Run the tank of Example 2 under the exact embedding on set-points that no "
         "tuning has seen, with right and wrong friction, unmeasured steps and two sticky valves, "
         "and compare the noise-free outputs with the loop without stiction. Exit code 1 when a "
         "case misses what is asked of it.",
     )
     parser.add_argument(
-        "--seeds", type=seed_range, default=(101, 110), metavar="A:B", help="inclusive (101:110)"
+        "--seeds",
+        type=seed_range,
+        default=(101, 110),
+        metavar="A:B",
+        help="seeds from A to B (101:110)",
     )
     known = ", ".join(choices.CONTROL_CASES)
     parser.add_argument("--cases", metavar="A,B", help=f"some of {known}")

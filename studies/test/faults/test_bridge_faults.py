@@ -149,7 +149,7 @@ def test_where_nothing_is_to_happen_the_plant_must_not_take_over() -> None:
 
 def test_the_page_and_the_command_show_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert table() in PAGE.read_text(encoding="utf-8")
-    assert main(["faults", "--opcua", "--list"]) == 0
+    assert main(["faults", "--opcua"]) == 0
     assert capsys.readouterr().out == table()
 
 

@@ -66,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--family",
         action="append",
         choices=(*choices.BLIND_FAMILIES, choices.PHYSICS),
-        help="of loops; may be repeated (single); physics are loops of bench world",
+        help="family of loops; may be repeated (single); physics are loops of bench world",
     )
     group.add_argument("--first", type=int, metavar="SEED", help=f"first seed ({FIRST_SEED})")
     group.add_argument("--loops", type=int, metavar="N", help=f"loops of each family ({LOOPS})")
