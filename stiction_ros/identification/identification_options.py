@@ -60,7 +60,6 @@ class IdentificationOptions:
         min_moves: fewest stem moves from which anything may be concluded.
         negligible_friction: f_S up to this is healthy, %.
         negligible_share: f_S up to this share of the OP span is healthy.
-        one_step_best: also find the friction and delays of least one-step SE (exact, He's law).
         check_columns: refuse a record in which OP and PV are clearly swapped.
 
     Raises:
@@ -86,7 +85,6 @@ class IdentificationOptions:
     min_moves: int = 6
     negligible_friction: float = 0.3
     negligible_share: float = 0.03
-    one_step_best: bool = True
     check_columns: bool = True
 
     @property

@@ -171,7 +171,7 @@ def test_friction_that_could_sit_in_either_of_two_valves_is_named() -> None:
     twins = Record("twins", 1.0, ("V1", "V2"), ("PV1",), np.repeat(record.op, 2, axis=1), record.pv)
     noise = 1e-6 * np.random.default_rng(0).standard_normal(twins.op.shape)
     twins = dataclasses.replace(twins, op=twins.op + noise)
-    options = dataclasses.replace(THIRD_ORDER, delay=(5, 5), one_step_best=False)
+    options = dataclasses.replace(THIRD_ORDER, delay=(5, 5))
     notes = identify(twins, options).notes
     assert any("friction in V" in note and "as well as in V" in note for note in notes)
 

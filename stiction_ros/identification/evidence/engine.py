@@ -136,7 +136,7 @@ def _identification(
     model, table = _process(small, options, valves, part)
     if part is not record:
         valves, model = _over_all(record, data, valves, model)
-    findings = Findings(model, valves, table, (), None)
+    findings = Findings(model, valves, table, ())
     return dataclasses.replace(conclude(record, data, findings, 0.0), method="evidence")
 
 

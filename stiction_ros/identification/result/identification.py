@@ -225,7 +225,6 @@ class Identification:
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
         search: what the search tried and its squared error; None where a method keeps none.
-            The default search puts the friction and delays of least one-step SE here.
         orders: all orders that were compared.
         row_samples: samples that are one row where the friction was judged.
 

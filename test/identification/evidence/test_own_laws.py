@@ -74,6 +74,6 @@ def test_a_law_that_is_given_is_kept() -> None:
 
 
 def test_the_other_methods_keep_he_s_law() -> None:
-    options = IdentificationOptions("exact", output_order=1, delay=(0, 4), one_step_best=False)
+    options = IdentificationOptions("exact", output_order=1, delay=(0, 4))
     assert identify(pi_loop(3.0, 1.0), options).valves[0].law == "he"
     assert PaperOptions.of(options, "grid").law == "he"
