@@ -63,9 +63,13 @@ OPTIONS = IdentificationOptions()
 @pytest.mark.parametrize(
     ("probability", "against", "said"),
     [
-        (0.9, "held", "is likely (90 %) but not sure: the process found beside it is one that"),
+        (
+            0.9,
+            "loop_gone",
+            "is likely (90 %) but not sure: the simulated loop moves nearly as much",
+        ),
         (0.6, "repeats", "is likely (60 %) but not sure: PV also repeats itself a turn later"),
-        (0.4, "held", "does not rule out f_S up to 1.4 %, 18 % of OP's range"),
+        (0.4, "loop_gone", "does not rule out f_S up to 1.4 %, 18 % of OP's range"),
     ],
 )
 def test_the_reason_is_what_speaks_most_against(
