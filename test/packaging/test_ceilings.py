@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 77_841
+LINES = 77_843
 LINES_OF_STUDIES = 23_743
 NUMERIC_CONSTANTS = 1_013
 

@@ -58,6 +58,8 @@ def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None)
         more += "".join(f"\n{said}" for said in _further(valve))
         if valve["verdict"] == "healthy":
             more = f"f_S at most {percent(valve['f_s_interval'][1])} % of travel"
+        if valve.get("probability") is not None:
+            more += f"\nprobability of friction {valve['probability']:.2f}"
         truth = None if story is None else story.true_friction(valve["name"])
         if truth is not None:
             more += f"\nsimulated with f_S = {truth[0]:g} %, f_D = {truth[1]:g} %"
