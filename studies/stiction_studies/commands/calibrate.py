@@ -7,26 +7,19 @@ import dataclasses
 import functools
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.errors import InputError, storing
-from stiction_ros.identification.judgement.figures import Figures, definitions
-from stiction_studies.calibration.fitting import (
-    Judged,
-    by_folds,
-    counts,
-    fitted,
-    loss,
-    probabilities,
-    reliability,
-)
-from stiction_studies.calibration.loops import WORLDS
 from stiction_studies.judged_log import logged_rows, start_log
 from stiction_studies.seeds import add_jobs, run_each, seed_range
 
+if TYPE_CHECKING:
+    from stiction_studies.calibration.fitting import Judged
+
+WORLDS = ("field", "plain", "quiet", "cascade")
 SEEDS = (0, 399)
 """Of each world, when none are given."""
 
@@ -42,7 +35,7 @@ def add(commands: Any) -> None:
         "--worlds",
         nargs="+",
         choices=WORLDS,
-        default=list(WORLDS),
+        default=WORLDS,
         metavar="NAME",
         help="worlds of simulated loops (all)",
     )
@@ -69,9 +62,11 @@ def judged(log: Path | None, task: tuple[str, int]) -> Judged | None:
     """Return the figures of one loop; None where its truth or the record is not clear."""
     from stiction_ros.identification import identify
     from stiction_ros.records.parts import longest_part
+    from stiction_studies.calibration.fitting import Judged
+    from stiction_studies.calibration.loops import known_loop
 
     world, seed = task
-    loop = WORLDS[world](seed)
+    loop = known_loop(world, seed)
     row = None
     if loop.friction is not None:
         try:
@@ -88,6 +83,8 @@ def judged(log: Path | None, task: tuple[str, int]) -> Judged | None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    from stiction_studies.calibration.fitting import fitted
+
     known: list[Judged] = []
     if options.log is not None:
         known = logged_rows(options.log, True, _row_of) if options.log.exists() else []
@@ -112,6 +109,16 @@ def run(options: argparse.Namespace) -> int:
 
 def show(rows: list[Judged], ablate: bool) -> None:
     """Print how loops are told by trees fitted to others: of all worlds, and of other worlds."""
+    from stiction_ros.identification.judgement.figures import definitions
+    from stiction_studies.calibration.fitting import (
+        by_folds,
+        counts,
+        fitted,
+        loss,
+        probabilities,
+        reliability,
+    )
+
     console = Console()
     folds = by_folds(rows)
     for world in sorted({row.world for row in rows}):
@@ -139,4 +146,7 @@ def show(rows: list[Judged], ablate: bool) -> None:
 
 
 def _row_of(values: Any) -> Judged:
+    from stiction_ros.identification.judgement.figures import Figures
+    from stiction_studies.calibration.fitting import Judged
+
     return Judged(**{**values, "figures": Figures(**values["figures"])})
