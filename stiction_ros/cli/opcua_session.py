@@ -13,26 +13,15 @@ def add_session(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--security", choices=SECURITY, default=SECURITY[0], help="security of the messages"
     )
-    group.add_argument("--certificate", default="", metavar="F", help="our certificate, DER")
-    group.add_argument(
-        "--private-key", default="", metavar="F", help="our private key, PEM, mode 600"
-    )
-    group.add_argument(
-        "--server-certificate",
-        default="",
-        metavar="F",
-        help="pinned certificate of the server, DER",
-    )
-    group.add_argument("--user", default="", metavar="NAME", help="name of the user")
-    group.add_argument(
-        "--password-file", default="", metavar="F", help="file with the password, mode 600"
-    )
-    group.add_argument(
-        "--password-variable",
-        default="",
-        metavar="NAME",
-        help="environment variable with the password",
-    )
+    for name, metavar, text in (
+        ("--certificate", "F", "our certificate, DER"),
+        ("--private-key", "F", "our private key, PEM, mode 600"),
+        ("--server-certificate", "F", "pinned certificate of the server, DER"),
+        ("--user", "NAME", "name of the user"),
+        ("--password-file", "F", "file with the password, mode 600"),
+        ("--password-variable", "NAME", "environment variable with the password"),
+    ):
+        group.add_argument(name, default="", metavar=metavar, help=text)
 
 
 def credentials_of(options: argparse.Namespace) -> Credentials:

@@ -8,9 +8,7 @@ import numpy as np
 
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.candidate import (
-    Judge,
-)
+from stiction_ros.identification.evidence.candidate import Judge
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
 from stiction_ros.identification.evidence.search import Found
 from stiction_ros.identification.friction.grid import coarse_grid, finer_grid

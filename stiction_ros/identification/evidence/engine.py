@@ -27,7 +27,7 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
-from stiction_ros.identification.evidence.response import responds
+from stiction_ros.identification.evidence.response import loss_without_response, responds
 from stiction_ros.identification.evidence.sensor_hold import hold_notes
 from stiction_ros.identification.evidence.unseen import Unseen
 from stiction_ros.identification.friction.grid import find_law
@@ -107,9 +107,10 @@ def concluded(
     best = tuple(_estimate(part, one, j, options) for j, one in enumerate(agreed))
     found = _identification(record, data, part, options, best)
     closed = close_loop(record, found)
-    told = [figures_of(seen, one, j, closed) for j, one in enumerate(agreed)]
+    silent = [[loss_without_response(look, j) for look in seen] for j in range(len(agreed))]
+    told = [figures_of(seen, silent[j], one, j, closed) for j, one in enumerate(agreed)]
     best = tuple(
-        dataclasses.replace(one, responds=responds(seen, j, options.confidence))
+        dataclasses.replace(one, responds=responds(seen, silent[j], j, options.confidence))
         for j, one in enumerate(best)
     )
     judged = tuple(

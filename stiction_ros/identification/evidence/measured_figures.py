@@ -9,7 +9,6 @@ import numpy as np
 from stiction_ros.identification.closed_loop.closed_loop import ClosedLoop
 from stiction_ros.identification.evidence.echoes import echo
 from stiction_ros.identification.evidence.rates import Agreement, Look
-from stiction_ros.identification.evidence.response import loss_without_response
 from stiction_ros.identification.judgement.figures import Figures
 
 ENDLESS = 100.0  # ratio that stands for a movement that grows without end
@@ -17,16 +16,23 @@ FEW = 2.0
 """Nats added to a gain of which a ratio is taken: what two parameters gain by chance."""
 
 
-def figures_of(seen: Sequence[Look], agreed: Agreement, valve: int, closed: ClosedLoop) -> Figures:
+def figures_of(
+    seen: Sequence[Look],
+    silent: Sequence[float],
+    agreed: Agreement,
+    valve: int,
+    closed: ClosedLoop,
+) -> Figures:
     """Return the figures of one valve.
 
     Args:
         seen: each rate.
+        silent: −2 log likelihood at each where PV does not answer the valve.
         agreed: the rates that agree best on its friction.
         valve: index.
         closed: the loops, closed again with the best friction.
     """
-    gains = [_gain(look, valve) for look in seen]
+    gains = [_gain(look, loss, valve) for look, loss in zip(seen, silent, strict=True)]
     sees = [look for look in seen if look.sees_process(valve)] or list(seen)
     material = [0.5 * look.accepted[valve].material_gain for look in sees]
     repeated = max(echo(look.problem, look.found.without[valve]) for look in seen)
@@ -45,7 +51,6 @@ def figures_of(seen: Sequence[Look], agreed: Agreement, valve: int, closed: Clos
     )
 
 
-def _gain(look: Look, valve: int) -> float:
+def _gain(look: Look, silent: float, valve: int) -> float:
     """Return the nats by which friction beats an ideal valve and a PV that does not answer."""
-    silent = loss_without_response(look.problem, look.found.best, valve) - look.found.best.loss
-    return 0.5 * min(look.accepted[valve].gain, silent)
+    return 0.5 * min(look.accepted[valve].gain, silent - look.found.best.loss)

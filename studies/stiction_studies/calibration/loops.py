@@ -44,8 +44,3 @@ WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {
     "quiet": functools.partial(_plain, quiet=True),
     "cascade": functools.partial(_plain, cascade=True),
 }
-
-
-def known_loop(world: str, seed: int) -> KnownLoop:
-    """Return the loop of a seed in a world."""
-    return WORLDS[world](seed)

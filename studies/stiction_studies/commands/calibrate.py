@@ -19,7 +19,7 @@ from stiction_studies.seeds import add_jobs, run_each, seed_range
 if TYPE_CHECKING:
     from stiction_studies.calibration.fitting import Judged
 
-WORLDS = ("field", "plain", "quiet", "cascade")
+NAMES = ("field", "plain", "quiet", "cascade")
 SEEDS = (0, 399)
 """Of each world, when none are given."""
 
@@ -34,8 +34,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--worlds",
         nargs="+",
-        choices=WORLDS,
-        default=WORLDS,
+        choices=NAMES,
+        default=NAMES,
         metavar="NAME",
         help="worlds of simulated loops (all)",
     )
@@ -63,10 +63,10 @@ def judged(log: Path | None, task: tuple[str, int]) -> Judged | None:
     from stiction_ros.identification import identify
     from stiction_ros.records.parts import longest_part
     from stiction_studies.calibration.fitting import Judged
-    from stiction_studies.calibration.loops import known_loop
+    from stiction_studies.calibration.loops import WORLDS
 
     world, seed = task
-    loop = known_loop(world, seed)
+    loop = WORLDS[world](seed)
     row = None
     if loop.friction is not None:
         try:

@@ -10,18 +10,18 @@ import pytest
 
 from stiction_ros.cli.main import main
 from stiction_ros.identification.judgement.figures import definitions
-from stiction_studies.calibration.loops import WORLDS, known_loop
+from stiction_studies.calibration.loops import WORLDS
 from stiction_studies.calibration.plain_loops import plain_loop
 from stiction_studies.commands import calibrate
 
 
 def test_the_command_offers_every_world() -> None:
-    assert set(calibrate.WORLDS) == set(WORLDS)
+    assert set(calibrate.NAMES) == set(WORLDS)
 
 
 @pytest.mark.parametrize("world", [name for name in WORLDS if name != "field"])
 def test_a_seed_makes_the_same_record_again(world: str) -> None:
-    one, other = known_loop(world, 3).record, known_loop(world, 3).record
+    one, other = WORLDS[world](3).record, WORLDS[world](3).record
     assert np.array_equal(one.op, other.op)
     assert np.array_equal(one.pv, other.pv)
     assert (one.sp is None) is (world == "cascade")
