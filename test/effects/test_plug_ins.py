@@ -103,8 +103,9 @@ def test_the_law_is_simulated_and_survives_yaml() -> None:
     assert np.any(record.stem != record.op)
 
 
+@pytest.mark.trial
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize("method", ["exact", pytest.param("evidence", marks=pytest.mark.trial)])
+@pytest.mark.parametrize("method", ["exact", "evidence"])
 def test_all_three_parameters_are_identified_and_nothing_is_certified(method: str) -> None:
     record = record_of(loop().with_valve_effects({"V1": (lopsided(),)}), 450)
     found = identify(record, IdentificationOptions(law="lopsided", method=method))

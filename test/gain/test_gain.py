@@ -264,6 +264,7 @@ def test_a_record_without_a_controller_is_refused(record: Record, found: Identif
         gain_of(dataclasses.replace(record, op=op), dataclasses.replace(found, stem=op))
 
 
+@pytest.mark.trial
 def test_a_model_is_simulated_under_its_own_controller(model: LoopModel) -> None:
     gain = gain_of_model(model, samples=600)
     service, embedding = (gain.option(what).measures for what in (What.SERVICE, What.EMBEDDING))
@@ -323,6 +324,7 @@ def test_jumps_are_less_certain_than_bands(loop: RecordedLoop) -> None:
     assert spreads[0] < spreads[1]
 
 
+@pytest.mark.trial
 def test_loops_that_grow_without_end_are_told(
     record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -141,6 +141,7 @@ def test_options_are_checked(wrong: dict[str, object]) -> None:
         IdentificationOptions(**wrong)  # type: ignore[arg-type]
 
 
+@pytest.mark.trial
 def test_orders_that_were_compared_are_listed() -> None:
     found = identify(loops.example1(0, samples=900))
     assert [row.output_order for row in found.orders] == [1, 2, 3]

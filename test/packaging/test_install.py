@@ -93,7 +93,7 @@ def symlink_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return colcon(tree, tmp_path_factory.mktemp("symlink"), "--symlink-install")
 
 
-@pytest.fixture(params=["pip", "colcon", "symlink"])
+@pytest.fixture(params=["pip", "colcon", pytest.param("symlink", marks=pytest.mark.trial)])
 def prefix(request: pytest.FixtureRequest) -> Path:
     return request.getfixturevalue(f"{request.param}_prefix")
 

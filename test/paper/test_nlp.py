@@ -171,6 +171,7 @@ def test_derivatives_are_those_of_the_objective_and_constraints(law: str) -> Non
         assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
 
 
+@pytest.mark.trial
 def test_no_stable_process_is_a_status() -> None:
     generator = np.random.default_rng(0)
     op = np.sin(np.arange(300) / 9.0)

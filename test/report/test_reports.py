@@ -53,6 +53,7 @@ def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
     assert page.count("data:image/png;base64") == len(FIGURES)
 
 
+@pytest.mark.trial
 def test_one_page_alone(log: RunLog, tmp_path: Path) -> None:
     written = write_run(tell(log), tmp_path / "only.html")
     assert [path.name for path in tmp_path.iterdir()] == ["only.html"]
@@ -74,6 +75,7 @@ def test_a_bag_with_nothing_but_the_signals(log: RunLog, tmp_path: Path) -> None
     assert {p.stem for p in written.files if p.suffix == ".png"} == {"trends", "valves"}
 
 
+@pytest.mark.trial
 def test_a_sticky_valve_without_a_comparison_is_a_warning(log: RunLog, tmp_path: Path) -> None:
     quiet = dataclasses.replace(log.record, pv=log.record.sp)
     page = write_run(tell(dataclasses.replace(log, record=quiet)), tmp_path).page

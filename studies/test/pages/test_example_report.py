@@ -75,6 +75,7 @@ def test_trends_show_measured_and_estimated_signals(tank: Example, found: Identi
     assert labels[1] == ["OP u", "stem χ, true", "stem χ̂, estimated"]
 
 
+@pytest.mark.trial
 def test_the_window_holds_a_set_point_move() -> None:
     for example in (example1(1), example2(1)):
         part = window(example)

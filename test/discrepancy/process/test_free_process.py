@@ -92,6 +92,7 @@ def test_the_model_found_makes_a_controller(sticky: Discrepancy, mode: str) -> N
     assert live.mode == mode
 
 
+@pytest.mark.trial
 def test_a_sound_loop_lacks_nothing() -> None:
     answer = found(recorded(None, seed=4))
     assert answer.effects == ()

@@ -42,6 +42,7 @@ def test_an_ideal_valve_is_not_called_sticky() -> None:
         assert found.valves[0].verdict is not VerdictKind.STICKY
 
 
+@pytest.mark.trial
 def test_friction_is_found_where_a_historian_held_every_other_sample() -> None:
     record = pi_loop(3.0, 1.0, samples=1600, noise=0.1)
     slow = record.pv.copy()

@@ -164,6 +164,7 @@ def test_growing_record_is_reported_unstable() -> None:
     assert fit.reason
 
 
+@pytest.mark.trial
 def test_stable_order_that_loses_to_an_unstable_one_is_doubtful() -> None:
     # OP is a function of PV but for rounding: the record tells no process from the controller.
     random = np.random.default_rng(1)

@@ -54,6 +54,7 @@ def test_friction_is_named_with_value_interval_and_unit(friction: GapFinding) ->
     assert ") %" in friction.text
 
 
+@pytest.mark.trial
 def test_the_same_window_gives_the_same_document(friction: GapFinding) -> None:
     again = find_in_window(loop(), record(sticky(), 900).part(200, 900))
     assert json_text(again.to_json()) == json_text(friction.to_json())

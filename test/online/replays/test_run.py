@@ -275,6 +275,7 @@ def test_a_parameter_of_another_version_is_one_clear_error(bag: Path, tmp_path: 
         replay(copy_bag(bag, tmp_path / "bag", spoil))
 
 
+@pytest.mark.trial
 def test_another_version_and_pace_are_noted(bag: Path, tmp_path: Path) -> None:
     def older(told: str) -> str:
         return told.replace("version: ", "version: 0.0.").replace("lockstep", "realtime")
@@ -298,6 +299,7 @@ def test_a_bag_without_op_has_nothing_to_replay(bag: Path, tmp_path: Path) -> No
             read_replay_bag(path, namespace=namespace)
 
 
+@pytest.mark.trial
 def test_of_several_loops_one_is_chosen_by_its_namespace(bag: Path, tmp_path: Path) -> None:
     path = tmp_path / "two"
     with BagWriter(path) as writer:
