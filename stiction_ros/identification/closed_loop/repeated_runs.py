@@ -11,11 +11,11 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.switching import MovingCells
-from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
+from stiction_ros.signals.movement import moving, size
 from stiction_ros.signals.oscillation import (
     REGULAR,
     oscillation,
@@ -46,6 +46,22 @@ def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
     friction = valve.behaviour()
     form = friction.jump_form() if isinstance(friction, Stiction) else None
     return 0.0, 0.0, 1.0 if form is None else form.overshoot
+
+
+@dataclasses.dataclass(frozen=True)
+class Moved:
+    """How a loop moves when its record is repeated, between moves of its set-point.
+
+    Attributes:
+        with_friction, without_friction: movement of OP over the recorded one.
+        gone: share that goes away with the friction, of OP's movement or of that of PV − SP,
+            whichever is more: a controller that passes noise on to the valve moves OP anyway,
+            and one that is slow hardly moves it at all.
+    """
+
+    with_friction: float
+    without_friction: float
+    gone: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,6 +250,11 @@ class Repeated:
         repeated = np.repeat(sp[None], number, axis=0)
         outside = np.ascontiguousarray(load)
         return run_loops(self.process, Controllers.of(self.pairs), runs, repeated, outside)
+
+
+def gone(stuck: float, free: float) -> float:
+    """Return the share of a movement that is gone where it is another one without a friction."""
+    return max(0.0, 1.0 - free / stuck) if 0.0 < stuck < np.inf else 0.0
 
 
 def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:

@@ -10,7 +10,7 @@ from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,
     close_loop,
 )
-from stiction_ros.identification.closed_loop.damping import ringing
+from stiction_ros.loop.damping import ringing
 from stiction_ros.loop.linear_loops import Process
 
 STICKY = Kind(friction=(3.0, 1.0))
