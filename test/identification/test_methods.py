@@ -34,7 +34,6 @@ def test_each_method_signs_its_result(method: str) -> None:
     assert found.method == method
     document = found.to_json()
     assert document["model"]["method"] == method
-    assert ("search" in document["model"]) is (found.search is not None)
     assert json.loads(json.dumps(document, allow_nan=False))["valves"][0]["name"] == "V1"
 
 

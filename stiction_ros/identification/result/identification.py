@@ -16,7 +16,6 @@ from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 from stiction_ros.identification.result.cause import Cause
-from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability
 
 __all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
@@ -224,7 +223,6 @@ class Identification:
         valves, outputs: estimates in the order of the record.
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
-        search: what the search tried and its squared error; None where a method keeps none.
         orders: all orders that were compared.
         row_samples: samples that are one row where the friction was judged.
 
@@ -251,7 +249,6 @@ class Identification:
     outputs: tuple[OutputModel, ...]
     stem: FloatArray
     notes: tuple[str, ...] = ()
-    search: SearchLog | None = None
     orders: tuple[OrderRow, ...] = ()
     row_samples: int = 1
 
@@ -284,8 +281,6 @@ class Identification:
             "method": self.method,
             "notes": list(self.notes),
         }
-        if self.search is not None:
-            model["search"] = self.search.to_json()
         if self.orders:
             model["orders"] = [dataclasses.asdict(row) for row in self.orders]
         profiles = {v.name: [list(row) for row in v.profile] for v in self.valves if v.profile}
