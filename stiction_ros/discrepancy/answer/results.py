@@ -10,8 +10,7 @@ from stiction_ros.discrepancy.answer.not_considered import NotConsidered, left_o
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck
 from stiction_ros.discrepancy.data.gate import Gate
 from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict
-from stiction_ros.discrepancy.decision.scores import Scores
-from stiction_ros.discrepancy.decision.testable import Testable
+from stiction_ros.discrepancy.decision.scores import Scores, Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import OutputGap
 from stiction_ros.discrepancy.gap.noise_check import OutputNoise
