@@ -40,7 +40,7 @@ class SolvedStart:
         """Whether it may win."""
         return self.feasible and self.stable
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self)
 
@@ -83,6 +83,6 @@ class SearchLog:
         """Runs of IPOPT that ended at their limit of iterations."""
         return sum(start.status == CAPPED for start in self.starts)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self)

@@ -62,7 +62,7 @@ def record_page(
     record: Record, identification: Identification, parts: Sequence[Record] = ()
 ) -> str:
     """Return the report of a record as HTML; ``parts`` are all parts of its source."""
-    found = finite(identification.to_json())
+    found = finite(identification.to_dict())
     headline = verdict_line(found["valves"])
     kicker = (
         f"{record.name}: {len(record)} samples of {record.sample_time:g} s, "
@@ -151,7 +151,7 @@ def _free_runs(record: Record, found: Identification) -> str:
 
 def _responses(record: Record, found: Identification) -> str:
     """Return the response of each PV to a step of each stem."""
-    models = [model.to_json() for model in found.outputs]
+    models = [model.to_dict() for model in found.outputs]
     if not models:
         return ""
     length = settling(models, None)
