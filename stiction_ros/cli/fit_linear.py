@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     with bar("fitting") as show:
         found = fit_linear(record, settings, progress=show)
     if options.json is not None:
-        write_json(options.json, {"record": str(options.record)} | found.to_json())
+        write_json(options.json, {"record": str(options.record)} | found.to_dict())
     if options.json != "-":
         print(f"{loop.name}: {loop.summary}")
         _print(str(options.record), found)

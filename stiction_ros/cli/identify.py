@@ -129,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
         found = search(record, show)
     if options.model is not None:
         _write_model(record, found, options.model)
-    document = {"record": str(options.record)} | found.to_json()
+    document = {"record": str(options.record)} | found.to_dict()
     if options.json is not None:
         write_json(options.json, document)
     if options.json != "-":

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
-from stiction_ros.pages.frame import text
-from stiction_ros.pages.plot import MOST, Curve, against, over_time
+from stiction_ros.intake.record_file import record_of
+from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time
 from stiction_ros.pages.window import Window
 from stiction_ros.records.record import Record
 
@@ -18,6 +22,64 @@ class Units:
 
     pv: str
     op: str
+
+
+UNITS = Units("PV units", "% of travel")
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure:
+    """Figures of a record: a notebook shows them, :meth:`save` writes them.
+
+    Attributes:
+        page: HTML that stands alone.
+    """
+
+    page: str = dataclasses.field(repr=False)
+
+    def _repr_html_(self) -> str:
+        frame = 'title="figures of a record" style="width:100%;height:40em;border:0"'
+        return f'<iframe srcdoc="{text(self.page)}" {frame}></iframe>'
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the figures as a page, such as ``look.html``, and return the file.
+
+        Raises:
+            OSError: nothing can be written there.
+        """
+        target = Path(path)
+        target.write_text(self.page, encoding="utf-8")
+        return target
+
+
+def plot(
+    record: Record | str | os.PathLike[str], identification: Identification | None = None
+) -> Figure:
+    """Return each signal of a record over time; with an identification a close look first.
+
+    Args:
+        record: what was measured, or the path of a file or bag of one loop.
+        identification: of this record. Adds four cycles, PV and stem against OP, and the stem.
+
+    Raises:
+        InputError: the file cannot be read, or the identification has another length.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, plot, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=200)
+        >>> plot(record).save("look.html").name
+        'look.html'
+    """
+    measured, found = record_of(record), identification
+    if found is not None and found.samples != len(measured):
+        said = f"it has {found.samples} samples, the record {len(measured)}"
+        raise InputError(said, where="identification", fix="give that of this record")
+    parts = [f"<h1>{text(measured.name)}</h1>"]
+    stem = None
+    if found is not None:
+        stem = found.stem if found.stem.shape == measured.op.shape else None
+        parts.append(close_look(measured, found, UNITS))
+    return Figure(framed(measured.name, [*parts, all_signals(measured, stem, UNITS)], SCRIPT))
 
 
 def close_look(record: Record, found: Identification, units: Units) -> str:

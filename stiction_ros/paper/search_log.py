@@ -41,7 +41,7 @@ class SolvedStart:
         """Whether it may win."""
         return self.feasible and self.stable
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self)
 
@@ -84,7 +84,7 @@ class SearchLog:
         """Runs of IPOPT that ended at their limit of iterations."""
         return sum(start.status == CAPPED for start in self.starts)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self)
 
@@ -99,9 +99,9 @@ class PaperIdentification(Identification):
 
     search: SearchLog | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
-        document = super().to_json()
+        document = super().to_dict()
         if self.search is not None:
-            document["model"]["search"] = self.search.to_json()
+            document["model"]["search"] = self.search.to_dict()
         return document

@@ -112,7 +112,7 @@ def test_service_is_predicted_as_the_loop_without_friction_does(
 def test_leaving_the_loop_is_now(gain: Gain) -> None:
     left = gain.option(What.LEAVE).measures
     assert left is not None
-    for key, value in left.to_json().items():
+    for key, value in left.to_dict().items():
         assert value == pytest.approx(getattr(gain.now, key))
 
 
@@ -126,7 +126,7 @@ def test_leaving_a_loop_that_is_not_repeated_is_now_too(
 
 
 def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
-    document = gain.to_json()
+    document = gain.to_dict()
     assert [option["what"] for option in document["options"]] == [
         "service",
         "embedding",
@@ -240,7 +240,7 @@ def test_backlash_is_planned_without_a_least_jump(found: Identification) -> None
 def test_the_same_record_gives_the_same_answer(
     gain: Gain, record: Record, found: Identification
 ) -> None:
-    assert gain_of(record, found).to_json() == gain.to_json()
+    assert gain_of(record, found).to_dict() == gain.to_dict()
 
 
 def test_a_healthy_valve_gains_nothing_by_service(record: Record, found: Identification) -> None:

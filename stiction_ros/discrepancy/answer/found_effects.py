@@ -69,7 +69,7 @@ class FoundEffect:
         """Effect with its law, such as ``stiction (xch)``; the effect alone where it has one."""
         return self.effect if self.law is None else f"{self.effect} ({self.law})"
 
-    def to_json(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Return the entry of ``effects`` in ``gap --json``."""
         return {
             "place": self.place,

@@ -114,11 +114,11 @@ class Discrepancy:
         )
         return (*listed, *left_out(self.model_before.outputs, self.gate.alone))
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``."""
         return {
             "verdict": self.verdict.value,
-            "effects": [effect.to_json() for effect in self.effects],
+            "effects": [effect.to_dict() for effect in self.effects],
             "alternatives": [{"place": p, "effect": e} for p, e in self.alternatives],
             "experiment": self.experiment,
             "where": list(self.where),
@@ -126,12 +126,12 @@ class Discrepancy:
                 {"place": t.place, "effect": t.effect, "experiment": t.experiment}
                 for t in self.untestable
             ],
-            "not_considered": [entry.to_json() for entry in self.not_considered],
-            "noise": {each.name: each.to_json() for each in self.noise},
-            "process_changes": [each.to_json() for each in self.process_changes],
+            "not_considered": [entry.to_dict() for entry in self.not_considered],
+            "noise": {each.name: each.to_dict() for each in self.noise},
+            "process_changes": [each.to_dict() for each in self.process_changes],
             "gap": {
-                "before": {gap.name: gap.to_json() for gap in self.before},
-                "after": {gap.name: gap.to_json() for gap in self.after},
+                "before": {gap.name: gap.to_dict() for gap in self.before},
+                "after": {gap.name: gap.to_dict() for gap in self.after},
                 "closed": self.closed,
             },
             "model_before": self.model_before.to_mapping(),

@@ -70,7 +70,7 @@ class Figures:
         "the cycle is not of the kind that friction makes",
     )
 
-    def to_json(self) -> dict[str, float]:
+    def to_dict(self) -> dict[str, float]:
         """Return the figures by name."""
         return dataclasses.asdict(self)
 

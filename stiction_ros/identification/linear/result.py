@@ -123,7 +123,7 @@ class LinearIdentification:
             name,
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``fit-linear --json`` but for ``record``."""
         outputs = []
         for i, tag in enumerate(self.outputs):

@@ -126,7 +126,7 @@ class ValveEstimate:
         form = law.jump_form() if isinstance(law, Stiction) else None
         return self if form is None else dataclasses.replace(self, jump=form.least)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
         return {
             "name": self.name,
@@ -134,7 +134,7 @@ class ValveEstimate:
             "probability": self.probability,
             "band_share": self.band_share,
             "responds": self.responds,
-            "stability": None if self.stability is None else self.stability.to_json(),
+            "stability": None if self.stability is None else self.stability.to_dict(),
             "law": self.law,
             "f_s": self.static_friction,
             "f_s_interval": list(self.static_interval),
@@ -179,7 +179,7 @@ class OutputModel:
     fit_free_run: float
     cause: Cause | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
         return {
             "name": self.name,
@@ -190,7 +190,7 @@ class OutputModel:
             "noise_std": self.noise_std,
             "fit_one_step": self.fit_one_step,
             "fit_free_run": self.fit_free_run,
-            "cause": None if self.cause is None else self.cause.to_json(),
+            "cause": None if self.cause is None else self.cause.to_dict(),
         }
 
 
@@ -272,7 +272,7 @@ class Identification:
 
         return as_table(self)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
         model: dict[str, Any] = {
             "kind": "arx",
@@ -295,6 +295,6 @@ class Identification:
                 "sample_time": self.sample_time,
                 "used": self.row_samples * self.sample_time,
             },
-            "valves": [valve.to_json() for valve in self.valves],
-            "outputs": [output.to_json() for output in self.outputs],
+            "valves": [valve.to_dict() for valve in self.valves],
+            "outputs": [output.to_dict() for output in self.outputs],
         }

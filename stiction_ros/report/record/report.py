@@ -13,7 +13,7 @@ from stiction_ros.identification import Identification, ValveEstimate
 from stiction_ros.identification.judgement.figures import definitions
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, over_time
-from stiction_ros.pages.signals import Units, all_signals, close_look
+from stiction_ros.pages.signals import UNITS, all_signals, close_look
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
 from stiction_ros.report.page import Cell, duration, number, page_file, table
@@ -21,8 +21,6 @@ from stiction_ros.report.record.sections import lead, stability_table, work_tabl
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
 from stiction_ros.report.shapes import free_run, settling, step_response
 from stiction_ros.texts import finite
-
-UNITS = Units("PV units", "% of travel")
 
 
 def report_record(
@@ -62,7 +60,7 @@ def record_page(
     record: Record, identification: Identification, parts: Sequence[Record] = ()
 ) -> str:
     """Return the report of a record as HTML; ``parts`` are all parts of its source."""
-    found = finite(identification.to_json())
+    found = finite(identification.to_dict())
     headline = verdict_line(found["valves"])
     kicker = (
         f"{record.name}: {len(record)} samples of {record.sample_time:g} s, "
@@ -151,7 +149,7 @@ def _free_runs(record: Record, found: Identification) -> str:
 
 def _responses(record: Record, found: Identification) -> str:
     """Return the response of each PV to a step of each stem."""
-    models = [model.to_json() for model in found.outputs]
+    models = [model.to_dict() for model in found.outputs]
     if not models:
         return ""
     length = settling(models, None)

@@ -55,7 +55,7 @@ def work_table(record: Record, found: Identification) -> str:
 
 def stability_table(found: Identification) -> str:
     """Return how the answer holds at other rates and in the halves of the record."""
-    rate = found.to_json()["rate"]
+    rate = found.to_dict()["rate"]
     rows: list[list[Cell]] = []
     for valve in found.valves:
         for look in () if valve.stability is None else valve.stability.tried:

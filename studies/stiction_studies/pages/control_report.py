@@ -63,7 +63,7 @@ class PlantStudy:
         """Return the mean over the seeds by column key."""
         return {c.key: mean_score([score[c.key] for score in self.scores]) for c in COLUMNS}
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return options, means and the figures of every seed."""
         return {
             "options": dataclasses.asdict(self.options),
@@ -71,8 +71,8 @@ class PlantStudy:
             "columns": {
                 column.key: {
                     "title": column.title,
-                    "mean": self.means()[column.key].to_json(),
-                    "by_seed": [score[column.key].to_json() for score in self.scores],
+                    "mean": self.means()[column.key].to_dict(),
+                    "by_seed": [score[column.key].to_dict() for score in self.scores],
                 }
                 for column in COLUMNS
             },

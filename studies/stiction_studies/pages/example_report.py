@@ -63,7 +63,7 @@ def report_example(
         comparison: of the two.
         target: the ``.html`` file; its folder is there.
     """
-    values = finite(found.to_json())
+    values = finite(found.to_dict())
     headline = f"{TITLES[example.name]}: {verdict_line(values['valves'])}"
     record = example.record
     kicker = (
@@ -111,7 +111,7 @@ def draw_example(example: Example, found: Identification) -> tuple[Drawing, ...]
                 "Response of each PV to a stem step of 1 %, of the actual and of the identified "
                 "process" + (", the tank linearised." if _is_tank(example) else "."),
                 draw_responses(
-                    [output.to_json() for output in found.outputs],
+                    [output.to_dict() for output in found.outputs],
                     record,
                     example.truth,
                     _units(example),

@@ -272,7 +272,7 @@ def test_samples_that_stand_alone_are_listed_as_not_searched() -> None:
     (told,) = [entry for entry in answer.not_considered if entry.effect == "spikes"]
     assert told.place == "sensor"
     assert told.reason.startswith("samples of PV1 that stand alone, 10 of them, were left out")
-    assert told.to_json() in answer.to_json()["not_considered"]
+    assert told.to_dict() in answer.to_dict()["not_considered"]
     assert "spikes" not in {
         entry.effect
         for entry in find_discrepancy(loop(), [sound], GapOptions(quick=True)).not_considered

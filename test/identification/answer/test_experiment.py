@@ -121,7 +121,7 @@ def test_only_undecided_valves_get_an_experiment(record: Record) -> None:
         valve = dataclasses.replace(undecided(), verdict=kind)
         (told,) = advised(record, answer(valve), OPTIONS).valves
         assert bool(told.experiment) is (kind is VerdictKind.UNDECIDED)
-        assert (told.to_json()["experiment"] is None) is (kind is not VerdictKind.UNDECIDED)
+        assert (told.to_dict()["experiment"] is None) is (kind is not VerdictKind.UNDECIDED)
 
 
 @pytest.mark.parametrize(

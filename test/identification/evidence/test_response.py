@@ -24,7 +24,7 @@ def test_a_stem_that_never_moves_is_named() -> None:
     valve = stuck(3).valves[0]
     assert not valve.responds
     assert not valve.verdict.has_friction
-    assert valve.to_json()["responds"] is False
+    assert valve.to_dict()["responds"] is False
     assert valve.experiment.startswith("PV does not answer OP of V1: the stem is stuck")
 
 

@@ -133,7 +133,7 @@ def test_what_the_process_cannot_hold_is_in_the_provenance() -> None:
 def test_json_is_json_and_holds_every_rival(kind: LinearKind) -> None:
     record, _ = open_loop(2, 0.05)
     found = fit_linear(record, LinearOptions(kind=kind))
-    document = json.loads(json.dumps(found.to_json()))
+    document = json.loads(json.dumps(found.to_dict()))
     assert document["model"]["kind"] == kind.value
     assert [entry["name"] for entry in document["outputs"]] == list(record.outputs)
     for entry in document["outputs"]:
@@ -148,7 +148,7 @@ def test_json_is_json_and_holds_every_rival(kind: LinearKind) -> None:
 def test_bias_of_the_json_is_in_absolute_units() -> None:
     record, _ = open_loop(1, 0.0)
     found = fit_linear(record, LinearOptions(kind=LinearKind.ARX, output_order=2, delay=(0, 0)))
-    entry = found.to_json()["outputs"][0]
+    entry = found.to_dict()["outputs"][0]
     k = 700
     y, u = record.pv[:, 0], record.op
     right = entry["bias"] - sum(a * y[k - i - 1] for i, a in enumerate(entry["a"]))

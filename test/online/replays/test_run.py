@@ -104,7 +104,7 @@ def test_the_whole_replay_is_equal_without_notes(whole: Replay) -> None:
 def test_the_json_tells_fits_modes_and_swap(
     whole: Replay, live: tuple[Path, LiveRun], swap: int
 ) -> None:
-    document = whole.to_json()
+    document = whole.to_dict()
     assert document["match"] == "equal"
     assert document["swap"] == {"recorded": swap, "replayed": swap}
     fits = live[1].fits
@@ -141,7 +141,7 @@ def test_with_all_recorded_fits_the_swap_of_a_late_bag_is_the_same(
     found = replay(cut_bag(bag, tmp_path / "bag", first=121.0))
     assert found.modes is not None
     assert (found.modes.match, found.modes.difference) == (Match.EQUAL, "")
-    assert found.to_json()["swap"] == {"recorded": swap, "replayed": swap}
+    assert found.to_dict()["swap"] == {"recorded": swap, "replayed": swap}
 
 
 def test_where_trust_is_not_known_no_mode_is_compared(bag: Path, tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def _draw(
     for label, values in printed:
         axis.plot(at, values, color=GREY, linestyle=(0, (5, 2)), label=label)
     for method, label, colour in METHODS:
-        output = sources.found(number, method).identification.outputs[i].to_json()
+        output = sources.found(number, method).identification.outputs[i].to_dict()
         axis.plot(at, step_response(output, valve, count), color=colour, label=label)
 
 
