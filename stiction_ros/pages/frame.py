@@ -59,6 +59,7 @@ th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t, tbody th { text-align: left; }
 tbody th { color: inherit; vertical-align: top; }
+table:not(.list) td.t { overflow-wrap: anywhere; min-width: 7ch; }
 .name { overflow-wrap: break-word; } td.wordy { overflow-wrap: anywhere; min-width: 14ch; }
 ::placeholder { color: var(--soft); opacity: 1; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 16px; font-size: .92rem; }
@@ -123,6 +124,7 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
     border-bottom: 1px solid var(--line); }
   table.list thead tr { display: flex; flex-wrap: wrap; gap: 0 16px; align-items: baseline; }
   table.list thead tr::before { content: "Sort by"; color: var(--soft); }
+  table.list thead .name { min-width: 0; }
   table.list th button { min-height: 30px; text-decoration: underline; }
   table.list tr[hidden] { display: none; }
   table.list td, table.list th { border: 0; padding: 2px 0; text-align: left; min-width: 0;

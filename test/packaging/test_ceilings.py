@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 77_491
+LINES = 77_494
 LINES_OF_STUDIES = 23_976
 NUMERIC_CONSTANTS = 974
 

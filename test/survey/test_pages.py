@@ -101,20 +101,24 @@ def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool)
 
 
 @needs_browser
-def test_the_list_sorts_filters_and_searches(list_file: Path) -> None:
+@pytest.mark.parametrize("width", [1400, 390])
+def test_the_list_sorts_filters_and_searches(list_file: Path, width: int) -> None:
     act = """
       const names = () => [...document.querySelectorAll("table.list tbody tr")]
         .filter(row => !row.hidden).map(row => row.querySelector(".name").innerText);
       const head = [...document.querySelectorAll("th button")]
         .find(one => one.innerText.startsWith("probability"));
+      const box = head.getBoundingClientRect();
       head.click(); const down = names(); head.click(); const up = names();
       const put = (id, value) => { const input = document.getElementById(id);
         input.value = value; input.dispatchEvent(new Event("input")); };
       put("kind", "healthy"); const healthy = names(); put("kind", "");
       put("search", "wrong xic"); const searched = names(); put("search", "");
-      return { up, down, healthy, searched, all: names().length };
+      const seen = box.right <= innerWidth && box.width;
+      return { up, down, healthy, searched, all: names().length, seen };
     """
-    acted = probe(list_file, 1400, dark=False, act=act)["acted"]
+    acted = probe(list_file, width, dark=False, act=act)["acted"]
+    assert acted["seen"] > 20
     assert acted["up"][0] == "LIC7"
     assert acted["down"][0] == "<b>TIC</b>"
     assert acted["up"][-1] == acted["down"][-1] == "XIC"

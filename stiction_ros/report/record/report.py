@@ -100,7 +100,7 @@ def evidence_table(valves: Sequence[ValveEstimate]) -> str:
         return ""
     rows: list[list[Cell]] = [
         [
-            f"{key.replace('_', ' ')}, {meaning['unit']}: {meaning['definition']}",
+            f"{key.replace('_', ' ')} ({meaning['unit']}): {meaning['definition']}",
             *[number(getattr(valve.figures, key)) for valve in told],
         ]
         for key, meaning in definitions().items()
