@@ -179,7 +179,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
             f"{valve.dynamic_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
             *(cell for key in further for cell in _cells(valve, key)),
-            f"{100 * valve.band_share:.0f} %" if valve.band_share > 0.0 else "",
+            f"{100 * min(valve.band_share, 1.0):.0f} %" if valve.band_share > 0.0 else "",
         )
     console.print(table)
     if found.row_samples > 1:

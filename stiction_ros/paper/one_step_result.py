@@ -175,7 +175,7 @@ def result(
         starts=answer.starts,
     )
     notes += [
-        f"delay of {valve} to {output.name} is the longest tried, try a wider range with --delay"
+        f"the delay from valve {valve} to {output.name} is the longest tried; widen --delay"
         for output in outputs
         for valve, delay in output.delay.items()
         if delay == high > low

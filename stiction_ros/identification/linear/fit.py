@@ -147,7 +147,7 @@ def fit_linear(
     report(1.0)
     low, high = options.delay
     notes = tuple(
-        f"delay of {valve} to {output} is the longest tried, try a wider range with --delay"
+        f"the delay from valve {valve} to {output} is the longest tried; widen --delay"
         for i, output in enumerate(found.outputs)
         for j, valve in enumerate(found.valves)
         if found.delay[i, j] == high > low

@@ -13,7 +13,9 @@ from matplotlib.figure import Figure
 
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.paper.controllers.weights import ProgrammeCost
-from stiction_ros.report.drawing import (
+from stiction_ros.report.page import Cell, number, table
+from stiction_ros.report.run.story import TANK_UNITS
+from stiction_studies.drawing import (
     BLUE,
     DPI,
     GREY,
@@ -21,10 +23,9 @@ from stiction_ros.report.drawing import (
     ORANGE,
     Drawing,
     data_limits,
+    embedded,
     style,
 )
-from stiction_ros.report.page import Cell, embedded, number, table
-from stiction_ros.report.run.story import TANK_UNITS
 from stiction_studies.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
 from stiction_studies.pages.control_scores import ColumnScore, mean_score, score_trial
 

@@ -68,7 +68,7 @@ OPTIONS = IdentificationOptions()
             "loop_gone",
             "is likely (90 %) but not sure: the simulated loop moves nearly as much",
         ),
-        (0.6, "repeats", "is likely (60 %) but not sure: PV also repeats itself a turn later"),
+        (0.6, "repeats", "is likely (60 %) but not sure: PV also repeats itself one cycle later"),
         (0.4, "loop_gone", "does not rule out f_S up to 1.4 %, 18 % of OP's range"),
     ],
 )

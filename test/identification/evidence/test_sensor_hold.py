@@ -65,7 +65,7 @@ def test_what_was_measured_stays(seed: int) -> None:
 def test_a_sensor_that_freezes_makes_no_friction(seed: int) -> None:
     found = identify(frozen(pi_loop(0.0, 0.0, seed=seed), seed))
     assert not found.valves[0].verdict.has_friction
-    assert any("PV1 was stale for" in note for note in found.notes)
+    assert any("measurement PV1 was stale for" in note for note in found.notes)
 
 
 @pytest.mark.trial

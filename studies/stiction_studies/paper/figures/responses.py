@@ -9,8 +9,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification
-from stiction_ros.report.drawing import BLUE, GREEN, GREY, ORANGE, Drawing, panels, style
 from stiction_ros.report.shapes import step_response, true_response
+from stiction_studies.drawing import BLUE, GREEN, GREY, ORANGE, Drawing, panels, style
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
 from stiction_studies.paper.sources import Sources
