@@ -111,9 +111,9 @@ def changed(settings: Any, values: Mapping[str, Any], node: str, configured: boo
 
     Args:
         settings: in force.
-        values: to be changed, by names of settings.
+        values: to be changed, by name.
         node: its full name.
-        configured: whether the node is; at rest it reads all when it is configured.
+        configured: whether it is; at rest a node reads all when it is configured.
 
     Raises:
         InputError: a value that cannot be used, or that would change nothing.
@@ -128,12 +128,9 @@ def changed(settings: Any, values: Mapping[str, Any], node: str, configured: boo
         if value == getattr(settings, entry.name):
             continue
         if configured and entry.fixed:
-            rest = f"call ros2 lifecycle set {node} deactivate, then cleanup, and set it before"
-            raise InputError(
-                "cannot change while the node is configured",
-                where=where,
-                fix=f"{rest} configure and activate; or {start}",
-            )
+            rest = f"deactivate and clean it up (ros2 lifecycle set {node} …), set it, configure"
+            what = "cannot change while the node is configured"
+            raise InputError(what, where=where, fix=f"{rest} and activate it; or {start}")
         if configured and other and getattr(settings, other) != needed:
             found = f"{other} is {getattr(settings, other)}"
             raise InputError(f"has no effect while {found}", where=where, fix=f"use {needed}")

@@ -8,7 +8,7 @@ from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.estimator.live import EstimatorSettings
 from stiction_ros.online.monitor.gap_monitor import MonitorRule
 from stiction_ros.online.pairing import BRIDGED, Pairing
-from stiction_ros.online.plain_settings import PACES, NodeSettings
+from stiction_ros.online.plain_settings import PACES, SPEED, NodeSettings, speed_setting
 from stiction_ros.settings import setting
 
 
@@ -23,13 +23,7 @@ class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
         choices=PACES,
         fixed=True,
     )
-    speed: float = setting(
-        1.0,
-        "simulated seconds per second of realtime pace, as of the plant",
-        low=1e-3,
-        high=1e6,
-        beside=("pace", "realtime"),
-    )
+    speed: float = speed_setting(f"{SPEED}, as of the plant")
     sp_source: str = setting(
         "schedule",
         "schedule: in lockstep each pv has its own sp; external: the last (transient local) holds",
@@ -54,13 +48,7 @@ class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
         choices=PACES,
         fixed=True,
     )
-    speed: float = setting(
-        1.0,
-        "simulated seconds per second of realtime pace",
-        low=1e-3,
-        high=1e6,
-        beside=("pace", "realtime"),
-    )
+    speed: float = speed_setting()
     monitor_model: str = setting(
         "",
         "loop model file the monitor compares with; empty for the loop as it is identified",

@@ -6,10 +6,17 @@ They stand apart so that these nodes load nothing of control and identification.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from stiction_ros.settings import setting
 
 PACES = ("lockstep", "realtime")
+SPEED = "simulated seconds per second of realtime pace"
+
+
+def speed_setting(description: str = SPEED) -> Any:
+    """Declare the speed, which has no effect in lockstep."""
+    return setting(1.0, description, low=1e-3, high=1e6, beside=("pace", "realtime"))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,13 +54,7 @@ class PlantNodeSettings(NodeSettings):
         choices=PACES,
         fixed=True,
     )
-    speed: float = setting(
-        1.0,
-        "simulated seconds per second of realtime pace",
-        low=1e-3,
-        high=1e6,
-        beside=("pace", "realtime"),
-    )
+    speed: float = speed_setting()
     commander: str = setting(
         "controller",
         "the only node whose op is taken, as it names itself in frame_id; without a leading "
