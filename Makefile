@@ -27,7 +27,8 @@ setup: $(DONE)
 # A first or broken-off installation starts from an empty environment; after that only what
 # has changed is installed. The package and its studies are installed editable, so that the
 # command and the nodes follow the tree; install_data adds what an editable installation leaves out:
-# launchers, marker and config files. $(BIN)/python is missing when its Python has gone.
+# launchers, marker and config files. Bytecode is made when a module is first imported, as most
+# modules of the packages never are. $(BIN)/python is missing when its Python has gone.
 $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	@test -e $@ -a -x $(BIN)/python || { $(find-python); \
 	    echo "setup: new environment $(VENV) with `$$python --version`"; \

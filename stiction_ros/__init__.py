@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from stiction_ros.online.session import LiveRun as LiveRun
     from stiction_ros.online.session import Scenario as Scenario
     from stiction_ros.online.session import run_live as run_live
+    from stiction_ros.pages.signals import plot as plot
     from stiction_ros.records.csv_writer import write_csv as write_csv
     from stiction_ros.records.record import Record as Record
     from stiction_ros.records.run.record_to_bag import write_bag as write_bag
@@ -93,6 +94,7 @@ _HOMES = {
     "find_gap": "discrepancy.workflow:find_discrepancy",
     "fit_linear": "identification.linear.fit",
     "identify": "identification.methods",
+    "plot": "pages.signals",
     "prbs_experiment": "loop.excitation",
     "read": "intake.record_file",
     "report_record": "report.record.report",
@@ -132,6 +134,7 @@ __all__ = [
     "find_gap",
     "fit_linear",
     "identify",
+    "plot",
     "prbs_experiment",
     "read",
     "report_record",

@@ -77,6 +77,7 @@ def test_machine_code_is_kept_where_the_environment_says(package: Path, tmp_path
     assert not codes(package)
 
 
+@pytest.mark.trial
 def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(
     package: Path, tmp_path: Path
 ) -> None:
@@ -133,6 +134,7 @@ def helped(package: Path) -> list[str]:
     return told.stdout.split()
 
 
+@pytest.mark.trial
 def test_others_help_once_and_only_where_something_is_compiled(package: Path) -> None:
     assert helped(package) == ["helped"]
     assert helped(package) == []

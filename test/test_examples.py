@@ -17,7 +17,10 @@ FOLDER = Path(__file__).resolve().parents[1] / "examples"
 FILES = sorted(FOLDER.glob("*.py"))
 USERS = ("control engineers", "maintenance planners", "researchers", "ROS engineers")
 SCREEN = 72  # lines
-LONG = ("04_rank_many_loops", "08_a_live_loop", "09_bags", "10_add_a_friction_law")
+LONG = (
+    *("04_rank_many_loops", "05_fit_a_linear_model", "06_what_does_the_simulation_miss"),
+    *("08_a_live_loop", "09_bags", "10_add_a_friction_law"),
+)
 
 # What it is called with here, and what its output must hold.
 SMALL: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {

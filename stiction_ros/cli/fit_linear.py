@@ -53,7 +53,6 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: 1 to 3)")
     parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
-    parser.add_argument("--nc", type=int, metavar="N", help="order n_c of armax (default: n_a)")
     parser.add_argument(
         "--criterion", default="bic", choices=searches.CRITERIA, help="criterion of the order (bic)"
     )
@@ -80,14 +79,13 @@ def run(options: argparse.Namespace) -> int:
     record = longest_part(loop.parts)
     from stiction_ros.identification.linear.data import LinearKind, LinearStatus, OrderCriterion
     from stiction_ros.identification.linear.fit import LinearOptions, fit_linear
-    from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
+    from stiction_ros.signals.subspace_projection import SubspaceMethod
 
     settings = LinearOptions(
         kind=LinearKind(options.kind),
         order=options.order,
         output_order=options.na,
         input_order=options.nb,
-        noise_order=options.nc,
         delay=options.delay,
         criterion=OrderCriterion(options.criterion),
         method=SubspaceMethod(options.method),
@@ -95,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     with bar("fitting") as show:
         found = fit_linear(record, settings, progress=show)
     if options.json is not None:
-        write_json(options.json, {"record": str(options.record)} | found.to_json())
+        write_json(options.json, {"record": str(options.record)} | found.to_dict())
     if options.json != "-":
         print(f"{loop.name}: {loop.summary}")
         _print(str(options.record), found)
@@ -152,13 +150,12 @@ def _rivals(found: LinearIdentification) -> Table:
             delays = " ".join(map(str, found.detail.delay))
             _row(table, ("all", str(rival.order), delays), figures, taken)
         return table
-    judged = found.detail[0].judged
-    table.title = f"orders, AIC and BIC of the {judged.replace('_', '-')} error"
+    table.title = "orders, AIC and BIC of the free-run error"
     for tag, choice in zip(found.outputs, found.detail, strict=True):
-        for row in choice.best_of_each_order():
-            figures = (*row.values(judged), row.fit_one_step, row.fit_free_run)
-            orders = f"{row.orders.output} {row.orders.input} {row.orders.noise}"
-            _row(table, (tag, orders, " ".join(map(str, row.delays))), figures, row.chosen)
+        for fit in choice.best_of_each_order():
+            figures = (fit.aic, fit.bic, fit.fit_one_step, fit.fit_free_run)
+            orders = f"{fit.orders.output} {fit.orders.input}"
+            _row(table, (tag, orders, " ".join(map(str, fit.delays))), figures, fit is choice.fit)
     return table
 
 

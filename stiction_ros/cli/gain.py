@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
         found = _of_model(options)
     else:
         found, verdict = _of_record(options)
-    document = {"record": str(options.record)} | verdict | found.to_json()
+    document = {"record": str(options.record)} | verdict | found.to_dict()
     hand_over(options.json, document, lambda: show(found, verdict))
     return 0
 
@@ -129,7 +129,7 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
 def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str, Any]:
     """Return what was found of the valve that was looked at, as it stands in the JSON."""
     index = record.valves.index(gain.valve)
-    valve = identified.valves[index].to_json()
+    valve = identified.valves[index].to_dict()
     keys = ("verdict", "probability", "law", "f_s", "f_s_interval", "f_d", "f_d_interval")
     return {key: valve[key] for key in keys}
 

@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
         found = find_discrepancy(model, records, settings, progress=show)
     if options.out is not None:  # first: who reads what is printed may stop doing so
         _write(found, Path(options.out))
-    hand_over(options.json, found.to_json(), lambda: _print(found))
+    hand_over(options.json, found.to_dict(), lambda: _print(found))
     return EXIT_CODES[found.verdict]
 
 

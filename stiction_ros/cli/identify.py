@@ -129,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
         found = search(record, show)
     if options.model is not None:
         _write_model(record, found, options.model)
-    document = {"record": str(options.record)} | found.to_json()
+    document = {"record": str(options.record)} | found.to_dict()
     if options.json is not None:
         write_json(options.json, document)
     if options.json != "-":
@@ -179,7 +179,7 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
             f"{valve.dynamic_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
             *(cell for key in further for cell in _cells(valve, key)),
-            f"{100 * valve.band_share:.0f} %" if valve.band_share > 0.0 else "",
+            f"{100 * min(valve.band_share, 1.0):.0f} %" if valve.band_share > 0.0 else "",
         )
     console.print(table)
     if found.row_samples > 1:

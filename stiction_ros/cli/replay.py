@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
         found = replay(options.bag, namespace=options.namespace, progress=show)
     hand_over(
         options.json,
-        found.to_json() | {"bag": str(options.bag)},
+        found.to_dict() | {"bag": str(options.bag)},
         lambda: _print(str(options.bag), found),
     )
     return 1 if found.match is Match.DIFFERENT else 0

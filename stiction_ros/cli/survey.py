@@ -144,7 +144,7 @@ def run(options: argparse.Namespace) -> int:
     if plan.out is not None:
         _write(found, plan.out, earlier)
     if options.json is not None:
-        write_json(options.json, found.to_json())
+        write_json(options.json, found.to_dict())
     if options.json != "-":
         print_list(found, earlier)
     list_at = "no list and no page was written; --out DIR writes them"

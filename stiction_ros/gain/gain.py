@@ -136,9 +136,9 @@ class Option:
                 found[key] = self.interval[key]
         return dict(sorted(found.items(), reverse=True))
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return an entry of ``options`` of ``gain --json``."""
-        measures = dict.fromkeys(KEYS) if self.measures is None else self.measures.to_json()
+        measures = dict.fromkeys(KEYS) if self.measures is None else self.measures.to_dict()
         return {
             "what": self.what.value,
             **measures,
@@ -169,13 +169,13 @@ class Gain:
         """Return one option."""
         return next(option for option in self.options if option.what is what)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gain --json``."""
         return {
             "valve": self.valve,
             "output": self.output,
-            "now": self.now.to_json(),
-            "options": [option.to_json() for option in self.options],
+            "now": self.now.to_dict(),
+            "options": [option.to_dict() for option in self.options],
             "notes": list(self.notes),
         }
 

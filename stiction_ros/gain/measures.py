@@ -45,7 +45,7 @@ class Measures:
     reversals_per_hour: float
     period: float | None = None
 
-    def to_json(self) -> dict[str, float | None]:
+    def to_dict(self) -> dict[str, float | None]:
         """Return the mapping of ``gain --json``."""
         return dataclasses.asdict(self)
 

@@ -57,7 +57,7 @@ def compile_end() -> None:
     past = np.zeros((1, 3, 1))
     law = np.array([[0.0, 0.0, 1.0]])
     runs = Runs(np.zeros((1, 1, 2)), np.zeros((1, 1, 3)), past, past, np.zeros((1, 1)), law)
-    run_loops(process, controllers, runs, np.zeros((1, 4, 1)), np.zeros((1, 4, 1)), True)
+    run_loops(process, controllers, runs, np.zeros((1, 4, 1)), np.zeros((1, 4, 1)))
 
 
 def _begin() -> None:

@@ -145,9 +145,8 @@ def run_loops(
     runs: Runs,
     sp: FloatArray,
     load: FloatArray,
-    pv_too: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return OP, shape (R, n, m), and PV, shape (R, n, p), where it is asked for.
+    """Return OP, shape (R, n, m), and PV, shape (R, n, p).
 
     Several runs go side by side, each computed as it would be alone.
 
@@ -158,13 +157,12 @@ def run_loops(
             longest lag.
         sp: set-points, shape (R, H + n, p).
         load: added to PV behind the process, shape (R, H + n, p).
-        pv_too: whether PV is asked for; else its shape is (R, 0, p).
     """
     number, past, outputs = runs.pv.shape
     valves, whole = runs.stem.shape[2], sp.shape[1]
     na, nb = process.a.shape[1], process.b.shape[2]
     op_rows = np.full((number, whole - past, valves), np.inf)
-    pv_rows = np.full((number, whole - past if pv_too else 0, outputs), np.inf)
+    pv_rows = np.full((number, whole - past, outputs), np.inf)
     y, stem = np.empty((whole, outputs, LANES)), np.empty((whole, valves, LANES))
     wanted, added = np.empty((whole, outputs, LANES)), np.empty((whole, outputs, LANES))
     u, error = np.empty((valves, LANES)), np.zeros((valves, 2, LANES))
@@ -258,7 +256,7 @@ def run_loops(
         for lane in range(min(LANES, number - first)):
             until = whole if gone[lane] == 0 else gone[lane] + 1
             for i in range(outputs):
-                for k in range(past, until if pv_too else past):
+                for k in range(past, until):
                     pv_rows[first + lane, k - past, i] = y[k, i, lane] + added[k, i, lane]
             for j in range(valves):
                 for k in range(past, until):

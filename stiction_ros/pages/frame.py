@@ -59,6 +59,7 @@ th[aria-sort=ascending] button::after { content: " ▲"; }
 th[aria-sort=descending] button::after { content: " ▼"; }
 td.t, th.t, tbody th { text-align: left; }
 tbody th { color: inherit; vertical-align: top; }
+table:not(.list) td.t { overflow-wrap: anywhere; min-width: 7ch; }
 .name { overflow-wrap: break-word; } td.wordy { overflow-wrap: anywhere; min-width: 14ch; }
 ::placeholder { color: var(--soft); opacity: 1; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 16px; font-size: .92rem; }
@@ -78,8 +79,11 @@ figure { margin: 18px 0; } figcaption { margin-top: 4px; max-width: 90ch; }
 figcaption b { color: var(--ink); }
 figure img { display: block; width: 100%; height: auto; background: #fff;
   border: 1px solid var(--line); border-radius: 8px; padding: 10px; }
-.plot svg { display: block; width: 100%; height: auto; touch-action: pan-y; overflow: hidden; }
+.plot svg { display: block; touch-action: pan-y; overflow: hidden; }
+.square > svg { width: 100%; height: auto; }
+.plot > .over { overflow: visible; width: calc(100% - 76px); margin: 8px 8px 28px 68px; }
 .plot text { fill: var(--soft); font-size: 12px; } .square text { font-size: 9.5px; }
+.plot .mark { stroke: var(--ink); stroke-dasharray: 4 4; }
 .plot .frame { fill: none; stroke: var(--line); }
 .plot .grid { stroke: var(--line); stroke-width: 1; }
 .plot polyline { fill: none; stroke-width: 1.3; vector-effect: non-scaling-stroke; }
@@ -113,10 +117,15 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   figure img { width: 640px; }
   figure:has(img) figcaption::before { content: "Move the picture sideways. "; }
   dl { display: block; } dd { margin: 0 0 6px; }
-  table.list thead { display: none; }
-  table.list, table.list tbody { display: block; } table.list { font-size: .92rem; }
+  table.list, table.list thead, table.list tbody { display: block; }
+  table.list thead:not(:has(button)) { display: none; }
+  table.list { font-size: .92rem; }
   table.list tr { display: grid; grid-template-columns: 1fr 1fr; gap: 0 14px; padding: 9px 0;
     border-bottom: 1px solid var(--line); }
+  table.list thead tr { display: flex; flex-wrap: wrap; gap: 0 16px; align-items: baseline; }
+  table.list thead tr::before { content: "Sort by"; color: var(--soft); }
+  table.list thead .name { min-width: 0; }
+  table.list th button { min-height: 30px; text-decoration: underline; }
   table.list tr[hidden] { display: none; }
   table.list td, table.list th { border: 0; padding: 2px 0; text-align: left; min-width: 0;
     white-space: normal; }
@@ -124,7 +133,6 @@ svg.spark polyline { fill: none; stroke: var(--stem); stroke-width: 1.5; }
   table.list td::before { content: attr(data-label) " "; color: var(--soft); font-weight: 400; }
   table.list .name, table.list td.wordy, table.list td.trend { grid-column: 1 / -1; }
   table.list td.trend svg { display: inline-block; margin-left: 6px; }
-  .plot:not(.square) text { font-size: 22px; }
   .plot .x text:nth-child(even) { display: none; }
   table.list td { order: 1; } table.list .name { order: 0; }
 }

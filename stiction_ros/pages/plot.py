@@ -12,14 +12,12 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.intake.tables.clock import DATED
-from stiction_ros.pages.frame import text
+from stiction_ros.pages.frame import text, words
 from stiction_ros.signals.holds import stretches
 from stiction_ros.texts import DAY, HOUR
 
-WIDTH, HEIGHT = 960, 280
-LEFT, RIGHT, TOP, BOTTOM = 96, 8, 8, 32
-"""Size of a figure and its margins, units of its own: a phone shows it at a third, and the figures
-on its axes twice as large."""
+WIDE, TALL = 1000, 240
+"""Units across the area of a figure over time, which is as wide as its page, and its height, px."""
 
 SIDE = 300
 """Width and height of a figure that has no time."""
@@ -94,8 +92,7 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
   const svg = figure.querySelector("svg"), area = svg.querySelector("svg");
   const key = figure.dataset.low + " " + figure.dataset.high;
   if (!views.has(key)) views.set(key, toolbar(figure));
-  const view = views.get(key), left = +figure.dataset.left, wide = +figure.dataset.wide;
-  const whole = area.getAttribute("viewBox").split(" ").map(Number);
+  const view = views.get(key), whole = area.getAttribute("viewBox").split(" ").map(Number);
   const axis = svg.querySelector("g.x"), dated = "dated" in figure.dataset;
   let from = null;
   view.drawn.push(() => {
@@ -105,7 +102,7 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
     axis.textContent = "";
     for (const [value, label] of ticks(a, b, dated)) {
       const tick = document.createElementNS("http://www.w3.org/2000/svg", "text");
-      tick.setAttribute("x", left + wide * (value - a) / (b - a));
+      tick.setAttribute("x", 100 * (value - a) / (b - a) + "%");
       tick.setAttribute("y", axis.dataset.y);
       tick.setAttribute("text-anchor", "middle");
       tick.textContent = label;
@@ -113,9 +110,9 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
     }
   });
   const at = event => {
-    const box = svg.getBoundingClientRect();
-    const x = (event.clientX - box.left) * svg.viewBox.baseVal.width / box.width;
-    return view.a + (view.b - view.a) * Math.min(Math.max((x - left) / wide, 0), 1);
+    const box = area.getBoundingClientRect();
+    const share = (event.clientX - box.left) / box.width;
+    return view.a + (view.b - view.a) * Math.min(Math.max(share, 0), 1);
   };
   svg.addEventListener("pointerdown", event => { from = at(event); });
   svg.addEventListener("pointerup", event => {
@@ -151,6 +148,9 @@ def over_time(
     axis: str,
     start: float = 0.0,
     shade: Sequence[tuple[float, float]] = (),
+    *,
+    marks: Sequence[float] = (),
+    limits: tuple[float, float] | None = None,
 ) -> str:
     """Return a figure of curves over one time, which the script of the page can zoom.
 
@@ -160,52 +160,53 @@ def over_time(
         curves: values that are not finite leave a gap.
         axis: name and unit of what goes up, HTML.
         start: of the record; dates are shown where it is one, s since 1970.
-        shade: begin and end of stretches that are shaded, in the unit of ``time``.
+        shade: begin and end of stretches that are shaded, s of ``time``.
+        marks: where a vertical line stands, s of ``time``.
+        limits: of what goes up; None shows all values.
     """
-    low, high = _range([curve.values for curve in curves])
-    wide, tall = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
+    low, high = limits or _range([curve.values for curve in curves])
     span = float(max(time[-1] - time[0], 1e-9))
     dated = DATED[0] <= start <= DATED[1]
     unit, size = ("date", 1.0) if dated else _unit(span)
     begin = (start if dated else 0.0) + float(time[0]) / size
     end = begin + span / size
+    scale = WIDE / span
     lines = [
-        f'<rect x="{(a - time[0]) / span * wide:.1f}" y="0" height="{tall}" class="shade" '
-        f'width="{(b - a) / span * wide:.1f}"/>'
+        f'<rect x="{(a - time[0]) * scale:.1f}" y="0" height="{TALL}" class="shade" '
+        f'width="{(b - a) * scale:.1f}"/>'
         for a, b in shade
     ]
+    lines += [
+        f'<polyline class="mark" points="{x:.1f},0 {x:.1f},{TALL}"/>'
+        for x in [(at - time[0]) * scale for at in marks]
+    ]
     for curve in curves:
-        x = (time - time[0]) / span * wide
-        y = (high - curve.values) / (high - low) * tall
-        for part in _parts(x, y, curve.steps):
+        y = (high - curve.values) / (high - low) * TALL
+        for part in _parts((time - time[0]) * scale, y, curve.steps):
             lines.append(f'<polyline class="{curve.kind}" points="{part}"/>')
     grid, labels = [], []
     for value in _ticks(low, high, 5):
-        up = TOP + (high - value) / (high - low) * tall
-        grid.append(
-            f'<line class="grid" x1="{LEFT}" x2="{LEFT + wide}" y1="{up:.1f}" y2="{up:.1f}"/>'
-        )
-        labels.append(
-            f'<text x="{LEFT - 6}" y="{up + 4:.1f}" text-anchor="end">{_label(value)}</text>'
-        )
-    marks = (
+        up = (high - value) / (high - low) * TALL
+        grid.append(f'<line class="grid" x1="0" x2="100%" y1="{up:.1f}" y2="{up:.1f}"/>')
+        labels.append(f'<text x="-6" y="{up + 4:.1f}" text-anchor="end">{_label(value)}</text>')
+    ticks = (
         _dates(begin, end) if dated else [(value, _label(value)) for value in _ticks(begin, end, 8)]
     )
     across = "".join(
-        f'<text x="{LEFT + wide * (value - begin) / (end - begin):.1f}" y="{HEIGHT - 8}" '
+        f'<text x="{100.0 * (value - begin) / (end - begin):.2f}%" y="{TALL + 18}" '
         f'text-anchor="middle">{label}</text>'
-        for value, label in marks
+        for value, label in ticks
     )
     told = f"Time from {_stamp(begin)} to {_stamp(end)}." if dated else f"Time in {unit}."
     return (
-        f'<figure class="plot" data-low="{begin:.12g}" data-high="{end:.12g}" '
-        f'{"data-dated " * dated}data-left="{LEFT}" data-wide="{wide}">{_keys(curves, axis)}'
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{text(title)}">'
-        f'{"".join(grid)}<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{tall}" '
-        f'viewBox="0 0 {wide} {tall}" preserveAspectRatio="none">{"".join(lines)}</svg>'
-        f'<rect class="frame" x="{LEFT}" y="{TOP}" width="{wide}" height="{tall}"/>'
-        f'{"".join(labels)}<g class="x" data-y="{HEIGHT - 8}">{across}</g></svg>'
-        f"<figcaption>{text(title)} {told}</figcaption></figure>"
+        f'<figure class="plot" data-low="{begin:.12g}" data-high="{end:.12g}"'
+        f"{' data-dated' * dated}>{_keys(curves, axis)}"
+        f'<svg class="over" height="{TALL}" role="img" aria-label="{text(title)}">'
+        f'{"".join(grid)}<svg width="100%" height="{TALL}" viewBox="0 0 {WIDE} {TALL}" '
+        f'preserveAspectRatio="none">{"".join(lines)}</svg>'
+        f'<rect class="frame" width="100%" height="{TALL}"/>'
+        f'{"".join(labels)}<g class="x" data-y="{TALL + 18}">{across}</g></svg>'
+        f"<figcaption>{words(title)} {told}</figcaption></figure>"
     )
 
 
@@ -253,13 +254,14 @@ def against(
         f'<svg viewBox="0 0 {SIDE} {SIDE}" role="img" aria-label="{text(title)}">'
         f'<rect class="frame" x="{left}" y="6" width="{wide}" height="{tall}"/>{"".join(lines)}'
         f'<text x="{left + wide / 2}" y="{SIDE - 8}" text-anchor="middle">{axes[0]}</text></svg>'
-        f"<figcaption>{text(title)}</figcaption></figure>"
+        f"<figcaption>{words(title)}</figcaption></figure>"
     )
 
 
 def _keys(curves: Sequence[Curve], axis: str) -> str:
     shown = "".join(
-        f'<span><i class="{curve.kind}"></i>{text(curve.name)}</span>' for curve in curves
+        f'<span><i class="{kind}"></i>{text(name)}</span>'
+        for name, kind in dict.fromkeys((curve.name, curve.kind) for curve in curves)
     )
     return f'<div class="key">{shown}<span class="soft">{axis}</span></div>'
 

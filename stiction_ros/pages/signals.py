@@ -3,21 +3,97 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+from collections.abc import Mapping
+from pathlib import Path
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
-from stiction_ros.pages.frame import text
-from stiction_ros.pages.plot import MOST, Curve, against, over_time
+from stiction_ros.intake.record_file import record_of
+from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time
 from stiction_ros.pages.window import Window
 from stiction_ros.records.record import Record
 
 
 @dataclasses.dataclass(frozen=True)
 class Units:
-    """Units of PV and of OP, HTML."""
+    """Units of PV and of OP, HTML; ``outputs`` has those of single PVs by name."""
 
     pv: str
     op: str
+    outputs: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def axis(self, output: str) -> str:
+        """Return name and unit of a PV."""
+        return f"{text(output)} ({self.outputs.get(output, self.pv)})"
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """What of a record is drawn: its rows, vertical lines and shaded stretches, s."""
+
+    rows: slice = dataclasses.field(default_factory=lambda: slice(None))
+    marks: tuple[float, ...] = ()
+    shade: tuple[tuple[float, float], ...] = ()
+
+
+UNITS = Units("PV units", "% of travel")
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure:
+    """Figures of a record in a page of HTML: a notebook shows it, :meth:`save` writes it."""
+
+    page: str = dataclasses.field(repr=False)
+
+    def _repr_html_(self) -> str:
+        frame = 'title="figures of a record" style="width:100%;height:40em;border:0"'
+        return f'<iframe srcdoc="{text(self.page)}" {frame}></iframe>'
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the figures as a page, such as ``look.html``, and return the file.
+
+        Raises:
+            OSError: nothing can be written there.
+        """
+        target = Path(path)
+        target.write_text(self.page, encoding="utf-8")
+        return target
+
+
+def plot(
+    record: Record | str | os.PathLike[str], identification: Identification | None = None
+) -> Figure:
+    """Return each signal of a record over time; with an identification a close look first.
+
+    Args:
+        record: what was measured, or the path of a file or bag of one loop.
+        identification: of this record. Adds four cycles, PV and stem against OP, and the stem.
+
+    Returns:
+        Figures that a notebook shows; ``save(path)`` writes them as a page that can be zoomed.
+
+    Raises:
+        InputError: the file cannot be read, or the identification has another length.
+
+    Examples:
+        >>> from stiction_ros import LoopModel, find_config, plot, simulate
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=200)
+        >>> plot(record).save("look.html").name
+        'look.html'
+    """
+    measured, found = record_of(record), identification
+    if found is not None and found.samples != len(measured):
+        said = f"it has {found.samples} samples, the record {len(measured)}"
+        raise InputError(said, where="identification", fix="give that of this record")
+    parts = [f"<h1>{text(measured.name)}</h1>"]
+    stem = None
+    if found is not None:
+        stem = found.stem if found.stem.shape == measured.op.shape else None
+        parts.append(close_look(measured, found, UNITS))
+    return Figure(framed(measured.name, [*parts, all_signals(measured, stem, UNITS)], SCRIPT))
 
 
 def close_look(record: Record, found: Identification, units: Units) -> str:
@@ -39,7 +115,7 @@ def close_look(record: Record, found: Identification, units: Units) -> str:
             f"{shown[0].upper()}{shown[1:]} from the middle of the record.",
             time,
             _output(record, i, rows),
-            _axis(record.outputs[i], units.pv),
+            units.axis(record.outputs[i]),
             start,
         ),
         over_time(
@@ -62,32 +138,43 @@ def all_signals(record: Record, stem: FloatArray | None, units: Units) -> str:
         stem: estimated stems, shape (N, m), % of travel; None where there is none.
         units: of its signals.
     """
-    rows = slice(None)
+    drawn = over_record(record, stem, units)
+    return f"<h2>Signals</h2>{''.join(drawn)}"
+
+
+def over_record(
+    record: Record, stem: FloatArray | None, units: Units, view: View = View()
+) -> list[str]:
+    """Return a figure of each PV and then of each OP.
+
+    Args:
+        record: its samples that are not finite leave a gap.
+        stem: estimated stems, shape (N, m), % of travel; None where there is none.
+        units: of its signals.
+        view: what of it is drawn.
+    """
+    rows, time = view.rows, record.time[view.rows]
+    known = stem is not None or record.stem is not None
     drawn = [
-        over_time(
+        (
             f"{name}{' and its set-point' * (record.sp is not None)}.",
-            record.time,
             _output(record, i, rows),
-            _axis(name, units.pv),
-            record.start,
+            units.axis(name),
         )
         for i, name in enumerate(record.outputs)
     ]
     drawn += [
-        over_time(
-            f"Controller output to {name}{' and the stem' * (stem is not None)}.",
-            record.time,
+        (
+            f"Controller output to {name}{' and the stem' * known}.",
             _valve(record, stem, j, rows),
             units.op,
-            record.start,
         )
         for j, name in enumerate(record.valves)
     ]
-    return f"<h2>Signals</h2>{''.join(drawn)}"
-
-
-def _axis(name: str, unit: str) -> str:
-    return f"{text(name)} ({unit})"
+    return [
+        over_time(title, time, curves, axis, record.start, view.shade, marks=view.marks)
+        for title, curves, axis in drawn
+    ]
 
 
 def _output(record: Record, i: int, rows: slice) -> list[Curve]:
@@ -100,7 +187,7 @@ def _output(record: Record, i: int, rows: slice) -> list[Curve]:
 def _valve(record: Record, stem: FloatArray | None, j: int, rows: slice) -> list[Curve]:
     curves = [Curve(f"OP of {record.valves[j]}", "op", record.op[rows, j], steps=True)]
     if record.stem is not None:
-        curves.append(Curve("stem, measured", "ink", record.stem[rows, j], steps=True))
+        curves.append(Curve("stem, recorded", "ink", record.stem[rows, j], steps=True))
     if stem is not None:
         curves.append(Curve("stem, estimated", "stem", stem[rows, j], steps=True))
     return curves
@@ -123,7 +210,7 @@ def _planes(record: Record, stem: FloatArray | None, window: Window, units: Unit
             ],
             (
                 f"OP of {text(record.valves[window.valve])}, {units.op}",
-                _axis(record.outputs[window.output], units.pv),
+                units.axis(record.outputs[window.output]),
             ),
             equal=False,
         )

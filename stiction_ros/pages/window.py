@@ -6,6 +6,7 @@ import dataclasses
 
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.words import cause_of
+from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.records.record import Record
 
 CYCLES = 4
@@ -40,7 +41,8 @@ class Window:
         cause = cause_of(found, valve) if found.valves else None
         outputs = [i for i, model in enumerate(found.outputs) if model.cause is cause]
         output = outputs[0] if cause is not None and outputs else min(valve, record.pv.shape[1] - 1)
-        period = None if cause is None else cause.period
+        cycles = cause is not None and cause.kind is not CauseKind.NONE
+        period = cause.period if cause is not None and cycles else None
         parts = record.usable_rows() or [(0, len(record))]
         begin, end = max(parts, key=lambda part: part[1] - part[0])
         wanted = UNCYCLED if period is None else round(CYCLES * period / record.sample_time) + 1

@@ -20,13 +20,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.problem.equation_error import (
-    ArxOrders,
-    Delays,
-    EquationError,
-    fit_outputs,
-)
-from stiction_ros.identification.result.identification import Identification
+from stiction_ros.paper.equation_error import EquationError, fit_outputs
 from stiction_ros.paper.one_step_result import (
     Answer,
     check_record,
@@ -35,9 +29,11 @@ from stiction_ros.paper.one_step_result import (
     result,
 )
 from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx_fit import ArxOrders, Delays
 
 MAX_POINTS = 2_000_000
 MAX_CHOICES = 20_000
@@ -82,7 +78,7 @@ def identify_by_grid(
     record: Record,
     options: PaperOptions | None = None,
     progress: Progress | None = None,
-) -> Identification:
+) -> PaperIdentification:
     """Identify by the grid search.
 
     Args:

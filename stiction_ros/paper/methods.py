@@ -1,4 +1,4 @@
-"""Identification by the paper's methods.
+"""PaperIdentification by the paper's methods.
 
 - ``nlp``: the nonlinear programme (12) at its best, :mod:`.programme.nlp`.
 - ``nlp_printed``: the same to the letter, :mod:`.programme.printed`.
@@ -9,30 +9,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from stiction_ros.identification import Identification
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.records import Record
 
 Progress = Callable[[float], None]
-Method = Callable[[Record, PaperOptions, Progress | None], Identification]
+Method = Callable[[Record, PaperOptions, Progress | None], PaperIdentification]
 
 
 def _by_programme(
     record: Record, options: PaperOptions, progress: Progress | None
-) -> Identification:
+) -> PaperIdentification:
     from stiction_ros.paper.programme.nlp import identify_by_programme  # CasADi loads slowly
 
     return identify_by_programme(record, options, progress)
 
 
-def _as_printed(record: Record, options: PaperOptions, progress: Progress | None) -> Identification:
+def _as_printed(
+    record: Record, options: PaperOptions, progress: Progress | None
+) -> PaperIdentification:
     from stiction_ros.paper.programme.printed import identify_as_printed  # CasADi loads slowly
 
     return identify_as_printed(record, options, progress)
 
 
-def _by_grid(record: Record, options: PaperOptions, progress: Progress | None) -> Identification:
+def _by_grid(
+    record: Record, options: PaperOptions, progress: Progress | None
+) -> PaperIdentification:
     from stiction_ros.paper.grid_search import identify_by_grid  # slow to import
 
     return identify_by_grid(record, options, progress)
@@ -47,7 +51,7 @@ METHODS: Mapping[str, Method] = {
 
 def identify(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
-) -> Identification:
+) -> PaperIdentification:
     """Identify friction and linear dynamics as the paper does; see :class:`PaperOptions`.
 
     Args:

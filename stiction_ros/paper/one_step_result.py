@@ -11,13 +11,6 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import limited
 from stiction_ros.identification.linear.data import nrmse_fit
-from stiction_ros.identification.problem.equation_error import (
-    ArxFit,
-    ArxOrders,
-    Delays,
-    EquationError,
-    fit_outputs,
-)
 from stiction_ros.identification.problem.input_checks import (
     TOO_SHORT,
     require_samples,
@@ -25,16 +18,17 @@ from stiction_ros.identification.problem.input_checks import (
 )
 from stiction_ros.identification.result.identification import (
     FitStatus,
-    Identification,
     OutputModel,
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.result.search_log import SearchLog, SolvedStart
+from stiction_ros.paper.equation_error import EquationError, fit_outputs
 from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.search_log import PaperIdentification, SearchLog, SolvedStart
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays
 
 DEFAULT_ORDER = 3
 MIN_SAMPLES = 60
@@ -152,7 +146,9 @@ def delay_choices(record: Record, options: PaperOptions, most: int) -> list[Dela
     ]
 
 
-def result(record: Record, options: PaperOptions, answer: Answer, seconds: float) -> Identification:
+def result(
+    record: Record, options: PaperOptions, answer: Answer, seconds: float
+) -> PaperIdentification:
     """Return the result of a one-step method in the form of all methods."""
     limits, orders = friction_limits(record, options), orders_of(record, options)
     hard = evaluated(record, options, np.maximum(answer.friction, 0.0), answer.delays)
@@ -179,12 +175,12 @@ def result(record: Record, options: PaperOptions, answer: Answer, seconds: float
         starts=answer.starts,
     )
     notes += [
-        f"delay of {valve} to {output.name} is the longest tried, try a wider range with --delay"
+        f"the delay from valve {valve} to {output.name} is the longest tried; widen --delay"
         for output in outputs
         for valve, delay in output.delay.items()
         if delay == high > low
     ]
-    return Identification(
+    return PaperIdentification(
         status=FitStatus.NO_MODEL if answer.reason else FitStatus.OK,
         reason=answer.reason,
         method=options.method,

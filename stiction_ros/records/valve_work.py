@@ -46,7 +46,7 @@ class ValveWork:
         """Return the work of one hour, of what was done in ``hours``."""
         return ValveWork(self.travel / hours, self.moves / hours, self.reversals / hours)
 
-    def to_json(self) -> dict[str, float]:
+    def to_dict(self) -> dict[str, float]:
         """Return ``{travel, moves, reversals}``."""
         return dataclasses.asdict(self)
 

@@ -1,15 +1,13 @@
-"""What reports are made of: boxes, tables, pictures, and figures in words."""
+"""What reports are made of: boxes, tables, and figures in words."""
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from stiction_ros.pages import frame
 from stiction_ros.pages.frame import SCROLLED, text, words
-from stiction_ros.report.drawing import Drawing
 
 Cell = str | tuple[str, str]
 """Text of a table cell, or its class and its text."""
@@ -61,16 +59,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], texts: int = 1) -
     return (
         f"{SCROLLED}<table><thead><tr>{titles}</tr></thead>"
         f"<tbody>{''.join(lines)}</tbody></table></div>"
-    )
-
-
-def embedded(drawing: Drawing) -> str:
-    """Return a figure with its picture inside the page."""
-    data = base64.b64encode(drawing.png).decode("ascii")
-    return (
-        f'<figure id="{text(drawing.name)}">{SCROLLED}<img alt="{text(drawing.title)}" '
-        f'src="data:image/png;base64,{data}"></div><figcaption><b>{text(drawing.title)}.</b> '
-        f"{text(drawing.caption)}</figcaption></figure>"
     )
 
 

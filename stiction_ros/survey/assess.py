@@ -105,7 +105,7 @@ def _assessed(loop: Loop, entry: Entry, options: SurveyOptions) -> Assessed:
     gain, doubt = None, ""
     if options.gain and entry.found:
         try:
-            gain = gain_of(record, found, record.valves[chosen]).to_json()
+            gain = gain_of(record, found, record.valves[chosen]).to_dict()
         except InputError as error:
             doubt = f"gain is not known: {error}"
             log.append(doubt)
@@ -130,7 +130,7 @@ def _named(record: Record, name: str) -> Record:
 
 def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry, int]:
     """Return the entry with the verdict, and the index of the valve that it is about."""
-    document = found.to_json()
+    document = found.to_dict()
     valves, outputs = document["valves"], document["outputs"]
     notes = tuple(dict.fromkeys([*entry.notes, *record.notes, *found.notes]))
     if not valves or not outputs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.closed_loop.movement import moving, size
+from stiction_ros.signals.movement import moving, size
 from stiction_ros.signals.oscillation import turnings
 
 MOST = 200

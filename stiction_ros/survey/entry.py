@@ -90,7 +90,7 @@ class Entry:
     notes: tuple[str, ...] = ()
     beats: tuple[float, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``survey --json``."""
         row = dataclasses.asdict(self)
         del row["beats"]

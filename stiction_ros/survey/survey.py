@@ -69,7 +69,7 @@ class Survey:
         """How many loops were judged, in this run or before."""
         return sum(entry.status is Status.OK for entry in self.entries)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``survey --json``."""
         minutes = max(self.seconds, 1e-9) / 60.0
         return {
@@ -80,7 +80,7 @@ class Survey:
             "date": self.date,
             "before": self.before,
             "groups": [dataclasses.asdict(group) for group in self.groups],
-            "loops": [entry.to_json() for entry in self.entries],
+            "loops": [entry.to_dict() for entry in self.entries],
         }
 
 

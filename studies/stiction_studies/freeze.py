@@ -112,7 +112,7 @@ def replay_answer(name: str) -> Answer:
         "samples": found.samples,
         "swaps": [None if swap is None else found.seconds(swap.stamp) for swap in swaps],
         "fits": [
-            None if update is None else _valves(update.identification.to_json()["valves"])
+            None if update is None else _valves(update.identification.to_dict()["valves"])
             for update in updates
         ],
     }
@@ -131,9 +131,9 @@ def example_answer(name: str, variant: str, method: str) -> Answer:
     example = make(EXAMPLE_SEED, variant)
     if method == "grid":
         printed = PaperOptions.of(example.options, method)
-        return _identification(identify_as_paper(example.record, printed).to_json())
+        return _identification(identify_as_paper(example.record, printed).to_dict())
     options = dataclasses.replace(example.options, method=method)
-    return _identification(identify(example.record, options).to_json())
+    return _identification(identify(example.record, options).to_dict())
 
 
 def blind_answer(family: str, seed: int) -> Answer:
@@ -183,7 +183,7 @@ def _identified(record: Any) -> Answer:
     from stiction_ros.records.parts import longest_part
 
     try:
-        return _identification(identify(longest_part([record])).to_json())
+        return _identification(identify(longest_part([record])).to_dict())
     except InputError as error:
         return {"refused": str(error)}
 
@@ -215,7 +215,7 @@ def _valves(valves: Any) -> list[Answer]:
 def _gap(model: Any, record: Any) -> Answer:
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 
-    found = find_discrepancy(model, [record], GapOptions(quick=True)).to_json()
+    found = find_discrepancy(model, [record], GapOptions(quick=True)).to_dict()
     keys = ("place", "effect", "parameters", "intervals", "delta_bic", "closed")
     return {
         "verdict": found["verdict"],

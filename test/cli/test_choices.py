@@ -10,8 +10,8 @@ from stiction_ros.identification.answer.loop_kind import LoopKind
 from stiction_ros.identification.friction.grid import laws
 from stiction_ros.identification.identification_options import LOOP_KINDS
 from stiction_ros.identification.linear.data import LinearKind, OrderCriterion
-from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
 from stiction_ros.paper import methods
+from stiction_ros.signals.subspace_projection import SubspaceMethod
 
 
 def test_every_choice_is_known_and_none_is_missing() -> None:

@@ -56,7 +56,7 @@ def test_experiment_takes_levels_and_probability(tmp_path: Path) -> None:
     assert (np.diff(op) != 0.0).mean() == pytest.approx(0.5, abs=0.06)
 
 
-@pytest.mark.parametrize("kind", ["arx", "armax", "state_space"])
+@pytest.mark.parametrize("kind", ["arx", "state_space"])
 def test_fit_linear_prints_the_contract_as_json(
     kind: str, prbs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -79,7 +79,7 @@ def test_tables_show_both_fits_gains_and_poles(
         assert text in shown
 
 
-@pytest.mark.parametrize("kind", ["armax", "state_space"])
+@pytest.mark.parametrize("kind", ["arx", "state_space"])
 def test_loop_model_that_is_written_runs_the_tank(kind: str, prbs: Path, tmp_path: Path) -> None:
     path = tmp_path / "found.loop.yaml"
     arguments = ["fit-linear", str(prbs), *COLUMNS, "--kind", kind, "--delay", "0"]

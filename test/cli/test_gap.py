@@ -33,6 +33,7 @@ def ran(files: Path, name: str, *more: str) -> int:
     return main(["gap", str(files / "model.loop.yaml"), str(files / name), "--quick", *more])
 
 
+@pytest.mark.trial
 def test_a_named_effect_is_written_with_its_model(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -80,6 +80,7 @@ def test_what_cannot_be_done_is_said_in_one_line(
     assert len(error.splitlines()) == 1
 
 
+@pytest.mark.trial
 def test_nothing_judged_is_a_failure_and_nothing_written_is_told(
     exports: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -50,6 +50,7 @@ def test_no_plan_is_cheaper_than_the_optimum(seed: int, valves: int) -> None:
     assert found.gap == pytest.approx((cost - found.optimum) / found.optimum, abs=1e-5)
 
 
+@pytest.mark.trial
 @given(st.integers(0, 10_000))
 @settings(max_examples=15, deadline=None)
 def test_the_optimum_is_that_of_all_patterns_one_by_one(seed: int) -> None:

@@ -18,7 +18,7 @@ from stiction_ros.discrepancy.fit.misfit import misfit
 from stiction_ros.discrepancy.likelihood.kernels import least_squares, turn
 from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise, projector
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
-from stiction_ros.discrepancy.simulation.response_kernels import filtered
+from stiction_ros.discrepancy.simulation.responses import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel, simulate_open_loop
 from stiction_ros.signals.autoregression import whiten

@@ -41,5 +41,5 @@ def test_a_stem_may_stand_at_the_edge_of_a_deadband_and_short_of_a_slip(
 def test_backlash_that_rests_at_its_edge_is_no_stiction() -> None:
     hidden = hidden_loop(698023, "two", "exact")
     given = LoopModel.from_mapping(hidden.given)
-    answer = find_discrepancy(given, [hidden.record], GapOptions(quick=True)).to_json()
+    answer = find_discrepancy(given, [hidden.record], GapOptions(quick=True)).to_dict()
     assert any(("valve:V1", "backlash") in claim.names for claim in claims_of(answer))

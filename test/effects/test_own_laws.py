@@ -170,7 +170,7 @@ def test_the_jump_is_the_least_move_of_the_law(found: Identification) -> None:
     (valve,) = found.valves
     told = valve.with_own_jump()
     assert told.jump == pytest.approx(0.7 * (4.0 - 1.5))
-    assert told.to_json()["jump"] == told.jump
+    assert told.to_dict()["jump"] == told.jump
     assert "jumps by 1.8 % or more" in why(dataclasses.replace(found, valves=(told,)), 0)
     swings = dataclasses.replace(valve, law="semi_physical", further={"k": 1.99})
     assert swings.with_own_jump().jump == pytest.approx(1.99 * (4.0 - 1.5))
@@ -185,12 +185,12 @@ def test_table_and_report_show_every_parameter_with_its_interval(
     table = capsys.readouterr().out
     for said in ("viscous", "0.3", "0.25 to 0.36"):
         assert said in table
-    card = valve_cards([valve.to_json() for valve in found.valves])
+    card = valve_cards([valve.to_dict() for valve in found.valves])
     assert "viscous 0.300 (0.250 … 0.360): share left undone" in card
     held = dataclasses.replace(found.valves[0], further_intervals={})
     _print({"record": "short.csv"}, dataclasses.replace(found, valves=(held,)))
     assert "held" in capsys.readouterr().out
-    assert "viscous 0.300 (held)" in valve_cards([held.to_json()])
+    assert "viscous 0.300 (held)" in valve_cards([held.to_dict()])
 
 
 def test_gap_leaves_out_what_the_law_refuses_of_its_axes(record: Record) -> None:
@@ -236,7 +236,7 @@ def test_gap_names_the_law_in_its_table_and_sentences(
         *("valve:V1", "stiction", "xch", {"f_s": 2.0}, units_of(xch, "valve:V1"), {}),
         *(50.0, 0.9, GapVerdict.NAMED, (), "It gains 50 BIC over no effect"),
     )
-    assert (effect.to_json()["effect"], effect.to_json()["law"]) == ("stiction", "xch")
+    assert (effect.to_dict()["effect"], effect.to_dict()["law"]) == ("stiction", "xch")
     found = find_discrepancy(loop(), [simulate(loop(), samples=300)], GapOptions(quick=True))
     _print_gap(dataclasses.replace(found, effects=(effect,)))
     shown = capsys.readouterr().out

@@ -112,7 +112,7 @@ def test_service_is_predicted_as_the_loop_without_friction_does(
 def test_leaving_the_loop_is_now(gain: Gain) -> None:
     left = gain.option(What.LEAVE).measures
     assert left is not None
-    for key, value in left.to_json().items():
+    for key, value in left.to_dict().items():
         assert value == pytest.approx(getattr(gain.now, key))
 
 
@@ -126,7 +126,7 @@ def test_leaving_a_loop_that_is_not_repeated_is_now_too(
 
 
 def test_every_option_stands_in_the_json_with_its_interval(gain: Gain) -> None:
-    document = gain.to_json()
+    document = gain.to_dict()
     assert [option["what"] for option in document["options"]] == [
         "service",
         "embedding",
@@ -240,7 +240,7 @@ def test_backlash_is_planned_without_a_least_jump(found: Identification) -> None
 def test_the_same_record_gives_the_same_answer(
     gain: Gain, record: Record, found: Identification
 ) -> None:
-    assert gain_of(record, found).to_json() == gain.to_json()
+    assert gain_of(record, found).to_dict() == gain.to_dict()
 
 
 def test_a_healthy_valve_gains_nothing_by_service(record: Record, found: Identification) -> None:
@@ -264,6 +264,7 @@ def test_a_record_without_a_controller_is_refused(record: Record, found: Identif
         gain_of(dataclasses.replace(record, op=op), dataclasses.replace(found, stem=op))
 
 
+@pytest.mark.trial
 def test_a_model_is_simulated_under_its_own_controller(model: LoopModel) -> None:
     gain = gain_of_model(model, samples=600)
     service, embedding = (gain.option(what).measures for what in (What.SERVICE, What.EMBEDDING))
@@ -323,6 +324,7 @@ def test_jumps_are_less_certain_than_bands(loop: RecordedLoop) -> None:
     assert spreads[0] < spreads[1]
 
 
+@pytest.mark.trial
 def test_loops_that_grow_without_end_are_told(
     record: Record, found: Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -70,6 +70,7 @@ print("goes on")
 """
 
 
+@pytest.mark.trial
 def test_without_a_process_the_search_goes_on() -> None:
     assert told_by(NO_PROCESS) == "goes on\n"
 

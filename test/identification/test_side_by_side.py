@@ -60,6 +60,6 @@ def test_one_thread_identifies_what_two_do(monkeypatch: pytest.MonkeyPatch) -> N
 
     def found(two: bool) -> dict[str, object]:
         monkeypatch.setattr(side_by_side, "may_help", lambda: two)
-        return identify(record, options).to_json() | {"seconds": 0.0}
+        return identify(record, options).to_dict() | {"seconds": 0.0}
 
     assert found(two=True) == found(two=False)

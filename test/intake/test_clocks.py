@@ -306,7 +306,7 @@ DATES = [
 
 
 @settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(
     begin=st.datetimes(datetime.datetime(1999, 1, 1), datetime.datetime(2030, 1, 1)),

@@ -29,6 +29,7 @@ def sticky(path: Path) -> Path:
     return write(path, text(rows))
 
 
+@pytest.mark.trial
 def test_identify_says_sample_time_unit_and_span(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

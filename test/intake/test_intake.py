@@ -60,7 +60,7 @@ def outcomes(content: bytes, suffix: str, options: IntakeOptions) -> None:
             assert len(loop.summary.splitlines()) == 1
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @example(
     header=["OP", "PV"],
     body=[["0"], ["0", "F1.OP"], ["0", "F1.OP"]],

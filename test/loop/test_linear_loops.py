@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from known_loops import DELAY, A, B, Kind, known
 
-from stiction_ros.identification.closed_loop.damping import ringing
 from stiction_ros.identification.closed_loop.repeated_runs import law_of
 from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.loop.damping import ringing
 from stiction_ros.loop.linear_loops import (
     Controllers,
     Process,
@@ -55,7 +55,7 @@ def test_the_kernel_does_what_a_plain_loop_does(
     sp = np.full((1, PAST + 300, 1), 20.0)
     outside = np.concatenate([np.zeros(PAST), load])[None, :, None]
     moved = runs(friction, 1.0, 1.0 / 8.0, law_of(plain.found.valves[0]))
-    op, pv = run_loops(PROCESS, controllers(lag), moved, sp, outside, True)
+    op, pv = run_loops(PROCESS, controllers(lag), moved, sp, outside)
     near = 1e-9 if law != "semi_physical" else 1e-5  # a stem that remembers every last digit
     assert op[0, :, 0] + 50.0 == pytest.approx(plain.record.op[:, 0], abs=near)
     assert pv[0, :, 0] == pytest.approx(plain.record.pv[:, 0], abs=near)
@@ -73,7 +73,7 @@ def test_a_loop_under_any_controller_moves_as_in_the_kernel(
     sp[:, PAST + 5 :] = 26.0
     code = law_of(known(Kind(friction, law=law), samples=50).found.valves[0])
     begun = runs(friction, 1.0, 0.0, code)._replace(tuning=tuning)
-    _, pv = run_loops(PROCESS, ways, begun, sp, np.zeros_like(sp), True)
+    _, pv = run_loops(PROCESS, ways, begun, sp, np.zeros_like(sp))
     outside = np.full((1, 1, PAST + 300), PROCESS.bias[0])
     equations = Equations(np.array([[A]]), np.array([[[B]]]), PROCESS.delay, outside)
     op, rest = np.zeros((PAST + 300, 1)), np.full((PAST + 300, 1), 20.0)
@@ -88,9 +88,7 @@ def test_a_loop_under_any_controller_moves_as_in_the_kernel(
 def test_a_run_that_grows_without_end_is_infinite() -> None:
     sp = np.full((1, PAST + 4000, 1), 20.0)
     sp[:, PAST + 5 :] = 21.0
-    op, pv = run_loops(
-        PROCESS, controllers(), runs((0.0, 0.0), 9.0, 3.0), sp, np.zeros_like(sp), True
-    )
+    op, pv = run_loops(PROCESS, controllers(), runs((0.0, 0.0), 9.0, 3.0), sp, np.zeros_like(sp))
     assert np.isinf(op[0, -1, 0])
     assert np.isinf(pv[0, -1, 0])
 
@@ -99,7 +97,7 @@ def test_op_stays_within_its_limits() -> None:
     limited = controllers()._replace(low=np.array([-2.0]), high=np.array([1.0]))
     sp = np.full((1, PAST + 300, 1), 20.0)
     sp[:, PAST + 5 :] = 23.0
-    op, _ = run_loops(PROCESS, limited, runs((1.0, 0.5), 1.0, 0.1), sp, np.zeros_like(sp), True)
+    op, _ = run_loops(PROCESS, limited, runs((1.0, 0.5), 1.0, 0.1), sp, np.zeros_like(sp))
     assert op.max() == 1.0
     assert op.min() >= -2.0
 
@@ -107,7 +105,7 @@ def test_op_stays_within_its_limits() -> None:
 def test_a_valve_without_a_controller_keeps_its_op() -> None:
     alone = controllers()._replace(output=np.array([-1]))
     sp = np.full((1, PAST + 50, 1), 25.0)
-    op, pv = run_loops(PROCESS, alone, runs((0.0, 0.0), 1.0, 0.1), sp, np.zeros_like(sp), True)
+    op, pv = run_loops(PROCESS, alone, runs((0.0, 0.0), 1.0, 0.1), sp, np.zeros_like(sp))
     assert not op.any()
     assert pv == pytest.approx(20.0)
 
@@ -119,7 +117,7 @@ def test_poles_ring_as_the_simulated_loop_does(gain: float, lag: int) -> None:
     sp = np.full((1, PAST + 600, 1), 20.0)
     sp[:, PAST + 5 :] = 21.0
     _, pv = run_loops(
-        PROCESS, controllers(lag), runs((0.0, 0.0), gain, gain / 10.0), sp, np.zeros_like(sp), True
+        PROCESS, controllers(lag), runs((0.0, 0.0), gain, gain / 10.0), sp, np.zeros_like(sp)
     )
     apart = pv[0, 40:, 0] - 21.0
     peaks = np.flatnonzero((apart[1:-1] > apart[:-2]) & (apart[1:-1] > apart[2:]))[:5] + 1

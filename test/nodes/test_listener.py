@@ -50,6 +50,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.trial
 def test_windows_of_all_loops_are_filled(tmp_path: Path) -> None:
     domain = random.SystemRandom().randint(1, 100)
     context = Context()

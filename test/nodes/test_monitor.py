@@ -77,7 +77,7 @@ def twin() -> dict[str, list[dict[str, Any]]]:
     looks = [monitoring.add(k, SHIFTED.op[k], SHIFTED.pv[k]) for k in range(SAMPLES)]
     said = {"look": [look for look in looks if look], "finding": monitoring.collect()}
     return {
-        key: [json.loads(json_text(one.to_json(), indent=None)) for one in found]
+        key: [json.loads(json_text(one.to_dict(), indent=None)) for one in found]
         for key, found in said.items()
     }
 

@@ -107,7 +107,7 @@ def _fit(bag: Bag, stamp: int, update: FitUpdate, token: str) -> str:
     bag.put("/stiction", JOINT_STATE, data, stamp, Qos(depth=100))
     values = {
         "window_end": str(stamp),
-        "identification": json_text(update.identification.to_json(), indent=None),
+        "identification": json_text(update.identification.to_dict(), indent=None),
     }
     for name, friction in update.trusted.items():
         values[f"{name}.trusted_f_s"] = str(friction.static_friction)

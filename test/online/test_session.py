@@ -46,6 +46,7 @@ def quick(siso: Scenario) -> Scenario:
     return dataclasses.replace(siso, estimator=estimator, controller=controller)
 
 
+@pytest.mark.trial
 def test_two_runs_with_one_seed_are_equal_bit_for_bit(siso: Scenario) -> None:
     one, two = (run_live(quick(siso), samples=620) for _ in range(2))
     assert np.array_equal(one.run.record.op, two.run.record.op)

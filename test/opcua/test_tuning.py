@@ -17,6 +17,7 @@ from stiction_ros.nodes.shared.parameter_files import unused
 from stiction_ros.online.session import read_nodes
 
 
+@pytest.mark.trial
 def test_the_tuning_of_the_page_moves_the_valve_for_a_reason_only(tmp_path: Path) -> None:
     found = {name: tried(tmp_path, *case) for name, case in CASES.items()}
     unaware, inversion, bare, full = found.values()

@@ -18,7 +18,6 @@ from stiction_ros.nodes.__main__ import NODES
 ROOT = Path(__file__).resolve().parents[2]
 # Python module → distribution in setup.cfg, where the names differ.
 DISTRIBUTION = {
-    "PIL": "pillow",
     "mcap_ros2": "mcap-ros2-support",
     "yaml": "pyyaml",
 }
@@ -33,9 +32,7 @@ OPTIONAL = {
 }
 # Distribution in setup.cfg → rosdep key in package.xml; the others are installed with pip.
 ROSDEP = {
-    "matplotlib": "python3-matplotlib",
     "numpy": "python3-numpy",
-    "pillow": "python3-pil",
     "pyyaml": "python3-yaml",
     "rich": "python3-rich",
     "scipy": "python3-scipy",

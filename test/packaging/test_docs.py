@@ -90,6 +90,18 @@ def test_the_names_that_programs_of_a_page_import_exist(path: Path) -> None:
             exec(compile(tree, path.name, "exec"), {})
 
 
+def test_the_processes_that_the_page_of_loops_shows_are_read() -> None:
+    text = (ROOT / "docs" / "api" / "loops.md").read_text(encoding="utf-8")
+    blocks = [block for language, block in BLOCK.findall(text) if language == "yaml"]
+    assert len(blocks) == 2
+    for block in blocks:
+        loop = {"loop": "shown", "sample_time": 1.0, "valves": [{"name": "V1", "effects": []}]}
+        model = stiction_ros.LoopModel.from_mapping(loop | yaml.safe_load(block), "loops.md")
+        assert model.process.linear(1.0).step_responses(60)[-1, 0, 0] == pytest.approx(
+            0.8, abs=0.01
+        )
+
+
 @pytest.mark.trial
 def test_the_tutorial_comes_out_as_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

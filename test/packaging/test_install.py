@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.metadata import Metadata
 
 from stiction_ros.cli.extensions import OF_STUDIES
 from stiction_ros.nodes.__main__ import NODES
@@ -56,8 +59,18 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def pip_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install into a new environment that sees what this one has, but for package and studies."""
+def wheels(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Build the wheels of the package and of its studies."""
+    where, studies = tmp_path_factory.mktemp("wheels"), tmp_path_factory.mktemp("of") / "studies"
+    shutil.copytree(ROOT / "studies", studies, ignore=shutil.ignore_patterns("__pycache__"))
+    options = ["--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", where]
+    run(sys.executable, "-m", "pip", "wheel", *options, tree, studies)
+    return sorted(where.glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def pip_prefix(wheels: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel into a new environment that sees what else this one has, but no studies."""
     prefix = tmp_path_factory.mktemp("pip") / "environment"
     shared = tmp_path_factory.mktemp("shared")
     for entry in Path(sysconfig.get_path("purelib")).iterdir():
@@ -66,9 +79,9 @@ def pip_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     run(sys.executable, "-m", "venv", "--without-pip", prefix)
     site = prefix / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
     (site / "shared.pth").write_text(f"{shared}\n")
-    options = ["--no-deps", "--no-index", "--no-build-isolation"]
     python = prefix / "bin" / "python"
-    run(sys.executable, "-m", "pip", "--python", python, "install", *options, tree)
+    pip = (sys.executable, "-m", "pip", "--python", python)
+    run(*pip, "install", "--no-deps", "--no-index", wheels[0])
     return prefix
 
 
@@ -93,7 +106,7 @@ def symlink_prefix(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return colcon(tree, tmp_path_factory.mktemp("symlink"), "--symlink-install")
 
 
-@pytest.fixture(params=["pip", "colcon", "symlink"])
+@pytest.fixture(params=["pip", "colcon", pytest.param("symlink", marks=pytest.mark.trial)])
 def prefix(request: pytest.FixtureRequest) -> Path:
     return request.getfixturevalue(f"{request.param}_prefix")
 
@@ -126,6 +139,37 @@ def test_the_core_alone_lists_only_what_works(pip_prefix: Path, tmp_path: Path) 
     told = subprocess.run([str(command), "paper"], capture_output=True, text=True)
     assert told.returncode == 2
     assert "stiction-studies" in told.stderr
+
+
+def test_wheels_would_stand_on_a_public_index(wheels: list[Path]) -> None:
+    assert [wheel.name[:12] for wheel in wheels] == ["stiction_ros", "stiction_stu"]
+    for wheel in wheels:
+        with zipfile.ZipFile(wheel) as content:
+            names = content.namelist()
+            (told,) = (name for name in names if name.endswith(".dist-info/METADATA"))
+            metadata = Metadata.from_email(content.read(told))  # refuses what an index refuses
+        assert metadata.summary
+        assert metadata.description
+        assert metadata.description_content_type == "text/markdown"
+        assert metadata.license == "Apache-2.0"
+        assert [name for name in names if name.endswith("LICENSE")]
+        data = (".csv", ".mcap", ".db3", ".parquet", ".xlsx")
+        assert not [name for name in names if "test" in name.split("/") or name.endswith(data)]
+
+
+@pytest.mark.trial
+def test_the_first_program_of_the_readme_runs_with_the_core_alone(
+    pip_prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = (ROOT / "README.md").read_text(encoding="utf-8").partition("## Is it my valve?")[2]
+    program = re.search(r"^```python\n(.*?)^```", part, re.MULTILINE | re.DOTALL)
+    assert program is not None
+    monkeypatch.chdir(tmp_path)
+    run(pip_prefix / "bin" / "stiction", "simulate", "flow.loop.yaml", "--out", "history.csv")
+    assert "V1 sticky" in run(pip_prefix / "bin" / "python", "-c", program[1])
+    told = run(pip_prefix / "bin" / "stiction", "identify", "history.csv", "--out", "report")
+    assert "Have V1 serviced" in " ".join(told.split())
+    assert (tmp_path / "report" / "report.html").is_file()
 
 
 def test_only_the_command_is_in_bin(prefix: Path) -> None:

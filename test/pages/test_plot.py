@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from made import identification, record
 
+from stiction_ros.errors import InputError
 from stiction_ros.pages.plot import MOST, Curve, over_time
-from stiction_ros.pages.signals import Units, all_signals, close_look
+from stiction_ros.pages.signals import Units, all_signals, close_look, plot
 
 UNITS = Units("bar", "%")
 MARCH = 1709330400.0
@@ -66,3 +68,18 @@ def test_all_signals_have_one_figure_each() -> None:
     assert "PV1 (bar)" in page
     assert "set-point" in page
     assert "set-point" not in all_signals(dataclasses.replace(record(), sp=None), None, UNITS)
+
+
+def test_a_plot_is_shown_and_saved_and_has_a_close_look_of_what_was_identified(
+    tmp_path: Path,
+) -> None:
+    of = record()
+    plain, seen = plot(of), plot(of, identification(of))
+    assert (plain.page.count("<figure"), seen.page.count("<figure")) == (2, 6)
+    assert "stem, estimated" in seen.page
+    assert seen.save(tmp_path / "look.html").read_text(encoding="utf-8") == seen.page
+    assert "<figure" not in seen._repr_html_()
+    assert "&lt;figure" in seen._repr_html_()
+    assert repr(seen) == "Figure()"
+    with pytest.raises(InputError, match="samples, the record 50"):
+        plot(of.part(0, 50), identification(of))

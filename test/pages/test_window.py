@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made import identification, record
 
+from stiction_ros.identification.result.cause import CauseKind
 from stiction_ros.identification.result.identification import FitStatus, Identification
 from stiction_ros.pages.window import CYCLES, UNCYCLED, Window
 from stiction_ros.records.quality import Quality
@@ -15,11 +16,13 @@ from stiction_ros.records.quality import Quality
 PERIOD, SAMPLES = 60.0, 1200
 
 
-def answer(period: float | None = PERIOD) -> Identification:
+def answer(period: float | None = PERIOD, kind: CauseKind = CauseKind.VALVE) -> Identification:
     found = identification(record(SAMPLES))
     cause = found.outputs[0].cause
     assert cause is not None
-    output = dataclasses.replace(found.outputs[0], cause=dataclasses.replace(cause, period=period))
+    output = dataclasses.replace(
+        found.outputs[0], cause=dataclasses.replace(cause, kind=kind, period=period)
+    )
     return dataclasses.replace(found, outputs=(output,))
 
 
@@ -53,6 +56,8 @@ def test_without_a_cycle_some_samples_are_shown() -> None:
     window = Window.of(record(SAMPLES), answer(None))
     assert window.last - window.first == UNCYCLED
     assert "without a regular cycle" in window.named(1.0)
+    calm = answer(kind=CauseKind.NONE)
+    assert Window.of(record(SAMPLES), calm).period is None
     failed = dataclasses.replace(answer(), valves=(), outputs=(), status=FitStatus.NO_MODEL)
     assert Window.of(record(SAMPLES), failed).period is None
 

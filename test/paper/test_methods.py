@@ -27,7 +27,7 @@ def test_each_method_signs_its_result(method: str) -> None:
     record = loops.example1(0, samples=300)
     found = identify(record, dataclasses.replace(SMALL, method=method))
     assert found.method == method
-    document = found.to_json()
+    document = found.to_dict()
     assert document["model"]["method"] == method
     assert json.loads(json.dumps(document, allow_nan=False))["valves"][0]["name"] == "V1"
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, VerdictKind
-from stiction_ros.identification.problem.equation_error import ArxOrders, fit_outputs, squared_error
+from stiction_ros.paper.equation_error import fit_outputs, squared_error
 from stiction_ros.paper.methods import identify
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
@@ -30,6 +30,7 @@ from stiction_ros.paper.programme.starts import (
 from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS
 from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
 from stiction_ros.records.record import Record
+from stiction_ros.signals.arx_fit import ArxOrders
 
 OPTIONS = PaperOptions(
     method="nlp", output_order=3, input_order=3, delay=(5, 5), starts=4, friction_limit=100.0
@@ -171,6 +172,7 @@ def test_derivatives_are_those_of_the_objective_and_constraints(law: str) -> Non
         assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
 
 
+@pytest.mark.trial
 def test_no_stable_process_is_a_status() -> None:
     generator = np.random.default_rng(0)
     op = np.sin(np.arange(300) / 9.0)

@@ -58,6 +58,7 @@ def test_without_a_set_point_the_record_is_cut_into_parts() -> None:
     assert found.span == pytest.approx(4.0, rel=0.02)
 
 
+@pytest.mark.trial
 def test_the_paper_s_grids_have_the_paper_s_points() -> None:
     """Seed 1: Δu is 8.7 % in Example 1, 10.9 and 2.4 % in Example 2."""
     record = example1(1).record

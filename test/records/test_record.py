@@ -104,7 +104,7 @@ records = st.integers(2, 30).flatmap(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(records)
 def test_segments_cover_every_sample_once_and_usable_rows_all_that_is_usable(found: Record) -> None:
     covered = [row for first, last, _ in found.segments for row in range(first, last)]
@@ -118,7 +118,7 @@ def test_segments_cover_every_sample_once_and_usable_rows_all_that_is_usable(fou
         assert part.segments == (Segment(0, len(part), part.start),)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(records, st.data())
 def test_a_part_of_a_part_is_a_part(found: Record, data: st.DataObject) -> None:
     count = len(found)
@@ -133,7 +133,7 @@ def test_a_part_of_a_part_is_a_part(found: Record, data: st.DataObject) -> None:
     np.testing.assert_allclose(once.time + once.start, (found.time + found.start)[b:c])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(records)
 def test_filled_has_every_sample_at_its_time(found: Record) -> None:
     filled, rows = found.filled(), found.filled_rows()

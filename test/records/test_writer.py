@@ -61,7 +61,7 @@ def records(draw: st.DrawFn) -> Record:
 
 
 @given(records())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_what_is_written_is_read_back_without_naming_a_column(written: Record) -> None:
     with tempfile.TemporaryDirectory() as folder:
         write_csv(written, Path(folder) / "r.csv")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from browser import check, needs_browser, probe
 from made import identification, record
 
@@ -20,6 +21,7 @@ def test_the_report_of_a_record_is_readable(tmp_path: Path) -> None:
     check(probe(page, 390, dark=True), 390, dark=True)
 
 
+@pytest.mark.trial
 @needs_browser
 def test_the_report_of_a_run_is_readable(log: RunLog, tmp_path: Path) -> None:
     page = write_run(tell(log), tmp_path / "report.html").page

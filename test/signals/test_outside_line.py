@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from known_loops import DELAY, Kind, known
 
-from stiction_ros.identification.closed_loop.damping import ringing
+from stiction_ros.loop.damping import ringing
 from stiction_ros.loop.linear_loops import Process
 from stiction_ros.signals.outside_line import (
     NO_LINE,

@@ -58,6 +58,7 @@ def assessed(record: Record) -> Assessed:
     return assess(_loop(record), SurveyOptions(gain=False))
 
 
+@pytest.mark.trial
 def test_a_valve_that_sticks_is_found(assessed: Assessed) -> None:
     entry = assessed.entry
     assert entry.status is Status.OK

@@ -59,7 +59,7 @@ def _loops(count: int) -> list[Loop]:
 
 def test_the_json_has_the_keys_of_the_contract(tmp_path: Path) -> None:
     found = survey(_loops(3), Plan(SurveyOptions(), tmp_path), Counting())
-    document = json.loads(json.dumps(found.to_json()))
+    document = json.loads(json.dumps(found.to_dict()))
     assert {"engine", "workers", "seconds", "loops_per_minute", "loops"} <= set(document)
     for row in document["loops"]:
         assert set(row) >= KEYS
@@ -122,7 +122,7 @@ def test_units_that_are_given_later_come_onto_the_pages(tmp_path: Path) -> None:
     named = SurveyOptions(units=(("FIC000", "m³/h"),))
     found = survey(_loops(1), Plan(named, tmp_path, resume=True), Counting())
     assert page.read_text() == '<b>2 <span class="unit">m³/h</span></b>'
-    assert (found.before, found.to_json()["before"]) == (1, 1)
+    assert (found.before, found.to_dict()["before"]) == (1, 1)
     assert worked(found).startswith("1 loop, 0 of them in this run in ")
 
 
@@ -183,4 +183,4 @@ def test_the_tables_hold_the_list(tmp_path: Path) -> None:
 
 def test_identification_and_record_of_the_tests_fit() -> None:
     of = record()
-    assert identification(of).to_json()["valves"][0]["verdict"] == "sticky"
+    assert identification(of).to_dict()["valves"][0]["verdict"] == "sticky"

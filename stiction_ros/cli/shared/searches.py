@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LOOP_KINDS = ("flow", "pressure", "level", "temperature", "analyser")
 PAPER_METHODS = ("nlp", "nlp_printed", "grid")
 METHODS = ("exact", "evidence", *PAPER_METHODS)
-LINEAR_KINDS = ("arx", "armax", "state_space")
+LINEAR_KINDS = ("arx", "state_space")
 CRITERIA = ("aic", "bic")
 SUBSPACE_METHODS = ("n4sid", "moesp", "cva", "predictor")
 

@@ -13,6 +13,7 @@ from stiction_ros.discrepancy.data.gate import DataFinding
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
 from stiction_ros.discrepancy.fit.baseline import Baseline
+from stiction_ros.discrepancy.fit.uncertainty import Intervals
 from stiction_ros.discrepancy.gap.measure import (
     closed_share,
     gap_in_one_step,
@@ -21,7 +22,7 @@ from stiction_ros.discrepancy.gap.measure import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NoiseEffect, named_laws
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.effects import Behaviour, FloatArray
+from stiction_ros.effects import Backlash, Behaviour, FloatArray, HeStiction
 
 WIDEST = 10.0  # times the range of its signal that an interval of a size may be wide
 WHOLE = 0.95  # of a range of search: an interval that wide holds nothing out
@@ -68,7 +69,7 @@ class FoundEffect:
         """Effect with its law, such as ``stiction (xch)``; the effect alone where it has one."""
         return self.effect if self.law is None else f"{self.effect} ({self.law})"
 
-    def to_json(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Return the entry of ``effects`` in ``gap --json``."""
         return {
             "place": self.place,
@@ -199,3 +200,39 @@ def holds_nothing_out(
         if whole > 0.0 and high - low > WHOLE * whole:
             return True
     return False
+
+
+def without_its_jump(intervals: Intervals, effect: AddedEffect) -> Intervals:
+    """Return the intervals of a stiction, wide enough for no jump where that is not told from one.
+
+    Backlash is stiction whose f_S and f_D are both half of the band.
+    """
+    backlash = effect.place, Backlash.effect
+    if effect.effect != HeStiction.effect or backlash not in effect.alternatives:
+        return intervals
+    static, dynamic = intervals["f_s"], intervals["f_d"]
+    figures = figures_of(effect.behaviour)
+    half = 0.5 * (figures["f_s"] + figures["f_d"])
+    return {
+        **intervals,
+        "f_s": (min(static[0], half), static[1]),
+        "f_d": (dynamic[0], max(dynamic[1], half)),
+    }
+
+
+def behind_slope(intervals: Intervals, slope: float) -> Intervals:
+    """Return the intervals of a load, wide enough for either side of a curve's own slope.
+
+    A gain beside the curve of a valve mends the law by which its slope goes with its bend. What
+    enters beside the stem does not pass the curve: whether it passes that gain is not told.
+
+    Args:
+        intervals: behind the gain.
+        slope: the gain, 1 where none was changed.
+    """
+    found = dict(intervals)
+    for key in SIZES:
+        if key in found:
+            low, high = found[key]
+            found[key] = (min(low, slope * low), max(high, slope * high))
+    return found

@@ -40,7 +40,7 @@ class NotConsidered:
         """Name for people, such as ``valve stiction (kano)``."""
         return f"{self.place} {self.effect}" + (f" ({self.law})" if self.law else "")
 
-    def to_json(self) -> dict[str, str]:
+    def to_dict(self) -> dict[str, str]:
         """Return the entry of ``not_considered`` in ``gap --json``."""
         law = {} if self.law is None else {"law": self.law}
         return {"place": self.place, "effect": self.effect, **law, "reason": self.reason}

@@ -10,8 +10,7 @@ from stiction_ros.discrepancy.answer.not_considered import NotConsidered, left_o
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck
 from stiction_ros.discrepancy.data.gate import Gate
 from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict
-from stiction_ros.discrepancy.decision.scores import Scores
-from stiction_ros.discrepancy.decision.testable import Testable
+from stiction_ros.discrepancy.decision.scores import Scores, Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap.measure import OutputGap
 from stiction_ros.discrepancy.gap.noise_check import OutputNoise
@@ -115,11 +114,11 @@ class Discrepancy:
         )
         return (*listed, *left_out(self.model_before.outputs, self.gate.alone))
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``."""
         return {
             "verdict": self.verdict.value,
-            "effects": [effect.to_json() for effect in self.effects],
+            "effects": [effect.to_dict() for effect in self.effects],
             "alternatives": [{"place": p, "effect": e} for p, e in self.alternatives],
             "experiment": self.experiment,
             "where": list(self.where),
@@ -127,12 +126,12 @@ class Discrepancy:
                 {"place": t.place, "effect": t.effect, "experiment": t.experiment}
                 for t in self.untestable
             ],
-            "not_considered": [entry.to_json() for entry in self.not_considered],
-            "noise": {each.name: each.to_json() for each in self.noise},
-            "process_changes": [each.to_json() for each in self.process_changes],
+            "not_considered": [entry.to_dict() for entry in self.not_considered],
+            "noise": {each.name: each.to_dict() for each in self.noise},
+            "process_changes": [each.to_dict() for each in self.process_changes],
             "gap": {
-                "before": {gap.name: gap.to_json() for gap in self.before},
-                "after": {gap.name: gap.to_json() for gap in self.after},
+                "before": {gap.name: gap.to_dict() for gap in self.before},
+                "after": {gap.name: gap.to_dict() for gap in self.after},
                 "closed": self.closed,
             },
             "model_before": self.model_before.to_mapping(),

@@ -8,7 +8,7 @@ from stiction_ros.discrepancy.answer.found_effects import FoundEffect
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.decision.decide import GapVerdict
 from stiction_ros.discrepancy.decision.extend import AddedEffect
-from stiction_ros.discrepancy.decision.testable import Testable
+from stiction_ros.discrepancy.decision.scores import Testable
 from stiction_ros.effects import about
 
 LEFT = 0.4  # of the last effect's score: what may stay unexplained beside a name

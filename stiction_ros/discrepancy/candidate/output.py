@@ -8,8 +8,15 @@ from typing import Self
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.candidate.lags import lag_axis, lasts, late_axes, later
+from stiction_ros.discrepancy.candidate.base import (
+    Candidate,
+    GridBehaviour,
+    Response,
+    lag_axis,
+    lasts,
+    late_axes,
+    later,
+)
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end
 from stiction_ros.effects import (
     Axis,

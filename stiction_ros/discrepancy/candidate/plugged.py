@@ -20,14 +20,38 @@ ON_OUTPUTS = ("process", "disturbance", "sensor")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class PluggedValve(ValveCandidate):
-    """A behaviour at the end of a valve's chain, by its own axes.
+class _Plugged(Candidate):
+    """A behaviour by its own axes, wherever it acts.
 
     Attributes:
         plugged: the behaviour.
+        moments: at which PV surprises most, s; first values of a figure that is a moment.
     """
 
     plugged: type[Behaviour]
+    moments: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
+
+    def grid(self) -> FloatArray:
+        return with_moments(super().grid(), self.axes, self.moments if self.dated else None)
+
+    @property
+    def about(self) -> type[Behaviour]:
+        return self.plugged
+
+    @property
+    def law(self) -> str | None:
+        return self.plugged.law
+
+    def possible(self, points: FloatArray) -> BoolArray:
+        return possible(self.plugged, points)
+
+    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
+        return made(self.plugged, point)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class PluggedValve(_Plugged, ValveCandidate):
+    """A behaviour at the end of a valve's chain."""
 
     @classmethod
     def of(cls, run: FreeRun, valve: int, kind: type[Behaviour]) -> Self:
@@ -40,9 +64,6 @@ class PluggedValve(ValveCandidate):
             kind=kind,
             plugged=kind,
         )
-
-    def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self.plugged, points)
 
     def stems(self, run: FreeRun, points: FloatArray, *, from_measured: bool = False) -> FloatArray:
         """Return stem positions, shape (N, G), %; OP where the figures are not possible."""
@@ -57,24 +78,16 @@ class PluggedValve(ValveCandidate):
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         return dataclasses.replace(super().respond(run, points), possible=self.possible(points))
 
-    @property
-    def about(self) -> type[Behaviour]:
-        return self.plugged
-
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class PluggedLoad(Candidate):
-    """A behaviour that enters the process beside the stem of a valve, by its own axes.
+class PluggedLoad(_Plugged):
+    """A behaviour that enters the process beside the stem of a valve.
 
     Attributes:
         valve: its index.
-        plugged: the behaviour.
-        moments: at which PV surprises most, s.
     """
 
     valve: int
-    plugged: type[Behaviour]
-    moments: FloatArray
 
     @classmethod
     def of(cls, run: FreeRun, valve: int, kind: type[Behaviour], moments: FloatArray) -> Self:
@@ -89,17 +102,6 @@ class PluggedLoad(Candidate):
             moments=moments,
         )
 
-    def grid(self) -> FloatArray:
-        return with_moments(super().grid(), self.axes, self.moments if self.dated else None)
-
-    @property
-    def about(self) -> type[Behaviour]:
-        return self.plugged
-
-    @property
-    def law(self) -> str | None:
-        return self.plugged.law
-
     def respond(self, run: FreeRun, points: FloatArray) -> Response:
         wave = simulated(run, self.plugged, points, np.zeros(len(run.runs)))
         entering = run.stems[:, self.valve, None] + wave
@@ -107,24 +109,10 @@ class PluggedLoad(Candidate):
         shifts = {i: run.drive(i, self.valve, entering) - run.forced[:, i : i + 1] for i in reached}
         return Response(shifts or {0: np.zeros(wave.shape)}, possible=self.possible(points))
 
-    def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self.plugged, points)
-
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return made(self.plugged, point)
-
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class PluggedOutput(OutputCandidate):
-    """A behaviour in the process, on an output or at its sensor, by its own axes.
-
-    Attributes:
-        plugged: the behaviour.
-        moments: at which PV surprises most, s.
-    """
-
-    plugged: type[Behaviour]
-    moments: FloatArray
+class PluggedOutput(_Plugged, OutputCandidate):
+    """A behaviour in the process, on an output or at its sensor."""
 
     @classmethod
     def of(
@@ -141,17 +129,6 @@ class PluggedOutput(OutputCandidate):
         )
         return dataclasses.replace(bare, axes=axes_of(kind, seen_of(run, bare.signal(run))))
 
-    def grid(self) -> FloatArray:
-        return with_moments(super().grid(), self.axes, self.moments if self.dated else None)
-
-    @property
-    def about(self) -> type[Behaviour]:
-        return self.plugged
-
-    @property
-    def law(self) -> str | None:
-        return self.plugged.law
-
     def signal(self, run: FreeRun) -> FloatArray:
         """Return what it acts on: nothing, the output of the process, or what a sensor sees."""
         if self.place.startswith("disturbance:"):
@@ -165,12 +142,6 @@ class PluggedOutput(OutputCandidate):
             {self.output: simulated(run, self.plugged, points, incoming) - incoming[:, None]},
             possible=self.possible(points),
         )
-
-    def possible(self, points: FloatArray) -> BoolArray:
-        return possible(self.plugged, points)
-
-    def behaviour(self, run: FreeRun, point: FloatArray, factors: FloatArray) -> Behaviour:
-        return made(self.plugged, point)
 
 
 def plugged_candidates(run: FreeRun, whitened: list[FloatArray]) -> list[Candidate]:

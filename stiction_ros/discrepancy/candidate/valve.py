@@ -9,8 +9,15 @@ from typing import Self
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidate.base import Candidate, GridBehaviour, Response
-from stiction_ros.discrepancy.candidate.lags import lag_axis, lasts, late_axes, later
+from stiction_ros.discrepancy.candidate.base import (
+    Candidate,
+    GridBehaviour,
+    Response,
+    lag_axis,
+    lasts,
+    late_axes,
+    later,
+)
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, end_to_end, over_samples
 from stiction_ros.effects import (
     Axis,
@@ -182,20 +189,24 @@ class StictionCandidate(ValveCandidate):
         return np.column_stack([static, (totals - jumps) / (totals + jumps), leads])
 
 
-class BacklashCandidate(ValveCandidate):
-    """Backlash by its band and the place of the stem in it at the start."""
+class OneFigure(ValveCandidate):
+    """A behaviour of one figure; what else is searched, as where the stem stood, is none of it."""
 
     def rows(self, points: FloatArray) -> FloatArray:
         return points[:, :1]
-
-    def lead(self, point: FloatArray) -> float:
-        return 0.5 * AT_REST * float(point[0] * point[1])
 
     def count(self, point: FloatArray) -> int:
         return 1
 
 
-class LagCandidate(ValveCandidate):
+class BacklashCandidate(OneFigure):
+    """Backlash by its band and the place of the stem in it at the start."""
+
+    def lead(self, point: FloatArray) -> float:
+        return 0.5 * AT_REST * float(point[0] * point[1])
+
+
+class LagCandidate(OneFigure):
     """A lag by its time constant, the place of the stem at the start, and how late it moves."""
 
     def large_enough(self, point: FloatArray, factors: FloatArray) -> bool:
@@ -205,18 +216,12 @@ class LagCandidate(ValveCandidate):
         stems = super().stems(run, points, from_measured=from_measured)
         return later(stems, points[:, 2:], run)
 
-    def rows(self, points: FloatArray) -> FloatArray:
-        return points[:, :1]
-
     def lead(self, point: FloatArray) -> float:
         return float(point[1])
 
-    def count(self, point: FloatArray) -> int:
-        return 1
-
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class SlewCandidate(ValveCandidate):
+class SlewCandidate(OneFigure):
     """A slew by its rate and the place of the stem at the start.
 
     Attributes:
@@ -230,14 +235,8 @@ class SlewCandidate(ValveCandidate):
         """Return the candidate at a valve by its index, its stem that near OP at the start."""
         return dataclasses.replace(cls.at(run, valve, Slew, axes), reach=reach)
 
-    def rows(self, points: FloatArray) -> FloatArray:
-        return points[:, :1]
-
     def lead(self, point: FloatArray) -> float:
         return self.reach * float(point[1])
-
-    def count(self, point: FloatArray) -> int:
-        return 1
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)

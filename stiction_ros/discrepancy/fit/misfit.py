@@ -3,15 +3,118 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from stiction_ros.discrepancy.candidate.base import Response
-from stiction_ros.discrepancy.fit.misfit_kernels import left_of_shifts, taken_by_sizes
+from stiction_ros.compiled import compiled
+from stiction_ros.discrepancy.candidate.base import Candidate, Response
+from stiction_ros.discrepancy.likelihood.kernels import whitened_block
 from stiction_ros.discrepancy.likelihood.noise import Blocks, left_by
-from stiction_ros.effects import FloatArray
-from stiction_ros.signals.autoregression import TINY, whiten
+from stiction_ros.effects.behaviour import BoolArray, FloatArray, IntArray
+from stiction_ros.signals.autoregression import TINY, inner_product, whiten
+
+if TYPE_CHECKING:
+    from stiction_ros.discrepancy.fit.baseline import Baseline
+
+_RIDGE = 1e-10
+_ROUNDING = 1e-14
+
+
+@compiled
+def left_of_shifts(
+    target: FloatArray,
+    shift: FloatArray,
+    rows: IntArray,
+    basis: FloatArray,
+    ar: FloatArray,
+) -> FloatArray:
+    """Return the squared innovations that each response leaves, shape (G,).
+
+    Args:
+        target: whitened gap without the shared columns, shape (n,).
+        shift: responses, shape (N, G).
+        rows: of ``target`` among the N, rising.
+        basis: orthonormal, of the whitened shared columns, shape (n, r).
+        ar: φ, shape (p,).
+    """
+    size, rank = shift.shape[1], basis.shape[1]
+    squares, inside = np.zeros(size), np.zeros((rank, size))
+    white = np.empty(size)
+    for n in range(len(rows)):
+        k, wanted = rows[n], target[n]
+        for g in range(size):
+            white[g] = wanted - shift[k, g]
+        for i in range(min(len(ar), k)):
+            factor = ar[i]
+            for g in range(size):
+                white[g] += factor * shift[k - 1 - i, g]
+        for g in range(size):
+            squares[g] += white[g] * white[g]
+        for c in range(rank):
+            weight = basis[n, c]
+            for g in range(size):
+                inside[c, g] += weight * white[g]
+    for c in range(rank):
+        for g in range(size):
+            squares[g] -= inside[c, g] * inside[c, g]
+    return squares
+
+
+@compiled
+def _solved(gram: FloatArray, cross: FloatArray) -> FloatArray:
+    """Return the solution of positive definite equations; both arguments are used up."""
+    count = len(cross)
+    for i in range(count):
+        for j in range(i):
+            share = gram[i, j] / gram[j, j]
+            cross[i] -= share * cross[j]
+            for k in range(j, count):
+                gram[i, k] -= share * gram[j, k]
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            cross[i] -= gram[i, j] * cross[j]
+        cross[i] /= gram[i, i]
+    return cross
+
+
+@compiled
+def taken_by_sizes(
+    target: FloatArray,
+    sizes: FloatArray,
+    rows: BoolArray,
+    basis: FloatArray,
+    ar: FloatArray,
+) -> FloatArray:
+    """Return the squares that least squares of the factors takes away, shape (G,).
+
+    Args:
+        target, ar: as for :func:`left_of_shifts`; the shared columns are not in ``target``.
+        sizes: columns of the factors, shape (N, G, s).
+        rows: which of the N are those of ``target``, shape (N,).
+        basis: as for :func:`left_of_shifts`, but of shape (r, n).
+    """
+    points, count, rank = sizes.shape[1], sizes.shape[2], len(basis)
+    taken, inside = np.empty(points), np.empty((count, rank))
+    gram, cross = np.empty((count, count)), np.empty(count)
+    for g in range(points):
+        white = whitened_block(sizes[:, g].T.copy(), ar, rows, 0.0)
+        for s in range(count):
+            for c in range(rank):
+                inside[s, c] = inner_product(white[s], basis[c])
+        ridge = TINY
+        for s in range(count):
+            cross[s] = inner_product(white[s], target)
+            for t in range(s + 1):
+                whole = inner_product(white[s], white[t])
+                left = whole - inner_product(inside[s], inside[t])
+                gram[s, t] = gram[t, s] = left
+            ridge += _RIDGE * left + _ROUNDING * whole
+        for s in range(count):
+            gram[s, s] += ridge
+        wanted = cross.copy()
+        taken[g] = inner_product(_solved(gram, wanted), cross)
+    return taken
 
 
 class Shared(Protocol):
@@ -51,3 +154,34 @@ def misfit(
     if response.possible is not None:
         total = np.where(response.possible, total, np.inf)
     return np.asarray(total)
+
+
+PROBE = 0.05  # of a linear axis, at which its parabola is taken
+_TINY = 1e-300
+
+
+def settled(
+    base: Baseline,
+    gap: FloatArray,
+    candidate: Candidate,
+    coordinates: FloatArray,
+    ar: Mapping[int, FloatArray],
+) -> FloatArray:
+    """Return points with their linear figures at their best under given φ, shape (G, axes)."""
+    moved = coordinates.copy()
+    for d, axis in enumerate(candidate.axes):
+        if not axis.linear:
+            continue
+        scores = []
+        for side in (-1.0, 0.0, 1.0):
+            moved[:, d] = side * PROBE * axis.high
+            response = candidate.respond(base.run, candidate.values(moved))
+            scores.append(misfit(base, gap, response, ar))
+        kept = np.isfinite(scores).all(axis=0)  # elsewhere a side is no figure of the effect
+        scores = [np.where(kept, score, 0.0) for score in scores]
+        rows = sum(int(base.blocks[i].train.sum()) for i in response.outputs)
+        low, middle, high = np.exp((np.array(scores) - np.min(scores, axis=0)) / max(rows, 1))
+        bend = np.maximum(low - 2.0 * middle + high, _TINY)
+        vertex = np.clip(0.5 * PROBE * (low - high), -bend, bend) / bend
+        moved[:, d] = np.where(kept, vertex * axis.high, coordinates[:, d])
+    return moved

@@ -8,9 +8,8 @@ import numpy as np
 
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.misfit import misfit
+from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.fit.settled import settled
 from stiction_ros.effects import FloatArray
 
 SMOOTH = 3.84  # 95 % of one degree of freedom

@@ -11,15 +11,14 @@ import numpy as np
 from stiction_ros.deferred import halton_sequence
 from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.misfit import misfit
-from stiction_ros.discrepancy.fit.settled import settled
-from stiction_ros.discrepancy.fit.shared_factors import shared_factors
+from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag
 from stiction_ros.discrepancy.likelihood.grouped import best_noise
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
     NoiseFit,
     noise_forms,
+    shared_factors,
 )
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.effects import Behaviour, FloatArray

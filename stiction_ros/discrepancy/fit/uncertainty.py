@@ -10,15 +10,15 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import Candidate, figures_of
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.misfit import misfit
+from stiction_ros.discrepancy.fit.misfit import PROBE, misfit
 from stiction_ros.discrepancy.fit.region import SMOOTH, Region
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.fit.settled import PROBE
-from stiction_ros.discrepancy.fit.shared_factors import information, shared_factors
 from stiction_ros.discrepancy.likelihood.noise import (
     given_noise,
+    information,
     left_by,
     projector,
+    shared_factors,
     whitened_columns,
 )
 from stiction_ros.effects import FloatArray

@@ -31,7 +31,7 @@ class OutputGap:
     floor_free_run: float
     floor_one_step: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``."""
         return {
             "free_run_rmse": self.free_run_rmse,

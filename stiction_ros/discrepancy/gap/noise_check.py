@@ -40,7 +40,7 @@ class OutputNoise:
     disagrees: bool
     memory: int
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``gap --json``; a missing declaration is null."""
         return {
             "declared": None if math.isnan(self.declared) else self.declared,

@@ -16,7 +16,7 @@ KNOTS = 60
 LEAST_ROWS = 30
 WEIGHTS = 10.0 ** np.arange(-3.0, 4.0)
 CLEAR = 1.5  # times the usual size of innovations
-STRONG = 0.5  # share of a track's variance
+STRONG = 0.5  # share of the gap's variance
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,13 +27,11 @@ class Track:
         place: ``valve:TAG`` or ``disturbance:TAG``.
         wave: shape (N,), % at a valve, units of the output at a disturbance.
         gain: −2 log likelihood that it gains, less two per degree of freedom that it uses.
-        follows: share of its variance that OP, direction of OP, PV and time each explain.
     """
 
     place: str
     wave: FloatArray
     gain: float
-    follows: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,11 +63,7 @@ def locate(base: Baseline) -> Where:
                 f"{name}: {100 * share:.0f} % of the gap has a period of {spoken(period)}"
             )
     if tracks and tracks[0].gain > 10.0:
-        first = tracks[0]
-        sentences.append(f"a slow disturbance at {first.place} would close most of the gap")
-        for what, share in first.follows.items():
-            if share > STRONG:
-                sentences.append(f"that disturbance follows {what} (R² {share:.2f})")
+        sentences.append(f"a slow disturbance at {tracks[0].place} would close most of the gap")
     return Where(tuple(sentences), tuple(tracks), tuple(lines))
 
 
@@ -195,36 +189,4 @@ def _track(base: Baseline, output: int, place: str, hats: FloatArray, columns: F
         gain = rows * float(np.log(before / left)) - 2.0 * freedom
         if gain > best:
             best, wave = gain, hats @ beta
-    return Track(place, wave, best, _follows(base, output, wave))
-
-
-def _follows(base: Baseline, output: int, wave: FloatArray) -> dict[str, float]:
-    """Return R² of the wave on OP, the direction of OP, PV and time, one at a time."""
-    run = base.run.runs
-    found = {"PV": _share(wave, run.pv[:, output]), "time": _share(wave, run.time)}
-    for j, valve in enumerate(base.run.model.valve_names):
-        op = run.op[:, j]
-        found[f"OP of {valve}"] = _share(wave, op)
-        found[f"the direction of OP of {valve}"] = _share(wave, _direction(op))
-    return found
-
-
-def _direction(op: FloatArray) -> FloatArray:
-    """Return ±1: which way OP went last by more than a tenth of its span."""
-    out, last, state = np.zeros(len(op)), float(op[0]), 0.0
-    least = 0.1 * float(np.ptp(op))
-    for k, value in enumerate(op.tolist()):
-        if value - last > least:
-            last, state = value, 1.0
-        elif last - value > least:
-            last, state = value, -1.0
-        elif (value - last) * state > 0.0:
-            last = value
-        out[k] = state
-    return out
-
-
-def _share(wave: FloatArray, driver: FloatArray) -> float:
-    if float(np.std(wave)) <= 0.0 or float(np.std(driver)) <= 0.0:
-        return 0.0
-    return float(np.corrcoef(wave, driver)[0, 1] ** 2)
+    return Track(place, wave, best)

@@ -50,7 +50,7 @@ class ProcessChange:
     unit: str
     model: float | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``process_changes`` in ``gap --json``."""
         return dataclasses.asdict(self) | {"interval": list(self.interval)}
 

@@ -14,7 +14,7 @@ import numpy as np
 from stiction_ros.discrepancy.likelihood.noise import left_by, projector
 from stiction_ros.discrepancy.process.free_equation import Equation, Problem
 from stiction_ros.discrepancy.simulation.free_run import end_to_end
-from stiction_ros.discrepancy.simulation.response_kernels import filtered
+from stiction_ros.discrepancy.simulation.responses import filtered
 from stiction_ros.effects import FloatArray
 from stiction_ros.identification.kernels.delay import DEPENDENT, delay_energy
 from stiction_ros.identification.kernels.scan import without_projections

@@ -10,8 +10,8 @@ import numpy as np
 
 from stiction_ros.discrepancy.data.controller_check import check_controller, unseen_of
 from stiction_ros.discrepancy.data.effects import add_data_effects, corrected
+from stiction_ros.discrepancy.data.first_model import liveliest_parts
 from stiction_ros.discrepancy.data.gate import open_gate
-from stiction_ros.discrepancy.data.long_records import liveliest_parts
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.kept_back import with_surprises_fitted

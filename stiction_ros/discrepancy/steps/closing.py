@@ -8,15 +8,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stiction_ros.discrepancy.answer.doubts import behind_slope, without_its_jump
 from stiction_ros.discrepancy.answer.found_effects import (
     FoundEffect,
+    behind_slope,
     holds_nothing_out,
     moved_by,
     of_data,
     of_noise,
     own_closed,
     units_of,
+    without_its_jump,
 )
 from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.answer.say import LEFT, called, experiment_for, overall, reason_for
@@ -41,7 +42,7 @@ from stiction_ros.discrepancy.gap.noise_check import (
 )
 from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, noise_effects
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
-from stiction_ros.discrepancy.process.free_intervals import with_free_process
+from stiction_ros.discrepancy.process.free_search import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
 from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
 from stiction_ros.discrepancy.steps.settle import settle

@@ -19,8 +19,12 @@ from stiction_ros.discrepancy.decision.extend import (
     told_already,
 )
 from stiction_ros.discrepancy.decision.measured_stem import not_contradicted, told_by_stem
-from stiction_ros.discrepancy.decision.scores import Scores, all_candidates, score_candidates
-from stiction_ros.discrepancy.decision.testable import testable_effects
+from stiction_ros.discrepancy.decision.scores import (
+    Scores,
+    all_candidates,
+    score_candidates,
+    testable_effects,
+)
 from stiction_ros.discrepancy.fit.uncertainty import chance_threshold, stored_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process

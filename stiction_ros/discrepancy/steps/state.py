@@ -11,8 +11,7 @@ from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.data.controller_check import ControllerCheck
 from stiction_ros.discrepancy.data.gate import DataFinding, Gate
 from stiction_ros.discrepancy.decision.extend import AddedEffect, base_beside, base_with
-from stiction_ros.discrepancy.decision.scores import Progress
-from stiction_ros.discrepancy.decision.testable import Testable
+from stiction_ros.discrepancy.decision.scores import Progress, Testable
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.gap_options import GapOptions
 from stiction_ros.discrepancy.process.change import ProcessChange

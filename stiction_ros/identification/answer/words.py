@@ -32,8 +32,7 @@ def why(found: Identification, valve: int) -> str:
     band = estimate.static_friction + estimate.dynamic_friction
     if kind is VerdictKind.UNDECIDED:
         reason = estimate.experiment.partition(". ")[0].rstrip(".") + "."
-        cause = cause_of(found, valve)
-        if cause is None or cause.kind is not CauseKind.NONE or estimate.is_likely:
+        if not _calm(found, valve):
             return reason
         return f"The loop does not oscillate: nothing to repair is visible. {reason}"
     if kind is VerdictKind.HEALTHY:
@@ -70,7 +69,10 @@ def next_step(found: Identification, valve: int, *, asked: bool = False) -> str:
     """
     estimate = found.valves[valve]
     if estimate.verdict is VerdictKind.UNDECIDED:
-        return estimate.experiment.partition(". ")[2] or "Record the loop for longer."
+        step = estimate.experiment.partition(". ")[2] or "Record the loop for longer."
+        if not _calm(found, valve):
+            return step
+        return f"Nothing, while the loop is calm. What would decide: {step[0].lower()}{step[1:]}"
     cause = cause_of(found, valve)
     kind = CauseKind.NONE if cause is None else cause.kind
     other = CAUSES.get(kind, "")
@@ -91,6 +93,13 @@ def next_step(found: Identification, valve: int, *, asked: bool = False) -> str:
         f"{service}; ask stiction gain what a service, another tuning or a controller that knows "
         "the friction would bring."
     )
+
+
+def _calm(found: Identification, valve: int) -> bool:
+    """Return whether the loop does not oscillate and friction is not likely either."""
+    cause = cause_of(found, valve)
+    still = cause is not None and cause.kind is CauseKind.NONE
+    return still and not found.valves[valve].is_likely
 
 
 def cause_of(found: Identification, valve: int) -> Cause | None:

@@ -6,13 +6,12 @@ import dataclasses
 
 from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,
-    LoopStatus,
     OutputLoop,
     ValveLoop,
 )
-from stiction_ros.identification.closed_loop.damping import Ringing
 from stiction_ros.identification.result.cause import Cause, CauseKind
 from stiction_ros.identification.result.identification import Identification, ValveEstimate
+from stiction_ros.loop.damping import Ringing
 from stiction_ros.records.record import Record
 from stiction_ros.signals.oscillation import REGULAR
 
@@ -100,9 +99,7 @@ def explained(record: Record, found: Identification, closed: ClosedLoop) -> Iden
 def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
     """Return the figures of one closed loop, by name; none where it could not be closed.
 
-    ``loop_ratio`` and ``loop_ratio_free``: movement of OP over the recorded one when the loop
-    is closed without noise, with the friction and without. ``loop_alike``: share of those
-    runs that move as recorded. ``moved_with``, ``moved_without``: the same when the record is
+    ``moved_with``, ``moved_without``: movement of OP over the recorded one when the record is
     repeated with its noise. ``loop_gone``: share of that movement that goes away.
     ``controller_fit``: R². ``outside_line``: BIC gain by a line that enters behind the valve;
     ``line_rivalry``: that of a line alone over that of the friction.
@@ -111,16 +108,13 @@ def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
         return {}
     told = {
         "controller_fit": loop.controller.r_squared,
-        "loop_ratio_free": loop.without_friction.ratio,
         "moved_without": loop.moved_without,
         "outside_line": loop.outside.gain,
     }
-    if loop.status is not LoopStatus.UNTESTABLE:
+    if loop.band_share > 0.0:
         output = next(one for one in closed.outputs if one.name == loop.output)
         told |= {
             "line_rivalry": output.rivalry,
-            "loop_ratio": loop.with_friction.ratio,
-            "loop_alike": loop.with_friction.alike,
             "moved_with": loop.moved_with,
             "loop_gone": loop.gone,
         }

@@ -1,4 +1,4 @@
-"""The runs of a loop that is closed again: which frictions, controllers and starts."""
+"""The runs of a loop that is closed again, with the frictions that may be and without."""
 
 from __future__ import annotations
 
@@ -7,31 +7,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import FollowingRules
-from stiction_ros.effects.friction.switching import MovingCells, SlipPolygons
-from stiction_ros.identification.closed_loop.movement import Moved, gone, moving, size
+from stiction_ros.effects.friction.switching import MovingCells
 from stiction_ros.identification.closed_loop.scaled_loop import ScaledLoop, free_run, set_points_of
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
 from stiction_ros.loop.linear_loops import Controllers, Pairs, Process, Runs, run_loops
+from stiction_ros.signals.movement import moving, size
 from stiction_ros.signals.oscillation import (
     REGULAR,
     oscillation,
 )
-from stiction_ros.signals.recovered_controller import RecoveredController
 from stiction_ros.signals.spectral_lines import fitted_lines
 
-STARTS = (0.2, 0.5, 0.8)
-"""Shares of the longest stretch at which runs begin as recorded."""
-
-KICKS = (-2.0, 2.0)
-"""Standard deviations of PV by which the other runs begin away from rest."""
-
-CYCLES = 14
-"""Periods that a run goes on."""
-
-FEWEST, MOST = 240, 6000
+MOST = 6000
 """Samples of a run."""
 
 NOISES = 3
@@ -43,20 +34,34 @@ LINES = 3
 SEED = 20
 """Of the noises: the same record gives the same answer."""
 
-KNOWN = 1e-10
-"""Variance of coefficients over their square that is rounding and no uncertainty."""
-
 DOUBTED = 0.7
 """Share of the friction that is tried as its least where the interval begins at none."""
 
 
 def law_of(valve: ValveEstimate) -> tuple[float, float, float]:
-    """Return what the runs are told of a valve's law; of one without switching patterns, He's."""
+    """Return what the runs are told of a valve's law; of one without a known form, He's."""
     law = find_law(valve.law)
     if isinstance(law.switching, MovingCells):
         return (1.0, 0.0, 1.0) if law.switching.rules is FollowingRules else (0.0, 1.0, 1.0)
-    slips = isinstance(law.switching, SlipPolygons)
-    return 0.0, 0.0, valve.further_values[0] if slips else 1.0
+    friction = valve.behaviour()
+    form = friction.jump_form() if isinstance(friction, Stiction) else None
+    return 0.0, 0.0, 1.0 if form is None else form.overshoot
+
+
+@dataclasses.dataclass(frozen=True)
+class Moved:
+    """How a loop moves when its record is repeated, between moves of its set-point.
+
+    Attributes:
+        with_friction, without_friction: movement of OP over the recorded one.
+        gone: share that goes away with the friction, of OP's movement or of that of PV − SP,
+            whichever is more: a controller that passes noise on to the valve moves OP anyway,
+            and one that is slow hardly moves it at all.
+    """
+
+    with_friction: float
+    without_friction: float
+    gone: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,14 +120,6 @@ class Repeated:
         a, b, delay, _ = self.process
         late = max(law.lag for _, law in self.pairs)
         return int(max(a.shape[1], b.shape[2] + int(delay.max()), 3 + late))
-
-    def with_friction(self, valve: int) -> FloatArray:
-        """Return OP, shape (R, n), with the frictions tried for ``valve``."""
-        return self._run(valve, self.frictions[valve])
-
-    def without_friction(self, valve: int) -> FloatArray:
-        """Return OP, shape (R, n), of a valve that follows it."""
-        return self._run(valve, np.zeros((1, 2)))
 
     def recorded(self, valve: int, period: float) -> float:
         """Return the size of the recorded movement of OP about its slow mean.
@@ -252,69 +249,12 @@ class Repeated:
         )
         repeated = np.repeat(sp[None], number, axis=0)
         outside = np.ascontiguousarray(load)
-        return run_loops(self.process, Controllers.of(self.pairs), runs, repeated, outside, True)
-
-    def _run(self, valve: int, frictions: FloatArray) -> FloatArray:
-        """Return OP of one valve, shape (R, n), without a load and with resting set-points."""
-        period, past = self.periods[valve], self.past
-        count = int(np.clip(CYCLES * period, FEWEST, MOST))
-        laws = [law.coefficients for _, law in self.pairs]
-        tunings = tried_tunings(self.pairs[valve][1])
-        starts = self._starts(valve)
-        number = len(frictions) * len(tunings) * len(starts)
-        friction = np.repeat(self.frictions[None, :, 0], number, axis=0)
-        tuning = np.repeat(np.array(laws)[None], number, axis=0)
-        begins, sp = [], np.empty((number, past + count, self._p))
-        row = 0
-        for pair in frictions:
-            for law in tunings:
-                for start in starts:
-                    friction[row, valve], tuning[row, valve] = pair, law
-                    begins.append(start)
-                    sp[row] = start.sp
-                    row += 1
-        runs = Runs(
-            friction,
-            tuning,
-            np.array([start.pv for start in begins]),
-            np.array([start.stem for start in begins]),
-            np.array([start.op for start in begins]),
-            self.laws,
-        )
-        op, _ = run_loops(
-            self.process, Controllers.of(self.pairs), runs, sp, np.zeros_like(sp[:1]), False
-        )
-        return np.ascontiguousarray(op[:, :, valve])
-
-    def _starts(self, valve: int) -> list[_Start]:
-        first, last = self.loop.longest
-        past, half = self.past, round(self.periods[valve] / 2)
-        starts = []
-        for share in STARTS:
-            row = min(first + max(past, round(share * (last - first))), last - 1)
-            rows = slice(row - past, row)
-            near = slice(max(first, row - half), min(last, row + half + 1))
-            pv = self.simulated[rows] + self.load[near].mean(axis=0)
-            sp = self.set_points[row]
-            starts.append(_Start(pv, self.loop.stem[rows], self.loop.op[row - 1], sp))
-        output = self.pairs[valve][0]
-        rest = self.set_points[first:last].mean(axis=0)
-        for kick in KICKS:
-            pv = np.repeat(rest[None], past, axis=0)
-            pv[:, output] += kick
-            stem = np.zeros((past, self.loop.op.shape[1]))
-            starts.append(_Start(pv, stem, stem[0].copy(), rest))
-        return starts
+        return run_loops(self.process, Controllers.of(self.pairs), runs, repeated, outside)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Start:
-    """PV, shape (H, p), stems, shape (H, m), and OP, shape (m,), before a run; SP during it."""
-
-    pv: FloatArray
-    stem: FloatArray
-    op: FloatArray
-    sp: FloatArray
+def gone(stuck: float, free: float) -> float:
+    """Return the share of a movement that is gone where it is another one without a friction."""
+    return max(0.0, 1.0 - free / stuck) if 0.0 < stuck < np.inf else 0.0
 
 
 def surrogate(values: FloatArray, random: np.random.Generator) -> FloatArray:
@@ -351,22 +291,6 @@ def tried_frictions(valve: ValveEstimate) -> FloatArray:
     return np.array(
         [(f_s, f_d), (low_s, min(low_d, low_s)), (max(high_s, f_s), min(high_d, high_s))]
     )
-
-
-def tried_tunings(law: RecoveredController) -> FloatArray:
-    """Return the coefficients and those one standard error away along each axis, shape (T, 3)."""
-    values, vectors = np.linalg.eigh(law.covariance)
-    found = [law.coefficients]
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value <= KNOWN * float(law.coefficients @ law.coefficients):
-            continue
-        for sign in (-1.0, 1.0):
-            one = law.coefficients + sign * np.sqrt(value) * vector
-            for k in range(2):  # gain and reset keep their sign
-                if one[k] * law.coefficients[k] <= 0.0:
-                    one[k] = 0.2 * law.coefficients[k]
-            found.append(one)
-    return np.array(found)
 
 
 def span_of(loop: ScaledLoop, valve: int, period: float) -> float:

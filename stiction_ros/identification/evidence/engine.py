@@ -183,7 +183,7 @@ def _judged(
         verdict=verdict,
         probability=probability,
         figures=figures,
-        evidence=figures.to_json(),
+        evidence=figures.to_dict(),
         stability=stability(verdict is VerdictKind.HEALTHY),
     )
     if verdict.has_friction:

@@ -31,10 +31,8 @@ from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import settled
 from stiction_ros.identification.evidence.outside_waves import outside_wave
 from stiction_ros.identification.evidence.search import (
-    ALL,
     APART,
     Found,
-    Parts,
     better,
     heads,
     search,
@@ -170,35 +168,31 @@ def price_beside(wave_gain: float | None) -> float:
     return PRICE if wave_gain is None else PRICE + BESIDE + INEXACT * wave_gain
 
 
-def at_all_rates(
-    record: Record, options: IdentificationOptions, parts: Parts = ALL
-) -> list[Problem]:
+def at_all_rates(record: Record, options: IdentificationOptions) -> list[Problem]:
     """Return a record without gaps at each rate for which enough rows are left, as it is first."""
     step, _ = refresh(record)
     rates = [step * k for k in RATES if k == 1 or len(record) // (step * k) >= LEAST_ROWS]
-    told = tunings(record) if parts.tuning else ()
-    measured = restored(record, options) if parts.holding else record
+    told, measured = tunings(record), restored(record, options)
     return [Problem.of(measured, options, rate, told) for rate in rates]
 
 
-def looks(record: Record, options: IdentificationOptions, parts: Parts = ALL) -> tuple[Look, ...]:
+def looks(record: Record, options: IdentificationOptions) -> tuple[Look, ...]:
     """Return what each rate shows for which enough rows are left, the record as it is first.
 
     Args:
         record: without gaps.
         options: law, largest friction, smallest delay and level.
-        parts: of the search that are used.
     """
-    problems = at_all_rates(record, options, parts)
+    problems = at_all_rates(record, options)
     further = settled(problems[0])
     problems = [dataclasses.replace(problem, further=further) for problem in problems]
-    found = _searched(problems, parts)
-    outputs = range(len(record.outputs)) if parts.waves else ()
+    found = _searched(problems)
+    outputs = range(len(record.outputs))
     waves = tuple(outside_wave(problems, i) for i in outputs)
     gains: list[float | None] = [None] * len(problems)
     if any(waves):
         beside = [problem.with_waves([w.lines if w else () for w in waves]) for problem in problems]
-        also = _searched(beside, parts, _all_heads(problems, found))
+        also = _searched(beside, _all_heads(problems, found))
         for k, (plain, waved) in enumerate(zip(found, also, strict=True)):
             gains[k] = max(plain.ideal.loss - waved.ideal.loss, 0.0)
             found[k] = better(plain, waved)
@@ -213,11 +207,9 @@ def looks(record: Record, options: IdentificationOptions, parts: Parts = ALL) ->
     return tuple(seen)
 
 
-def _searched(
-    problems: Sequence[Problem], parts: Parts, seeds: Sequence[Candidate] = ()
-) -> list[Found]:
+def _searched(problems: Sequence[Problem], seeds: Sequence[Candidate] = ()) -> list[Found]:
     """Return what is found at each rate, what is best at one tried at the others, and ``seeds``."""
-    found = [search(problem, parts) for problem in problems]
+    found = [search(problem) for problem in problems]
     for _ in range(RATE_ROUNDS):
         heads_of = [_heads(*one) for one in zip(problems, found, strict=True)]
         for k, problem in enumerate(problems):

@@ -52,28 +52,6 @@ SWEEPS = 3  # searches of a valve, at most
 
 
 @dataclasses.dataclass(frozen=True)
-class Parts:
-    """What a search is made of; one is left out to see what it is worth.
-
-    Attributes:
-        growing: seeds from beginnings of the record as it is.
-        triangle: seeds from a grid at slower rates.
-        waves: all once more beside a wave from outside, where one may be there.
-        tuning: what the controller tells of the process it was tuned for.
-        holding: rows that a sensor repeats count as not measured.
-    """
-
-    growing: bool = True
-    triangle: bool = True
-    waves: bool = True
-    tuning: bool = True
-    holding: bool = True
-
-
-ALL = Parts()
-
-
-@dataclasses.dataclass(frozen=True)
 class Found:
     """What a search met.
 
@@ -232,15 +210,13 @@ def _key(row: FloatArray) -> tuple[float, ...]:
     return tuple(round(float(value), 9) for value in row)
 
 
-def search_valve(
-    problem: Problem, base: Candidate, valve: int, parts: Parts = ALL
-) -> list[Candidate]:
+def search_valve(problem: Problem, base: Candidate, valve: int) -> list[Candidate]:
     """Return all candidates met in a search over the friction of one valve, best first."""
     looked = _Valve(problem, base, valve)
     drifting = [white(problem, i, base.stems, DRIFT) for i in range(len(base.fits))]
-    if problem.rate == 1 and parts.growing:
+    if problem.rate == 1:
         looked.grow(drifting)
-    if problem.rate > 1 and parts.triangle:
+    else:
         looked.look(drifting)
     if looked.met:
         looked.settle(anew=True)
@@ -249,13 +225,8 @@ def search_valve(
     return sorted([base, *looked.met], key=lambda one: one.loss)
 
 
-def search(problem: Problem, parts: Parts = ALL) -> Found:
-    """Search the frictions of all valves, each anew when that of another has changed.
-
-    Args:
-        problem: the record.
-        parts: of it that are used.
-    """
+def search(problem: Problem) -> Found:
+    """Search the frictions of all valves, each anew when that of another has changed."""
     without = ideal(problem)
     met, best = [without], without
     due = list(range(len(problem.op)))
@@ -263,7 +234,7 @@ def search(problem: Problem, parts: Parts = ALL) -> Found:
         if not due:
             break
         valve = due.pop(0)
-        found = search_valve(problem, best, valve, parts)
+        found = search_valve(problem, best, valve)
         met += found
         if found[0].loss < best.loss - GAIN:
             best = found[0]

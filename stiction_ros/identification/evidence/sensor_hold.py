@@ -72,7 +72,7 @@ def hold_notes(record: Record) -> tuple[str, ...]:
         return (f"PV is refreshed every {step} samples only",)
     shares = (100.0 * float(held_rows(column).mean()) for column in record.pv.T)
     return tuple(
-        f"{tag} was stale for {share:.0f} % of the samples, which are taken as not measured"
+        f"measurement {tag} was stale for {share:.0f} % of the samples; these count as not measured"
         for tag, share in zip(record.outputs, shares, strict=True)
         if round(share) > 0
     )

@@ -47,7 +47,7 @@ def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Ide
         if record.op[:, j].min() < 0.0 or record.op[:, j].max() > 100.0:
             notes.append(f"op of {tag} lies outside 0 to 100 %; friction is in the op's own units")
     notes += [
-        f"delay of {valve} to {output.name} is the longest tried, try a wider range with --delay"
+        f"the delay from valve {valve} to {output.name} is the longest tried; widen --delay"
         for output in outputs
         for valve, delay in output.delay.items()
         if delay == data.delay[1] > data.delay[0]

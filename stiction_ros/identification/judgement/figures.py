@@ -26,51 +26,51 @@ class Figures:
 
     gain: float = _figure(
         "nats",
-        "by which friction beats an ideal valve beyond its price, at the weaker of two rates of "
-        "sampling that agree on its size",
+        "log likelihood of friction minus that of an ideal valve, minus a price for f_S and f_D; "
+        "the lesser at two rates of sampling that find the same size",
         "two rates of sampling do not both show it",
         1,
     )
     ruled_out: float = _figure(
         "nats",
-        "by which an ideal valve beats the best friction that would matter, at the rate most "
-        "against it",
+        "log likelihood of an ideal valve minus that of the best friction large enough to matter, "
+        "at the rate of sampling that speaks most against friction",
         "one rate of sampling speaks against it",
         -1,
     )
     repeats: float = _figure(
         "ratio",
-        "how strongly the rest that an ideal valve leaves of PV repeats itself a turn later, over "
-        "what friction gains",
-        "PV also repeats itself a turn later, as beside another loop that cycles",
+        "how strongly the part of PV that an ideal valve does not explain returns one cycle "
+        "later, divided by the gain of friction",
+        "PV also repeats itself one cycle later, as beside another loop that cycles",
         -1,
     )
     loop_gone: float = _figure(
         "share",
-        "of the simulated loop's movement that goes away without the friction",
+        "part of the simulated loop's movement that goes away without the friction",
         "the simulated loop moves nearly as much without it",
         1,
     )
     moves: float = _figure(
         "count",
-        "of samples at which the estimated stem moves",
+        "samples at which the estimated stem moves",
         "the estimated stem moves too seldom, or in nearly every sample",
     )
     controller_fit: float = _figure(
-        "R²", "of OP's moves by the recovered controller", "the controller is hardly known"
+        "R²", "fit of the recovered controller to OP's moves", "the controller is hardly known"
     )
     band_share: float = _figure(
         "ratio",
-        "f_S + f_D over the range in which OP moves",
+        "f_S + f_D divided by the range in which OP moves",
         "its band is hardly of a size that makes this loop move",
     )
     cycle_share: float = _figure(
         "share",
-        "of the variance of PV − SP that is one cycle",
+        "part of the variance of PV − SP that belongs to one cycle",
         "the cycle is not of the kind that friction makes",
     )
 
-    def to_json(self) -> dict[str, float]:
+    def to_dict(self) -> dict[str, float]:
         """Return the figures by name."""
         return dataclasses.asdict(self)
 

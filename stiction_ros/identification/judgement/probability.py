@@ -59,7 +59,7 @@ def fitted_model() -> Model:
 
 def contributions(figures: Figures, model: Model | None = None) -> dict[str, float]:
     """Return what each figure adds to the log odds, by name; they sum up to them, less c_0."""
-    values = figures.to_json()
+    values = figures.to_dict()
     added = dict.fromkeys(values, 0.0)
     for tree in (model or fitted_model()).trees:
         node = tree[0]

@@ -23,7 +23,6 @@ class LinearKind(enum.StrEnum):
     """Structure of a linear model from stem positions (or OP) to PV."""
 
     ARX = "arx"
-    ARMAX = "armax"
     STATE_SPACE = "state_space"
 
 
@@ -36,7 +35,6 @@ class LinearStatus(enum.StrEnum):
 
     OK = "ok"
     CONSTRAINED = "constrained"
-    NOT_CONVERGED = "not_converged"
     UNSTABLE = "unstable"
     NO_MODEL = "no_model"
 

@@ -1,4 +1,4 @@
-"""One face for the linear models of a whole record: ARX, ARMAX and state space."""
+"""One face for the linear models of a whole record: ARX and state space."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from stiction_ros.identification.linear.subspace import (
     SubspaceOptions,
     fit_state_space,
 )
-from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
 from stiction_ros.intake.record_file import record_of
 from stiction_ros.records.record import Record
+from stiction_ros.signals.subspace_projection import SubspaceMethod
 from stiction_ros.signals.velocity_form import explained
 
 DEFAULT_ORDERS = (1, 2, 3)
@@ -54,8 +54,8 @@ class LinearOptions:
     Attributes:
         kind: structure of the model.
         order: n of a state-space model; None chooses.
-        output_order, input_order, noise_order: n_a, n_b and n_c of ARX and ARMAX; None
-            chooses n_a among 1, 2 and 3 and takes n_b = n_a, n_c = n_a.
+        output_order, input_order: n_a and n_b of ARX; None chooses n_a among 1, 2 and 3 and takes
+            n_b = n_a.
         delay: inclusive range of t_d, samples.
         criterion: AIC or BIC, for every order that is not given.
         method: projection of the state-space model.
@@ -73,7 +73,6 @@ class LinearOptions:
     order: int | None = None
     output_order: int | None = None
     input_order: int | None = None
-    noise_order: int | None = None
     delay: tuple[int, int] = (0, 0)
     criterion: OrderCriterion = OrderCriterion.BIC
     method: SubspaceMethod = SubspaceMethod.CVA
@@ -86,21 +85,17 @@ class LinearOptions:
         ):
             object.__setattr__(self, key, one_of(getattr(self, key), kind, key))
         space = self.kind is LinearKind.STATE_SPACE
-        polynomial = (self.output_order, self.input_order, self.noise_order)
+        polynomial = (self.output_order, self.input_order)
         if space and any(value is not None for value in polynomial):
-            raise InputError("n_a, n_b and n_c belong to arx and armax", fix="give the order n")
+            raise InputError("n_a and n_b belong to arx", fix="give the order n")
         if not space and self.order is not None:
             raise InputError(f"{self.kind} has no order n", where="order", fix="give na and nb")
-        if self.kind is LinearKind.ARX and self.noise_order:
-            raise InputError("arx has no n_c", where="nc", fix="use armax")
 
     def polynomial(self) -> OrderOptions:
-        """Return what the orders of ARX and ARMAX are chosen from."""
+        """Return what the orders of ARX are chosen from."""
         return OrderOptions(
-            kind=self.kind,
             output=DEFAULT_ORDERS if self.output_order is None else (self.output_order,),
             input=() if self.input_order is None else (self.input_order,),
-            noise=self.noise_order,
             delay=self.delay,
             criterion=self.criterion,
         )
@@ -148,11 +143,11 @@ def fit_linear(
         for i in range(len(data.outputs)):
             choices.append(choose_orders(data, i, options.polynomial()))
             report((i + 1) / len(data.outputs))
-        found = arx_result(data, options.kind, tuple(choices))
+        found = arx_result(data, tuple(choices))
     report(1.0)
     low, high = options.delay
     notes = tuple(
-        f"delay of {valve} to {output} is the longest tried, try a wider range with --delay"
+        f"the delay from valve {valve} to {output} is the longest tried; widen --delay"
         for i, output in enumerate(found.outputs)
         for j, valve in enumerate(found.valves)
         if found.delay[i, j] == high > low

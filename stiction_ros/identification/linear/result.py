@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.identification.linear.armax import ArmaxFit
 from stiction_ros.identification.linear.data import LinearData, LinearKind, LinearStatus
-from stiction_ros.identification.linear.orders import OrderChoice, OrderRow
+from stiction_ros.identification.linear.orders import OrderChoice
 from stiction_ros.identification.linear.subspace import StateSpaceFit
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import (
@@ -124,7 +123,7 @@ class LinearIdentification:
             name,
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``fit-linear --json`` but for ``record``."""
         outputs = []
         for i, tag in enumerate(self.outputs):
@@ -181,15 +180,13 @@ def state_space_result(data: LinearData, fit: StateSpaceFit) -> LinearIdentifica
     )
 
 
-def arx_result(
-    data: LinearData, kind: LinearKind, choices: tuple[OrderChoice, ...]
-) -> LinearIdentification:
-    """Return the common face of one ARX or ARMAX equation per output."""
+def arx_result(data: LinearData, choices: tuple[OrderChoice, ...]) -> LinearIdentification:
+    """Return the common face of one ARX equation per output."""
     fits = [choice.fit for choice in choices]
     doubtful = [fit for fit in fits if fit.status is not LinearStatus.OK]
     equations = tuple(fit.equation(data.valves) for fit in fits)
     return LinearIdentification(
-        kind=kind,
+        kind=LinearKind.ARX,
         status=doubtful[0].status if doubtful else LinearStatus.OK,
         reason="; ".join(f"{fit.name}: {fit.reason}" for fit in doubtful),
         record=data.name,
@@ -251,8 +248,6 @@ def _provenance(found: LinearIdentification) -> dict[str, Any]:
     if isinstance(found.detail, StateSpaceFit):
         fit = found.detail
         entry |= {"method": fit.method.value, "order": fit.order, "kalman_gain": fit.k.tolist()}
-    elif found.kind is LinearKind.ARMAX:
-        entry["c"] = {c.fit.name: c.fit.c.tolist() for c in found.detail}
     return entry
 
 
@@ -274,20 +269,26 @@ def _matrices_json(fit: StateSpaceFit) -> dict[str, Any]:
 
 def _equation_json(choice: OrderChoice, valves: tuple[str, ...]) -> dict[str, Any]:
     """Return the equation in absolute units, as ``identify --json`` gives it, and its rivals."""
-    fit: ArmaxFit = choice.fit
+    fit = choice.fit
     bias = fit.constant + (1.0 + fit.a.sum()) * fit.pv0 - fit.b.sum(axis=1) @ fit.stem0
     return {
         "a": fit.a.tolist(),
         "b": dict(zip(valves, fit.b.tolist(), strict=True)),
-        "c": fit.c.tolist(),
         "bias": float(bias),
         "status": fit.status.value,
-        "criterion": f"{choice.criterion} of the {choice.judged} error",
-        "rivals": [_row_json(row) for row in choice.rows],
+        "criterion": f"{choice.criterion} of the free run",
+        "rivals": [
+            {
+                "na": rival.orders.output,
+                "nb": rival.orders.input,
+                "delays": list(rival.delays),
+                "status": rival.status.value,
+                "aic": rival.aic,
+                "bic": rival.bic,
+                "fit_one_step": rival.fit_one_step,
+                "fit_free_run": rival.fit_free_run,
+                "chosen": rival is fit,
+            }
+            for rival in choice.rivals
+        ],
     }
-
-
-def _row_json(row: OrderRow) -> dict[str, Any]:
-    values = dataclasses.asdict(row)
-    orders = values.pop("orders")
-    return {"na": orders["output"], "nb": orders["input"], "nc": orders["noise"]} | values

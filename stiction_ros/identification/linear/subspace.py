@@ -24,10 +24,10 @@ from stiction_ros.identification.linear.data import (
     information,
     nrmse_fit,
 )
-from stiction_ros.identification.linear.state_space_fit import (
+from stiction_ros.processes import LinearModel
+from stiction_ros.signals.state_space_fit import (
     TINY,
     Realisation,
-    Refinement,
     predict,
     realise,
     realise_by_shift,
@@ -35,14 +35,14 @@ from stiction_ros.identification.linear.state_space_fit import (
     with_best_gain,
     with_initial_state,
 )
-from stiction_ros.identification.linear.subspace_projection import (
+from stiction_ros.signals.subspace_projection import (
     StateSequence,
     SubspaceMethod,
     state_sequence,
 )
-from stiction_ros.processes import LinearModel
 
-DEFAULT_HORIZON = 15
+DEFAULT_HORIZON = 15  # block rows of past and future, samples, where the record allows it
+MAX_ORDER = 8  # that is tried
 UNSTABLE_MARGIN = 20.0
 """Lead of an unstable order in the criterion that casts doubt on the stable one taken."""
 
@@ -53,33 +53,23 @@ class SubspaceOptions:
 
     Attributes:
         order: n; None takes the lowest criterion of the one-step error among stable models.
-        max_order: largest order tried, and the most rows of the table of rivals.
         method: weighting; ``PREDICTOR`` for records of a closed loop.
-        horizon: block rows of past and future, samples; None takes 15, or what the record
-            allows.
         delay: samples by which every input is late before the states see it, one per valve;
             None is none. Delays that are left out cost one state each.
-        refinement: error that B and the offset are refined on; None takes the one-step error
-            for ``PREDICTOR`` and the free-run error for the others.
         criterion: AIC or BIC, where the order is not given.
 
     Raises:
-        InputError: an order, horizon or delay out of range.
+        InputError: an order or delay out of range.
     """
 
     order: int | None = None
-    max_order: int = 8
     method: SubspaceMethod = SubspaceMethod.CVA
-    horizon: int | None = None
     delay: tuple[int, ...] | None = None
-    refinement: Refinement | None = None
     criterion: OrderCriterion = OrderCriterion.BIC
 
     def __post_init__(self) -> None:
-        for key, low in (("order", 1), ("max_order", 1), ("horizon", 2)):
-            value = getattr(self, key)
-            if value is not None and not low <= value <= 100:
-                raise InputError(f"{value} lies outside {low} to 100", where=key)
+        if self.order is not None and not 1 <= self.order <= 100:
+            raise InputError(f"{self.order} lies outside 1 to 100", where="order")
         if self.delay is not None and min(self.delay, default=0) < 0:
             raise InputError("a delay is negative", where="delay")
 
@@ -200,16 +190,13 @@ def fit_state_space(data: LinearData, options: SubspaceOptions | None = None) ->
     u, y = _aligned(data, delay)
     horizon = _horizon(data, u.shape[1], options)
     # The shifted observability matrix must still show every state.
-    most = options.order or min(options.max_order, (horizon - 1) * len(y))
+    most = options.order or min(MAX_ORDER, (horizon - 1) * len(y))
     sequence = state_sequence(u, y, horizon, most, options.method)
     if len(sequence.states) < (options.order or 1):
         return _no_model(data, delay, sequence, options)
-    refinement = options.refinement
-    if refinement is None:
-        predictor = options.method is SubspaceMethod.PREDICTOR
-        refinement = Refinement.ONE_STEP if predictor else Refinement.FREE_RUN
+    one_step = options.method is SubspaceMethod.PREDICTOR
     orders = [options.order] if options.order else range(1, len(sequence.states) + 1)
-    fits = [_one_order(sequence, n, u, y, refinement) for n in orders]
+    fits = [_one_order(sequence, n, u, y, one_step) for n in orders]
     stable = [fit for fit in fits if fit[0].radius < 1.0]
     best = min(stable or fits, key=lambda fit: fit[1].value(options.criterion))
     status = _judge(best[1], [row for _, row in fits], options.criterion)
@@ -247,51 +234,45 @@ def _horizon(data: LinearData, samples: int, options: SubspaceOptions) -> int:
     width, p = len(data.u) + len(data.y), len(data.y)
     least = -(-(options.order or 1) // p) + 1
     allowed = samples // (4 * width + 2)
-    wanted = options.horizon or max(min(DEFAULT_HORIZON, allowed), least)
-    if wanted < least:
-        raise InputError(
-            f"{wanted} is too short for order {options.order}",
-            where="horizon",
-            fix=f"use {least} or more",
-        )
+    wanted = max(min(DEFAULT_HORIZON, allowed), least)
     if samples < 2 * wanted * (width + 1) + 10:
         raise InputError(
             f"{samples} samples are too few for a horizon of {wanted}",
             where=data.name,
-            fix="take a longer record, a lower order or a shorter horizon",
+            fix="take a longer record or a lower order",
         )
     return wanted
 
 
 def _one_order(
-    sequence: StateSequence, order: int, u: FloatArray, y: FloatArray, error: Refinement
+    sequence: StateSequence, order: int, u: FloatArray, y: FloatArray, one_step: bool
 ) -> tuple[Realisation, OrderRival]:
     """Return the realisation by regression; that by shift where only this one is stable."""
-    first = _scored(realise(sequence, order, u, y), sequence, u, y, error)
+    first = _scored(realise(sequence, order, u, y), sequence, u, y, one_step)
     if first[0].radius < 1.0:
         return first
-    second = _scored(realise_by_shift(sequence, order, u, y), sequence, u, y, error)
+    second = _scored(realise_by_shift(sequence, order, u, y), sequence, u, y, one_step)
     return second if second[0].radius < 1.0 else first
 
 
 def _scored(
-    model: Realisation, sequence: StateSequence, u: FloatArray, y: FloatArray, error: Refinement
+    model: Realisation, sequence: StateSequence, u: FloatArray, y: FloatArray, one_step: bool
 ) -> tuple[Realisation, OrderRival]:
-    model = refine(with_best_gain(model, sequence, u, y), u, y, error)
-    if model.radius >= 1.0 and error is Refinement.FREE_RUN:
-        model = refine(model, u, y, Refinement.ONE_STEP)
+    model = refine(with_best_gain(model, sequence, u, y), u, y, one_step)
+    if model.radius >= 1.0 and not one_step:
+        model = refine(model, u, y, True)
     model = with_initial_state(with_best_gain(model, sequence, u, y), u, y)
     p, first, order = len(y), sequence.horizon, len(model.a)
-    one_step, free = (predict(model, u, y, flag) for flag in (True, False))
+    ahead, free = (predict(model, u, y, flag) for flag in (True, False))
     with np.errstate(over="ignore", invalid="ignore"):
-        left = (y - one_step)[:, first:]
+        left = (y - ahead)[:, first:]
         covariance = left @ left.T / left.shape[1] + TINY * np.eye(p)
     usable = bool(np.isfinite(covariance).all())
     spread = float(np.exp(np.linalg.slogdet(covariance)[1])) if usable else np.inf
     aic, bic = information(spread, left.shape[1], order * (len(u) + 2 * p) + p)
     fits = [
         float(np.mean([nrmse_fit(y[i, first:], run[i, first:]) for i in range(p)]))
-        for run in (one_step, free)
+        for run in (ahead, free)
     ]
     return model, OrderRival(order, aic, bic, fits[0], fits[1], model.radius)
 

@@ -42,7 +42,7 @@ class Cause:
     amplitude: float
     sentence: str
 
-    def to_json(self) -> dict[str, str | float | None]:
+    def to_dict(self) -> dict[str, str | float | None]:
         """Return the mapping of ``identify --json``."""
         return {
             "kind": self.kind.value,

@@ -16,7 +16,6 @@ from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.judgement.figures import Figures
 from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 from stiction_ros.identification.result.cause import Cause
-from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability
 
 __all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
@@ -127,7 +126,7 @@ class ValveEstimate:
         form = law.jump_form() if isinstance(law, Stiction) else None
         return self if form is None else dataclasses.replace(self, jump=form.least)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
         return {
             "name": self.name,
@@ -135,7 +134,7 @@ class ValveEstimate:
             "probability": self.probability,
             "band_share": self.band_share,
             "responds": self.responds,
-            "stability": None if self.stability is None else self.stability.to_json(),
+            "stability": None if self.stability is None else self.stability.to_dict(),
             "law": self.law,
             "f_s": self.static_friction,
             "f_s_interval": list(self.static_interval),
@@ -180,7 +179,7 @@ class OutputModel:
     fit_free_run: float
     cause: Cause | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json``."""
         return {
             "name": self.name,
@@ -191,7 +190,7 @@ class OutputModel:
             "noise_std": self.noise_std,
             "fit_one_step": self.fit_one_step,
             "fit_free_run": self.fit_free_run,
-            "cause": None if self.cause is None else self.cause.to_json(),
+            "cause": None if self.cause is None else self.cause.to_dict(),
         }
 
 
@@ -224,7 +223,6 @@ class Identification:
         valves, outputs: estimates in the order of the record.
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
-        search: what the search tried and its squared error; None where a method keeps none.
         orders: all orders that were compared.
         row_samples: samples that are one row where the friction was judged.
 
@@ -251,7 +249,6 @@ class Identification:
     outputs: tuple[OutputModel, ...]
     stem: FloatArray
     notes: tuple[str, ...] = ()
-    search: SearchLog | None = None
     orders: tuple[OrderRow, ...] = ()
     row_samples: int = 1
 
@@ -275,7 +272,7 @@ class Identification:
 
         return as_table(self)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
         model: dict[str, Any] = {
             "kind": "arx",
@@ -284,8 +281,6 @@ class Identification:
             "method": self.method,
             "notes": list(self.notes),
         }
-        if self.search is not None:
-            model["search"] = self.search.to_json()
         if self.orders:
             model["orders"] = [dataclasses.asdict(row) for row in self.orders]
         profiles = {v.name: [list(row) for row in v.profile] for v in self.valves if v.profile}
@@ -300,6 +295,6 @@ class Identification:
                 "sample_time": self.sample_time,
                 "used": self.row_samples * self.sample_time,
             },
-            "valves": [valve.to_json() for valve in self.valves],
-            "outputs": [output.to_json() for output in self.outputs],
+            "valves": [valve.to_dict() for valve in self.valves],
+            "outputs": [output.to_dict() for output in self.outputs],
         }

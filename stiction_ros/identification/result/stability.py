@@ -24,7 +24,7 @@ class Look:
     agrees: bool
     band: Interval | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return an entry of ``stability.tried`` of ``identify --json``."""
         band = None if self.band is None else list(self.band)
         return {"look": self.name, "gain": self.gain, "band": band, "agrees": self.agrees}
@@ -53,9 +53,9 @@ class Stability:
         """Share of the looks that agree, 0 to 1."""
         return len(self.agreed) / len(self.tried)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return ``valves[].stability`` of ``identify --json``."""
-        return {"tried": [look.to_json() for look in self.tried], "agreed": list(self.agreed)}
+        return {"tried": [look.to_dict() for look in self.tried], "agreed": list(self.agreed)}
 
 
 def halves(gains: Interval, unheard: float | None) -> tuple[Look, ...]:

@@ -37,7 +37,7 @@ def fit_status(stamp: int, update: FitUpdate) -> tuple[str, str, Keys]:
     for name, friction in update.trusted.items():
         keys.append((f"{name}.trusted_f_s", friction.static_friction))
         keys.append((f"{name}.trusted_f_d", friction.dynamic_friction))
-    keys.append(("identification", json_text(update.identification.to_json(), indent=None)))
+    keys.append(("identification", json_text(update.identification.to_dict(), indent=None)))
     return "fit", verdicts_of(update), keys
 
 

@@ -53,10 +53,10 @@ def monitor_status(
 def look_status(look: GapLook, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
     """Return task, message and key-values of one measurement, which is told once."""
     keys: Keys = [("window_end", stamp_of(look.end))]
-    return "gap", look.text, [*keys, ("look", json_text(look.to_json(), indent=None))]
+    return "gap", look.text, [*keys, ("look", json_text(look.to_dict(), indent=None))]
 
 
 def finding_status(found: GapFinding, stamp_of: Callable[[int], int]) -> tuple[str, str, Keys]:
     """Return task, message and key-values of what was found, which is told once."""
     keys: Keys = [("window_begin", stamp_of(found.begin)), ("window_end", stamp_of(found.end))]
-    return "finding", found.text, [*keys, ("finding", json_text(found.to_json(), indent=None))]
+    return "finding", found.text, [*keys, ("finding", json_text(found.to_dict(), indent=None))]

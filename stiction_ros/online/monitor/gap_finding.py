@@ -43,7 +43,7 @@ class GapFinding:
         """The verdict, or ``unusable``."""
         return "unusable" if self.verdict is None else self.verdict.value
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping that diagnostics carry."""
         return {
             "begin": self.begin,
@@ -68,7 +68,7 @@ def find_in_window(model: LoopModel, record: Record) -> GapFinding:
     found = find_discrepancy(model, [record], GapOptions(quick=True))
     effects = tuple(_effect(effect, record.start) for effect in found.effects)
     begin = round(record.start / record.sample_time)
-    document = found.to_json()
+    document = found.to_dict()
     del document["model_before"]  # known to whoever asked
     del document["seconds"]  # another each time
     return GapFinding(

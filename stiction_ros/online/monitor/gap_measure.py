@@ -75,7 +75,7 @@ class OutputLook:
         """The gap over that of the baseline, s₁/s₀."""
         return self.gap / max(self.baseline, 1e-300)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping that diagnostics carry."""
         return dataclasses.asdict(self)
 

@@ -91,7 +91,7 @@ class GapLook:
             return f"gap of {worst.name} is {worst.growth:.3g} times the baseline's"
         return "gap as in the baseline"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping that diagnostics carry."""
         return {
             "begin": self.begin,
@@ -99,7 +99,7 @@ class GapLook:
             "grown": self.grown,
             "alarm": self.alarm,
             "failure": self.failure,
-            "outputs": {look.name: look.to_json() for look in self.outputs},
+            "outputs": {look.name: look.to_dict() for look in self.outputs},
         }
 
 

@@ -86,7 +86,7 @@ def _identification_differs(bag: ReplayBag, fit: ReplayedFit) -> str:
     if told is None or fit.update is None:
         return ""
     # Through text and back, as the recorded one went: JSON knows no tuples and no infinity.
-    found = json.loads(json_text(fit.update.identification.to_json(), indent=None))
+    found = json.loads(json_text(fit.update.identification.to_dict(), indent=None))
     return first_difference(told.identification, as_told(told.identification, found))
 
 

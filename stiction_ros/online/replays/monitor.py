@@ -25,8 +25,8 @@ def match_monitor(bag: ReplayBag, estimator: ReplayedEstimator) -> MonitorMatch 
         why = "the bag begins after the baseline"
         return MonitorMatch(0, 0, 0, 0, Match.NOT_COMPARED, why)
     origin, step = estimator.origin, estimator.step
-    looks = {origin + look.end * step: look.to_json() for look in estimator.looks}
-    found = {origin + one.end * step: one.to_json() for one in estimator.findings}
+    looks = {origin + look.end * step: look.to_dict() for look in estimator.looks}
+    found = {origin + one.end * step: one.to_dict() for one in estimator.findings}
     gaps = _differences("gap", bag.told_gaps.looks, looks, origin)
     named = _differences("finding", bag.told_gaps.findings, found, origin)
     told, shown = len(bag.told_gaps.looks), len(bag.told_gaps.findings)

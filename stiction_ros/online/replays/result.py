@@ -138,7 +138,7 @@ class Replay:
         """Return the time of a stamp in s since the first sample of the run."""
         return (stamp - self.origin) / SECOND
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``replay --json``; times in s since the run's first sample."""
         document = {
             "bag": self.bag.name,
@@ -166,7 +166,7 @@ class Replay:
             "whole_window": match.fit.whole,
             "failure": match.fit.failure,
             "loop_model": bool(match.fit.model_text),
-            "valves": [valve.to_json() for valve in valves],
+            "valves": [valve.to_dict() for valve in valves],
         }
 
     def _modes(self, modes: ModeMatch) -> dict[str, Any]:

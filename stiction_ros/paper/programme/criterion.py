@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.problem.equation_error import ArxOrders, Delays
 from stiction_ros.paper.smoothed_laws import smooth_law
 from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records import Record
 from stiction_ros.signals.arx import lagged
+from stiction_ros.signals.arx_fit import ArxOrders, Delays
 
 RIDGE = 1e-11  # on normal equations of unit columns: a stem that rests has no effect
 KEPT = 4096  # stems that are kept for the other choices of delays

@@ -22,9 +22,9 @@ import casadi as ca
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.problem.equation_error import Delays, fit_arx
 from stiction_ros.paper.programme.programme_data import Frame, ProgrammeData
 from stiction_ros.paper.programme.programme_terms import Terms
+from stiction_ros.signals.arx_fit import Delays, fit_arx
 
 FEASIBILITY = 1e-6
 MAX_ITERATIONS = 60

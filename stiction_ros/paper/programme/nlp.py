@@ -22,9 +22,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.problem.equation_error import Delays
-from stiction_ros.identification.result.identification import Identification
-from stiction_ros.identification.result.search_log import SolvedStart
 from stiction_ros.paper.one_step_result import (
     Answer,
     check_record,
@@ -38,7 +35,9 @@ from stiction_ros.paper.programme.apparent_stiction import apparent_stiction
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme, ReducedSolution
 from stiction_ros.paper.programme.starts import Start, StartKind, around, candidates
+from stiction_ros.paper.search_log import PaperIdentification, SolvedStart
 from stiction_ros.records import Record
+from stiction_ros.signals.arx_fit import Delays
 
 MAX_CHOICES = 500
 NO_END = "no start ended feasible with a stable process"
@@ -72,7 +71,7 @@ class _End:
 
 def identify_by_programme(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
-) -> Identification:
+) -> PaperIdentification:
     """Identify by the nonlinear programme (12); see the module for the order of work.
 
     Args:

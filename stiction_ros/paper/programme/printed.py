@@ -12,9 +12,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stiction_ros.identification.problem.equation_error import Delays
-from stiction_ros.identification.result.identification import Identification
-from stiction_ros.identification.result.search_log import SolvedStart
 from stiction_ros.paper.one_step_result import (
     Answer,
     check_record,
@@ -28,15 +25,17 @@ from stiction_ros.paper.programme.friction_programme import FrictionProgramme, S
 from stiction_ros.paper.programme.nlp import MAX_CHOICES, NO_END, pairs
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.starts import draw_starts
+from stiction_ros.paper.search_log import PaperIdentification, SolvedStart
 from stiction_ros.paper.smoothed_stems import final_smoothing
 from stiction_ros.records import Record
+from stiction_ros.signals.arx_fit import Delays
 
 Progress = Callable[[float], None]
 
 
 def identify_as_printed(
     record: Record, options: PaperOptions | None = None, progress: Progress | None = None
-) -> Identification:
+) -> PaperIdentification:
     """Identify by the method as printed; all else is as in :func:`~.nlp.identify_by_programme`."""
     begun = time.perf_counter()
     options = options or PaperOptions(method="nlp_printed")

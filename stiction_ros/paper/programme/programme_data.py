@@ -7,15 +7,9 @@ import dataclasses
 import numpy as np
 
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
-from stiction_ros.identification.problem.equation_error import (
-    ArxFit,
-    ArxOrders,
-    Delays,
-    regressors,
-    stable_arx,
-)
 from stiction_ros.paper.programme.stem_sensitivities import StemSensitivities
 from stiction_ros.paper.smoothed_laws import smooth_law
+from stiction_ros.signals.arx_fit import ArxFit, ArxOrders, Delays, regressors, stable_arx
 
 
 @dataclasses.dataclass(frozen=True)

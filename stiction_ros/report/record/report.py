@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,17 +11,15 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
 from stiction_ros.identification.judgement.figures import definitions
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, over_time
-from stiction_ros.pages.signals import Units, all_signals, close_look
+from stiction_ros.pages.plot import SCRIPT, Curve, over_time
+from stiction_ros.pages.signals import UNITS, all_signals, close_look
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
 from stiction_ros.report.page import Cell, duration, number, page_file, table
 from stiction_ros.report.record.sections import lead, stability_table, work_table
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
-from stiction_ros.report.shapes import free_run, settling, step_response
+from stiction_ros.report.shapes import free_run, responses
 from stiction_ros.texts import finite
-
-UNITS = Units("PV units", "% of travel")
 
 
 def report_record(
@@ -62,7 +59,7 @@ def record_page(
     record: Record, identification: Identification, parts: Sequence[Record] = ()
 ) -> str:
     """Return the report of a record as HTML; ``parts`` are all parts of its source."""
-    found = finite(identification.to_json())
+    found = finite(identification.to_dict())
     headline = verdict_line(found["valves"])
     kicker = (
         f"{record.name}: {len(record)} samples of {record.sample_time:g} s, "
@@ -90,7 +87,7 @@ def record_page(
         stability_table(identification),
         evidence_table(identification.valves),
         process_table(found["outputs"], record.sample_time),
-        _responses(record, identification),
+        responses(found["outputs"], record, UNITS, None),
         f"<h2>Notes</h2><ul>{listed}</ul>" if notes else "",
     ]
     return framed(f"{record.name}: {headline}", sections, SCRIPT)
@@ -103,7 +100,7 @@ def evidence_table(valves: Sequence[ValveEstimate]) -> str:
         return ""
     rows: list[list[Cell]] = [
         [
-            f"{key.replace('_', ' ')}, {meaning['unit']}: {meaning['definition']}",
+            f"{key.replace('_', ' ')} ({meaning['unit']}): {meaning['definition']}",
             *[number(getattr(valve.figures, key)) for valve in told],
         ]
         for key, meaning in definitions().items()
@@ -144,26 +141,5 @@ def _free_runs(record: Record, found: Identification) -> str:
             f"It fits {number(model.fit_free_run)} %, one step ahead "
             f"{number(model.fit_one_step)} %. Slow disturbances of the loop are not in it."
         )
-        axis = f"{text(model.name)} (PV units)"
-        drawn.append(over_time(said, record.time, curves, axis, record.start))
+        drawn.append(over_time(said, record.time, curves, UNITS.axis(model.name), record.start))
     return "<h2>Model against measurement</h2>" + "".join(drawn) if drawn else ""
-
-
-def _responses(record: Record, found: Identification) -> str:
-    """Return the response of each PV to a step of each stem."""
-    models = [model.to_json() for model in found.outputs]
-    if not models:
-        return ""
-    length = settling(models, None)
-    return "".join(
-        over_time(
-            f"Response of {model['name']} to a step of the stem by 1 %, from the step on.",
-            np.arange(float(length)) * record.sample_time,
-            [
-                Curve(f"{valve} → {model['name']}", kind, step_response(model, valve, length))
-                for valve, kind in zip(record.valves, itertools.cycle(KINDS), strict=False)
-            ],
-            f"{text(model['name'])} (PV units)",
-        )
-        for model in models
-    )

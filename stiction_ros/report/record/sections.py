@@ -34,11 +34,11 @@ def work_table(record: Record, found: Identification) -> str:
         if model.cause is None or model.cause.period is None:
             continue
         cause = model.cause
-        rows += [
-            [f"period of {model.name}", duration(cause.period)],
-            [f"regularity of {model.name} (above 1 is regular)", number(cause.regularity)],
-            [f"amplitude of {model.name}, PV units", number(cause.amplitude)],
-        ]
+        scale = f"regularity of {model.name} (0 to 1: irregular, above 1: regular)"
+        rows.append([scale, number(cause.regularity)])
+        if cause.kind is not CauseKind.NONE:
+            rows.append([f"period of {model.name}", duration(cause.period)])
+            rows.append([f"amplitude of {model.name}, PV units", number(cause.amplitude)])
     for j, name in enumerate(record.valves):
         signals = {f"OP of {name}": record.op[:, j]}
         if found.stem.shape == record.op.shape:
@@ -55,7 +55,7 @@ def work_table(record: Record, found: Identification) -> str:
 
 def stability_table(found: Identification) -> str:
     """Return how the answer holds at other rates and in the halves of the record."""
-    rate = found.to_json()["rate"]
+    rate = found.to_dict()["rate"]
     rows: list[list[Cell]] = []
     for valve in found.valves:
         for look in () if valve.stability is None else valve.stability.tried:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from stiction_ros.pages.frame import framed, text, words
+from stiction_ros.pages.plot import SCRIPT
 from stiction_ros.records.run.log import ModeChange
-from stiction_ros.report.drawing import Drawing
 from stiction_ros.report.page import (
     Cell,
     count,
     duration,
-    embedded,
     folded,
     interval,
     number,
     percent,
     table,
 )
+from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.identified import (
     KINDS,
     has_friction,
@@ -38,13 +36,8 @@ _SCORES = (
 )
 
 
-def run_page(story: Story, drawings: Sequence[Drawing]) -> str:
-    """Return the report of a run as HTML.
-
-    Args:
-        story: of the run.
-        drawings: every figure.
-    """
+def run_page(story: Story) -> str:
+    """Return the report of a run as HTML."""
     record = story.record
     kicker = (
         f"{len(record)} samples of {record.sample_time:g} s, "
@@ -60,7 +53,7 @@ def run_page(story: Story, drawings: Sequence[Drawing]) -> str:
         valve_cards(story.identified.get("valves", []), story),
         _gain(story),
         _work(story),
-        *map(embedded, drawings),
+        *draw_run(story),
         _fits(story),
         monitor_section(story.log),
         process_table(story.identified.get("outputs", []), record.sample_time),
@@ -68,7 +61,7 @@ def run_page(story: Story, drawings: Sequence[Drawing]) -> str:
         _configuration(story),
         _notes(story),
     ]
-    return framed(f"{story.name}: {headline(story)}", parts)
+    return framed(f"{story.name}: {headline(story)}", parts, SCRIPT)
 
 
 def headline(story: Story) -> str:
@@ -160,7 +153,7 @@ def _gain(story: Story) -> str:
     before, after, free = story.phases.before, story.phases.after, story.stiction_free
     if before is None:
         return ""
-    head = ["PV", "score", "unit", "before"]
+    head = ["PV", "score", "before"]
     if after is not None:
         head += ["after", "after / before"]
     if free is not None:
@@ -170,7 +163,7 @@ def _gain(story: Story) -> str:
         unit = story.units.get(name, "PV units")
         for key, label, per in _SCORES:
             was = getattr(before.scores[name], key)
-            row: list[Cell] = [name, label, unit + per, number(was)]
+            row: list[Cell] = [name, f"{label}, {unit}{per}", number(was)]
             now = None
             if after is not None:
                 now = getattr(after.scores[name], key)
@@ -184,7 +177,7 @@ def _gain(story: Story) -> str:
             rows.append(row)
     return (
         ("<h2>What the swap gained</h2>" if after is not None else "<h2>How the loop does</h2>")
-        + table(head, rows, texts=3)
+        + table(head, rows, texts=2)
         + f'<p class="soft">{text(_spans(story))}</p>'
     )
 

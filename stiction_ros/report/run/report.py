@@ -9,7 +9,6 @@ from typing import Any
 from stiction_ros.online.session import Scenario
 from stiction_ros.records.run.log import read_run
 from stiction_ros.report.page import page_file
-from stiction_ros.report.run.figures import draw_run
 from stiction_ros.report.run.page import run_page
 from stiction_ros.report.run.story import Story, tell
 from stiction_ros.report.run.summary import summary, write_json
@@ -42,7 +41,7 @@ def report_run(
     load: float | None = None,
     namespace: str | None = None,
 ) -> RunReport:
-    """Read a bag of a live loop and write ``summary.json``, ``report.html`` and the figures.
+    """Read a bag of a live loop and write ``summary.json`` and ``report.html``.
 
     Args:
         bag: a rosbag2 directory or a ``.mcap`` file.
@@ -65,12 +64,10 @@ def write_run(
 ) -> RunReport:
     """Write what :func:`report_run` writes of a run that has been scored."""
     target, folder = page_file(out)
-    drawings = draw_run(story)
-    target.write_text(run_page(story, drawings), encoding="utf-8")
+    target.write_text(run_page(story), encoding="utf-8")
     figures = summary(story, seconds, load)
     files = [target]
     if folder is not None:
         write_json(figures, folder / "summary.json")
         files.append(folder / "summary.json")
-        files += [drawing.save(folder) for drawing in drawings]
     return RunReport(story, figures, target, tuple(files))

@@ -64,7 +64,7 @@ class Score:
     offset: float
     iae_per_hour: float
 
-    def to_json(self) -> dict[str, float | None]:
+    def to_dict(self) -> dict[str, float | None]:
         """Return the mapping of ``summary.json``."""
         return dataclasses.asdict(self)
 

@@ -55,7 +55,7 @@ def measured(phases: Mapping[str, Phase | None]) -> dict[str, dict[str, Any]]:
     return {
         "phases": {name: scores(phase) for name, phase in there.items()},
         "valve_work": {
-            name: {valve: work.to_json() for valve, work in phase.work.items()}
+            name: {valve: work.to_dict() for valve, work in phase.work.items()}
             for name, phase in there.items()
         },
         "largest_op_step": {name: dict(phase.op_step) for name, phase in there.items()},
@@ -64,7 +64,7 @@ def measured(phases: Mapping[str, Phase | None]) -> dict[str, dict[str, Any]]:
 
 def scores(phase: Phase) -> dict[str, dict[str, float | None]]:
     """Return ``{PV: {amplitude, offset, iae_per_hour}}``."""
-    return {name: score.to_json() for name, score in phase.scores.items()}
+    return {name: score.to_dict() for name, score in phase.scores.items()}
 
 
 def messages(

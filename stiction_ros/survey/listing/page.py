@@ -114,7 +114,8 @@ def _table(entries: Sequence[Entry], columns: Columns) -> str:
     for entry in entries:
         cells = []
         for (kind, label), (shown, value) in zip(columns.heads, columns.cells(entry), strict=True):
-            tag = 'th scope="row"' if label == "loop" else f'td data-label="{text(label)}"'
+            said = text(label.replace("_S", "ₛ"))
+            tag = 'th scope="row"' if label == "loop" else f'td data-label="{said}"'
             kind += " none" * shown.endswith(">–</span>")
             cells.append(f'<{tag} class="{kind}" data-value="{text(value)}">{shown}</{tag[:2]}>')
         rows.append(
@@ -161,8 +162,8 @@ def _legend(columns: Columns) -> str:
     )
     return (
         "<h2>How to read it</h2><p>Valves that stick or have backlash and make their loop cycle "
-        "come first. Of these, the surest ones that lose most of OP's movement are at the top. "
-        "Undecided valves follow in the order of what speaks for their friction."
+        "come first; at the top stand the surest whose friction makes most of the loop's "
+        "movement. Undecided valves follow in the order of their probability of friction."
         f"{money} The page of a loop has all figures with their intervals. A dash says on "
         f"pointing why a cell is empty.</p><dl>{hints}</dl>"
     )

@@ -29,8 +29,8 @@ def figure(value: float | None, digits: int = 3) -> str:
 
 
 def percent(share: float | None) -> str:
-    """Return a share as whole percent; nothing where there is none."""
-    return "" if share is None or not math.isfinite(share) else f"{100.0 * share:.0f} %"
+    """Return a share as whole percent, at most 100; nothing where there is none."""
+    return "" if share is None or not math.isfinite(share) else f"{100.0 * min(share, 1.0):.0f} %"
 
 
 def signed_percent(change: float) -> str:

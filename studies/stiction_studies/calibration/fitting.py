@@ -47,7 +47,7 @@ def fitted(rows: Sequence[Judged], without: str | None = None) -> Model:
     from sklearn.ensemble import HistGradientBoostingClassifier  # type: ignore[import-untyped]
 
     names = [name for name in definitions() if name != without]
-    features = np.array([[row.figures.to_json()[name] for name in names] for row in rows])
+    features = np.array([[row.figures.to_dict()[name] for name in names] for row in rows])
     truth = np.array([row.friction for row in rows])
     worlds = [row.world for row in rows]
     weights = np.array([len(rows) / len(set(worlds)) / worlds.count(one) for one in worlds])

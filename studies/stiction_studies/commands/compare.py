@@ -129,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
         trials: list[Trial] = run_seeds(work, seeds, jobs, f"compare on {plant}")
         studies.append(PlantStudy.of(trials))
     page = report_study(studies, directory)
-    document = {study.options.plant: study.to_json() for study in studies}
+    document = {study.options.plant: study.to_dict() for study in studies}
     write_json(str(directory / "compare.json"), document)
     hand_over(options.json, document, lambda: _print(studies, page))
     return 0

@@ -93,14 +93,14 @@ class Outcome:
     found: Identification
     comparison: Comparison
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return one run as JSON data."""
         return {
             "example": self.example.name,
             "variant": self.example.variant,
             "seed": self.example.seed,
-            **self.comparison.to_json(),
-            "identification": self.found.to_json(),
+            **self.comparison.to_dict(),
+            "identification": self.found.to_dict(),
         }
 
 
@@ -185,7 +185,7 @@ def _run_one(choice: Choice, options: argparse.Namespace) -> int:
     outcome = Outcome(example, found, compare(example, found))
     hand_over(
         options.json,
-        outcome.to_json(),
+        outcome.to_dict(),
         lambda: print_outcome(Console(), outcome.example, outcome.comparison, outcome.found),
     )
     if options.out is not None:
@@ -203,8 +203,8 @@ def _run_many(choice: Choice, options: argparse.Namespace) -> int:
     document = {
         "example": choice.name,
         "variant": choice.variant,
-        "findings": [finding.to_json() for finding in findings],
-        "runs": [outcome.to_json() for outcome in outcomes],
+        "findings": [finding.to_dict() for finding in findings],
+        "runs": [outcome.to_dict() for outcome in outcomes],
     }
     rows = [(o.example.seed, o.comparison, o.found) for o in outcomes]
     hand_over(options.json, document, lambda: print_study(Console(), title, rows, findings))
@@ -220,5 +220,5 @@ def _write(outcome: Outcome, directory: Path) -> Path:
         page = report_example(
             outcome.example, outcome.found, outcome.comparison, directory / "report.html"
         )
-    write_json(str(directory / "result.json"), outcome.to_json())
+    write_json(str(directory / "result.json"), outcome.to_dict())
     return page

@@ -89,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"{options.speed:g} is not positive", where="--speed")
     require_ros()
     outcomes = run_cases(cases, options)
-    hand_over(options.json, [outcome.to_json() for outcome in outcomes], lambda: _print(outcomes))
+    hand_over(options.json, [outcome.to_dict() for outcome in outcomes], lambda: _print(outcomes))
     return 0 if outcomes and all(outcome.passed for outcome in outcomes) else 1
 
 

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     asked = [_Asked(fault.name, first + place) for place, fault in enumerate(faults)]
     work = functools.partial(_run, Path(options.out or "out/faults"), options.seed)
     outcomes = run_each(work, asked, options.jobs, f"faults: {len(asked)} cases")
-    hand_over(options.json, [outcome.to_json() for outcome in outcomes], lambda: _print(outcomes))
+    hand_over(options.json, [outcome.to_dict() for outcome in outcomes], lambda: _print(outcomes))
     return 0 if all(outcome.passed for outcome in outcomes) else 1
 
 

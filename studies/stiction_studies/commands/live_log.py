@@ -13,7 +13,7 @@ def log_of(live: LiveRun) -> RunLog:
     fits = tuple(
         Fit(
             update.end * step,
-            update.identification.to_json(),
+            update.identification.to_dict(),
             {
                 f"{valve}.{key}": value
                 for valve, friction in update.trusted.items()

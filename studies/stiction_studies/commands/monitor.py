@@ -70,7 +70,7 @@ def _document(one: Watched) -> dict[str, Any]:
         "early": one.early,
         "delay": one.delay,
         "score": one.score.value,
-        "findings": [finding.to_json() for finding in one.findings],
+        "findings": [finding.to_dict() for finding in one.findings],
     }
 
 

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
             found = _soak(options, Path(folder))
     else:
         found = _soak(options, _made(Path(options.out)))
-    hand_over(options.json, found.to_json(), lambda: _print(options.scenario, found))
+    hand_over(options.json, found.to_dict(), lambda: _print(options.scenario, found))
     return 1 if found.reasons else 0
 
 

@@ -36,7 +36,7 @@ class Against:
         low, high = self.interval
         return low - 1e-9 <= self.true <= high + 1e-9
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return true, found and error, and where there is an interval also that."""
         values: dict[str, Any] = {"true": self.true, "found": self.found, "error": self.error}
         if self.interval is not None:
@@ -60,13 +60,13 @@ class ValveComparison:
     dynamic_friction: Against
     stem_error: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return JSON data."""
         return {
             "name": self.name,
             "verdict": self.verdict,
-            "f_s": self.static_friction.to_json(),
-            "f_d": self.dynamic_friction.to_json(),
+            "f_s": self.static_friction.to_dict(),
+            "f_d": self.dynamic_friction.to_dict(),
             "stem_error": self.stem_error,
         }
 
@@ -89,13 +89,13 @@ class ChannelComparison:
     gain: Against
     response_error: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return JSON data."""
         return {
             "output": self.output,
             "valve": self.valve,
-            "delay": self.delay.to_json(),
-            "gain": self.gain.to_json(),
+            "delay": self.delay.to_dict(),
+            "gain": self.gain.to_dict(),
             "response_error": self.response_error,
         }
 
@@ -118,11 +118,11 @@ class Comparison:
     square_error: float
     true_stem_square_error: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return JSON data."""
         return {
-            "valves": [valve.to_json() for valve in self.valves],
-            "channels": [channel.to_json() for channel in self.channels],
+            "valves": [valve.to_dict() for valve in self.valves],
+            "channels": [channel.to_dict() for channel in self.channels],
             "stem_error": self.stem_error,
             "square_error": self.square_error,
             "true_stem_square_error": self.true_stem_square_error,

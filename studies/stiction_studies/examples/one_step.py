@@ -8,8 +8,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import OutputModel
-from stiction_ros.identification.problem.equation_error import ArxOrders, fit_arx
 from stiction_ros.records import Record
+from stiction_ros.signals.arx_fit import ArxOrders, fit_arx
 
 
 def square_error(record: Record, stem: FloatArray, outputs: Sequence[OutputModel]) -> float:

@@ -45,7 +45,7 @@ class Finding:
         asked = f"{'at most' if self.at_most else 'wanted'} {100 * self.wanted:g} %"
         return f"{line} ({asked}: {'met' if self.met else 'not met'})"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return JSON data."""
         return dataclasses.asdict(self) | {"met": self.met}
 

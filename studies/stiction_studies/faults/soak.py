@@ -96,7 +96,7 @@ class Soaked:
                 found.append(f"the memory of {name} is {memory.ratio:.3f} of that at a tenth")
         return found
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         memory = {
             name: {"tenth": one.tenth, "end": one.end, "ratio": one.ratio}

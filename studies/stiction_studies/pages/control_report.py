@@ -13,7 +13,9 @@ from matplotlib.figure import Figure
 
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.paper.controllers.weights import ProgrammeCost
-from stiction_ros.report.drawing import (
+from stiction_ros.report.page import Cell, number, table
+from stiction_ros.report.run.story import TANK_UNITS
+from stiction_studies.drawing import (
     BLUE,
     DPI,
     GREY,
@@ -21,10 +23,9 @@ from stiction_ros.report.drawing import (
     ORANGE,
     Drawing,
     data_limits,
+    embedded,
     style,
 )
-from stiction_ros.report.page import Cell, embedded, number, table
-from stiction_ros.report.run.story import TANK_UNITS
 from stiction_studies.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
 from stiction_studies.pages.control_scores import ColumnScore, mean_score, score_trial
 
@@ -63,7 +64,7 @@ class PlantStudy:
         """Return the mean over the seeds by column key."""
         return {c.key: mean_score([score[c.key] for score in self.scores]) for c in COLUMNS}
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return options, means and the figures of every seed."""
         return {
             "options": dataclasses.asdict(self.options),
@@ -71,8 +72,8 @@ class PlantStudy:
             "columns": {
                 column.key: {
                     "title": column.title,
-                    "mean": self.means()[column.key].to_json(),
-                    "by_seed": [score[column.key].to_json() for score in self.scores],
+                    "mean": self.means()[column.key].to_dict(),
+                    "by_seed": [score[column.key].to_dict() for score in self.scores],
                 }
                 for column in COLUMNS
             },

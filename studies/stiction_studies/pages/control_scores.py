@@ -65,7 +65,7 @@ class ColumnScore:
     p99_ms: float
     from_warm_start: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return nested mappings."""
         return dataclasses.asdict(self)
 
@@ -117,7 +117,7 @@ def _score(run: ColumnRun, period: float | None) -> ColumnScore:
         )
     steps = largest_op_step(record)
     valves = {
-        tag: ValveScore(**ValveWork.of(record.stem[:, j]).to_json(), op_step=steps[tag])
+        tag: ValveScore(**ValveWork.of(record.stem[:, j]).to_dict(), op_step=steps[tag])
         for j, tag in enumerate(record.valves)
     }
     median, last = np.median(run.times), np.percentile(run.times, 99)

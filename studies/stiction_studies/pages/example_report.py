@@ -11,31 +11,31 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
 from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import SCRIPT, Curve, against
+from stiction_ros.pages.signals import Units, all_signals
 from stiction_ros.processes import StirredTank
-from stiction_ros.report.drawing import (
+from stiction_ros.report.page import Cell, card, duration, number, table
+from stiction_ros.report.record.report import evidence_table
+from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
+from stiction_ros.report.run.story import TANK_UNITS
+from stiction_ros.report.shapes import free_run, responses
+from stiction_ros.signals.holds import set_point_moves
+from stiction_ros.texts import finite
+from stiction_studies.drawing import (
     BLUE,
+    GREY,
     INK,
+    ORANGE,
     SKY,
     VERMILION,
     Drawing,
     TimeAxis,
     data_limits,
+    embedded,
     legend,
     panels,
     style,
 )
-from stiction_ros.report.page import Cell, card, duration, embedded, number, table
-from stiction_ros.report.record.report import evidence_table
-from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
-from stiction_ros.report.run.story import TANK_UNITS
-from stiction_ros.report.shapes import (
-    draw_curves,
-    draw_responses,
-    draw_valve,
-    free_run,
-)
-from stiction_ros.signals.holds import set_point_moves
-from stiction_ros.texts import finite
 from stiction_studies.examples.comparison import Against, Comparison, ValveComparison
 from stiction_studies.examples.example import Example
 from stiction_studies.examples.one_step import one_step_estimate
@@ -63,9 +63,9 @@ def report_example(
         comparison: of the two.
         target: the ``.html`` file; its folder is there.
     """
-    values = finite(found.to_json())
+    values = finite(found.to_dict())
     headline = f"{TITLES[example.name]}: {verdict_line(values['valves'])}"
-    record = example.record
+    record, units = example.record, Units("PV units", "% of travel", _units(example))
     kicker = (
         f"{VARIANTS[example.variant]}, seed {example.seed}; {len(record)} samples of "
         f"{record.sample_time:g} s, {duration(len(record) * record.sample_time)} of operation"
@@ -76,11 +76,15 @@ def report_example(
         f'<div class="cards">{"".join(map(_card, comparison.valves))}</div>',
         comparison_table(comparison),
         _errors(comparison),
-        *map(embedded, draw_example(example, found)),
+        "<h2>Response to a step of the stem</h2>",
+        responses(values["outputs"], record, units, example.truth),
+        embedded(draw_window(example, found)),
+        all_signals(record, found.stem, units),
+        valve_curves(example, found),
         evidence_table(found.valves),
         process_table(values["outputs"], record.sample_time),
     ]
-    target.write_text(framed(headline, parts), encoding="utf-8")
+    target.write_text(framed(headline, parts, SCRIPT), encoding="utf-8")
     return target
 
 
@@ -100,39 +104,35 @@ def comparison_table(comparison: Comparison) -> str:
     return "<h2>True and identified</h2>" + table(head, rows)
 
 
-def draw_example(example: Example, found: Identification) -> tuple[Drawing, ...]:
-    """Draw step responses, trends of a window and of the whole record, and valve curves."""
-    record = example.record
+def draw_window(example: Example, found: Identification) -> Drawing:
+    """Draw the trends around a set-point move."""
     with style():
-        drawn = [
-            Drawing(
-                "step_responses",
-                "Unit step responses",
-                "Response of each PV to a stem step of 1 %, of the actual and of the identified "
-                "process" + (", the tank linearised." if _is_tank(example) else "."),
-                draw_responses(
-                    [output.to_json() for output in found.outputs],
-                    record,
-                    example.truth,
-                    _units(example),
-                ),
-            ),
-            Drawing(
-                "window",
-                "Measured and estimated time trends",
-                "A part of the record around a set-point move. The free run is driven by the "
-                "estimated stems alone; the one-step estimate also by the PV measured before.",
-                _trends(example, found, window(example)),
-            ),
-            Drawing(
-                "record",
-                "The whole record",
-                "The same signals over all samples.",
-                _trends(example, found, slice(0, len(record))),
-            ),
-            draw_curves(record, found.stem, record.stem),
-        ]
-    return tuple(drawn)
+        return Drawing(
+            "window",
+            "Measured and estimated time trends",
+            "A part of the record around a set-point move. The free run is driven by the "
+            "estimated stems alone; the one-step estimate also by the PV measured before.",
+            _trends(example, found, window(example)),
+        )
+
+
+def valve_curves(example: Example, found: Identification) -> str:
+    """Return the true and the estimated stem of each valve against OP."""
+    record = example.record
+    assert record.stem is not None
+    drawn = [
+        against(
+            f"Stem of {name} against OP.",
+            [
+                (record.op[:, j], Curve("stem, true", "op", record.stem[:, j])),
+                (record.op[:, j], Curve("stem, estimated", "stem", found.stem[:, j])),
+            ],
+            (f"OP of {name}, %", "stem, %"),
+            equal=True,
+        )
+        for j, name in enumerate(record.valves)
+    ]
+    return f"<h2>Valve curves</h2><div class='pair'>{''.join(drawn)}</div>"
 
 
 def window(example: Example) -> slice:
@@ -193,6 +193,41 @@ def _draw_estimates(
     data_limits(axis, [measured[part], run])
     axis.set_title(output.name)
     axis.set_ylabel(f"{output.name} ({_units(example).get(output.name, 'PV units')})")
+
+
+def draw_valve(
+    axis: Any,
+    at: FloatArray,
+    op: FloatArray,
+    stem: FloatArray | None,
+    estimate: FloatArray | None,
+) -> None:
+    """Draw OP and the true and estimated stem of one valve, each of shape (N,), %."""
+    drawn = [op]
+    axis.plot(at, op, color=GREY, linewidth=0.9, drawstyle="steps-post", label="OP u")
+    if stem is not None:
+        drawn.append(stem)
+        axis.plot(
+            at,
+            stem,
+            color=ORANGE,
+            linewidth=2.4,
+            alpha=0.85,
+            drawstyle="steps-post",
+            label="stem χ, true",
+        )
+    if estimate is not None:
+        drawn.append(estimate)
+        axis.plot(
+            at,
+            estimate,
+            color=BLUE,
+            linewidth=0.9,
+            drawstyle="steps-post",
+            label="stem χ̂, estimated",
+        )
+    data_limits(axis, drawn)
+    axis.set_ylabel("position (%)")
 
 
 def _card(valve: ValveComparison) -> str:

@@ -15,7 +15,13 @@ from stiction_ros.pages.frame import framed
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.records.storage.bag_metadata import BagTopic
-from stiction_ros.report.drawing import (
+from stiction_ros.report.page import card, duration, number, table
+from stiction_ros.report.run.scoring import Phases, phases
+from stiction_ros.report.run.summary import measured, messages, write_json
+from stiction_ros.report.run.work_table import work_rows
+from stiction_ros.texts import finite
+from stiction_studies.control_system.journal import transfer_steps
+from stiction_studies.drawing import (
     BLUE,
     GREEN,
     GREY,
@@ -24,17 +30,12 @@ from stiction_ros.report.drawing import (
     Drawing,
     TimeAxis,
     data_limits,
+    embedded,
     legend,
     mark_swap,
     panels,
     style,
 )
-from stiction_ros.report.page import card, duration, embedded, number, table
-from stiction_ros.report.run.scoring import Phases, phases
-from stiction_ros.report.run.summary import measured, messages, write_json
-from stiction_ros.report.run.work_table import work_rows
-from stiction_ros.texts import finite
-from stiction_studies.control_system.journal import transfer_steps
 
 JOURNAL = "journal.jsonl"  # of the simulated plant, beside the bag
 SMOOTH = 1.0  # %: what OP may step by at a transfer of control

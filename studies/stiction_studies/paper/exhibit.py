@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from stiction_ros.report.drawing import Drawing
+from stiction_studies.drawing import Drawing
 
 
 @dataclasses.dataclass(frozen=True)

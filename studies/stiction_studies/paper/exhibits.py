@@ -10,7 +10,8 @@ from pathlib import Path
 
 from stiction_ros.errors import InputError, storing
 from stiction_ros.pages.frame import framed, text
-from stiction_ros.report.page import embedded, table
+from stiction_ros.report.page import table
+from stiction_studies.drawing import embedded
 from stiction_studies.paper.exhibit import Exhibit
 from stiction_studies.paper.figures import controllers, diagrams, responses, trends
 from stiction_studies.paper.sources import Sources

@@ -18,6 +18,7 @@ import numpy as np
 from stiction_ros.errors import InputError
 from stiction_ros.identification import identify as identify_by_own
 from stiction_ros.paper.methods import identify
+from stiction_ros.paper.search_log import PaperIdentification
 from stiction_studies.paper.settings import printed_example
 
 RIGHT = 0.15
@@ -138,7 +139,7 @@ def run_trial(number: int, method: str, seed: int) -> Trial:
     seconds = time.perf_counter() - begun
     friction = np.array([[v.static_friction, v.dynamic_friction] for v in found.valves])
     true = np.array([example.friction(valve.name) for valve in found.valves])
-    log = None if method in OWN else found.search
+    log = found.search if isinstance(found, PaperIdentification) else None
     return Trial(
         example=number,
         method=method,

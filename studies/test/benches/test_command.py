@@ -148,6 +148,7 @@ def test_the_other_benchmark_refuses_these_options(capsys: pytest.CaptureFixture
     assert "benchmark graph has no such option" in capsys.readouterr().err
 
 
+@pytest.mark.trial
 def test_the_bar_runs_from_start_to_end() -> None:
     shares: list[float] = []
     plan = Plan(duels=(), lengths=(300,), valves=(), delay=(5, 5), longest=300, repeat=2)

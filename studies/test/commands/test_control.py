@@ -9,6 +9,7 @@ from stiction_ros.cli.main import main
 from stiction_studies.commands.control import CaseScores
 
 
+@pytest.mark.trial
 def test_a_case_is_scored_and_written(tmp_path: Path) -> None:
     target = tmp_path / "scores.json"
     call = ["study-control", "--seeds", "41:41", "--jobs", "1", "--cases", "nominal"]

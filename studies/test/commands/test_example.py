@@ -54,9 +54,9 @@ def test_the_result_compares_with_the_truth(written: Path) -> None:
 @pytest.mark.trial
 def test_the_report_shows_the_figures(written: Path) -> None:
     page = (written / "report.html").read_text(encoding="utf-8")
-    for name in ("step_responses", "window", "record", "valve_curves"):
-        assert f'<figure id="{name}">' in page
-    assert page.count("data:image/png;base64") == 4
+    assert '<figure id="window">' in page
+    assert page.count("data:image/png;base64") == 1
+    assert page.count("<svg") > 4
 
 
 @pytest.mark.trial

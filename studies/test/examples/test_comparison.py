@@ -61,7 +61,7 @@ def test_inside_counts_the_ends() -> None:
 
 
 def test_json_is_plain(example: Example) -> None:
-    document = compare(example, perfect(example)).to_json()
+    document = compare(example, perfect(example)).to_dict()
     assert json.loads(json.dumps(document)) == document
     assert document["valves"][0]["f_s"].keys() == {"true", "found", "error", "interval", "inside"}
 

@@ -42,6 +42,7 @@ def test_a_longer_example1_goes_on_with_the_same_set_points(first: Example) -> N
     assert np.array_equal(longer.sp[2500:], first.record.sp[:100])
 
 
+@pytest.mark.trial
 def test_example1_is_the_same_for_the_same_seed(first: Example) -> None:
     again, other = (example1(seed, first.variant, samples=600).record for seed in (3, 4))
     assert np.array_equal(again.pv, first.record.pv[:600])

@@ -24,7 +24,7 @@ GOOD = Soaked(
 
 def test_a_run_without_growth_and_loss_passes():
     assert GOOD.reasons == []
-    assert GOOD.to_json()["passed"] is True
+    assert GOOD.to_dict()["passed"] is True
 
 
 @pytest.mark.parametrize(

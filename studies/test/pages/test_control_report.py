@@ -96,6 +96,7 @@ def test_every_controller_has_a_row_for_each_output() -> None:
     assert (moves[0], moves[-1]) == ("31", "–")  # a healthy valve's moves say nothing
 
 
+@pytest.mark.trial
 def test_the_page_stands_alone_and_the_figures_lie_beside_it(tmp_path: Path) -> None:
     study = PlantStudy.of([made_up_trial(seed) for seed in (1, 2)])
     page = report_study([study], tmp_path).read_text(encoding="utf-8")

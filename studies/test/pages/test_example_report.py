@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from stiction_ros.identification import Identification, IdentificationOptions, identify
-from stiction_ros.report.drawing import style
 from stiction_studies.examples import Example, compare, example1, example2, healthy_loop
-from stiction_studies.pages.example_report import draw_example, report_example, window
+from stiction_studies.pages.example_report import draw_window, report_example, window
 
 FAST = IdentificationOptions(output_order=1, input_order=1, delay=(0, 0))
 
@@ -38,6 +37,8 @@ def test_the_page_stands_alone(tank: Example, found: Identification, tmp_path: P
     assert "the nonlinear tank (A.1), seed 1" in page
     assert "Stem error (1/m)" in page
     assert "true 8" in page
+    assert page.count("simulated process") == 2
+    assert page.count("stem, true") == 2
 
 
 @pytest.mark.trial
@@ -51,30 +52,15 @@ def test_a_truth_outside_its_interval_stands_out(
 
 
 @pytest.mark.trial
-def test_step_responses_are_drawn_per_channel(tank: Example, found: Identification) -> None:
-    with style():
-        steps, part, whole, curves = draw_example(tank, found)
-    assert [d.name for d in (steps, part, whole, curves)] == [
-        "step_responses",
-        "window",
-        "record",
-        "valve_curves",
-    ]
-    assert [len(axis.lines) for axis in steps.figure.axes] == [2, 2, 2, 2]
-    titles = [axis.get_title(loc="left") for axis in steps.figure.axes]
-    assert titles == ["V1 → C", "V2 → C", "V1 → T", "V2 → T"]
-
-
-@pytest.mark.trial
 def test_trends_show_measured_and_estimated_signals(tank: Example, found: Identification) -> None:
-    with style():
-        part = draw_example(tank, found)[1]
+    part = draw_window(tank, found)
     output, *_, valve = part.figure.axes
     labels = [[line.get_label() for line in axis.lines] for axis in (output, valve)]
     assert labels[0] == ["PV, measured", "SP", "one-step estimate", "free run"]
     assert labels[1] == ["OP u", "stem χ, true", "stem χ̂, estimated"]
 
 
+@pytest.mark.trial
 def test_the_window_holds_a_set_point_move() -> None:
     for example in (example1(1), example2(1)):
         part = window(example)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from stiction_ros.discrepancy.answer.doubts import behind_slope, without_its_jump
+from stiction_ros.discrepancy.answer.found_effects import behind_slope, without_its_jump
 from stiction_ros.effects import HeStiction
 
 

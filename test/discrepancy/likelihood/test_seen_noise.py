@@ -94,6 +94,7 @@ def test_scans_between_samples_are_asked_where_no_law_gives_the_op() -> None:
     assert found.keep == 0.0
 
 
+@pytest.mark.trial
 def test_a_rounded_op_is_no_disturbance() -> None:
     model = loop()
     answer = find_discrepancy(

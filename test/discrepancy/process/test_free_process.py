@@ -9,9 +9,8 @@ import pytest
 from gap_loops import loop, record, without_set_points
 
 from stiction_ros.discrepancy import Discrepancy, GapOptions, GapVerdict, find_discrepancy
-from stiction_ros.discrepancy.data.first_model import first_model
-from stiction_ros.discrepancy.data.long_records import liveliest_parts
-from stiction_ros.discrepancy.process.free_intervals import with_free_process
+from stiction_ros.discrepancy.data.first_model import first_model, liveliest_parts
+from stiction_ros.discrepancy.process.free_search import with_free_process
 from stiction_ros.discrepancy.process.refit import (
     equations_of,
     longest_delay,
@@ -92,6 +91,7 @@ def test_the_model_found_makes_a_controller(sticky: Discrepancy, mode: str) -> N
     assert live.mode == mode
 
 
+@pytest.mark.trial
 def test_a_sound_loop_lacks_nothing() -> None:
     answer = found(recorded(None, seed=4))
     assert answer.effects == ()

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from stiction_ros.discrepancy.decision.extend import AddedEffect
-from stiction_ros.discrepancy.steps.outliers import band_of, without_outliers
+from stiction_ros.discrepancy.steps.settle import band_of, without_outliers
 from stiction_ros.effects import Backlash, Behaviour, HeStiction, StepDisturbance
 
 

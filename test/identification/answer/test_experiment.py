@@ -68,7 +68,7 @@ OPTIONS = IdentificationOptions()
             "loop_gone",
             "is likely (90 %) but not sure: the simulated loop moves nearly as much",
         ),
-        (0.6, "repeats", "is likely (60 %) but not sure: PV also repeats itself a turn later"),
+        (0.6, "repeats", "is likely (60 %) but not sure: PV also repeats itself one cycle later"),
         (0.4, "loop_gone", "does not rule out f_S up to 1.4 %, 18 % of OP's range"),
     ],
 )
@@ -121,7 +121,7 @@ def test_only_undecided_valves_get_an_experiment(record: Record) -> None:
         valve = dataclasses.replace(undecided(), verdict=kind)
         (told,) = advised(record, answer(valve), OPTIONS).valves
         assert bool(told.experiment) is (kind is VerdictKind.UNDECIDED)
-        assert (told.to_json()["experiment"] is None) is (kind is not VerdictKind.UNDECIDED)
+        assert (told.to_dict()["experiment"] is None) is (kind is not VerdictKind.UNDECIDED)
 
 
 @pytest.mark.parametrize(

@@ -106,6 +106,7 @@ def test_an_undecided_loop_that_does_not_cycle_says_so() -> None:
         (HEALTHY, CauseKind.DISTURBANCE, "Leave the valve and look upstream"),
         (HEALTHY, CauseKind.SET_POINT, "Leave the valve and look at what moves the set-point"),
         (UNDECIDED, CauseKind.VALVE, "Do this. Or that."),
+        (UNDECIDED, CauseKind.NONE, "Nothing, while the loop is calm. What would decide: do this."),
     ],
 )
 def test_what_to_do_next(verdict: VerdictKind, kind: CauseKind | None, said: str) -> None:

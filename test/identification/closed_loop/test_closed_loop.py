@@ -8,10 +8,9 @@ from known_loops import Kind, Known, changed, known
 
 from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,
-    LoopStatus,
     close_loop,
 )
-from stiction_ros.identification.closed_loop.damping import ringing
+from stiction_ros.loop.damping import ringing
 from stiction_ros.loop.linear_loops import Process
 
 STICKY = Kind(friction=(3.0, 1.0))
@@ -28,20 +27,16 @@ def test_a_sticky_valve_keeps_the_loop_cycling(
     friction: tuple[float, float], seed: int, law: str
 ) -> None:
     valve = closed(known(Kind(friction=friction, law=law), seed)).valves[0]
-    assert valve.status is LoopStatus.SUSTAINED
-    assert 0.8 < valve.with_friction.ratio < 1.2
-    assert valve.without_friction.ratio < 0.05
     assert valve.gone > 0.9
     assert 0.8 < valve.moved_with < 1.2
     assert 0.4 < valve.band_share < 1.5
 
 
-def test_friction_fitted_to_a_square_load_does_not_keep_the_loop_cycling() -> None:
+def test_friction_fitted_to_a_square_load_is_behind_a_line() -> None:
     load = 0.4 * np.sign(np.sin(2 * np.pi * np.arange(900) / 60.0))
     moved = known(Kind(noise=0.02), load=load)
     blamed = known(Kind(friction=(0.3, 0.3)), load=load)
     found = close_loop(moved.record, blamed.found)
-    assert found.valves[0].status is LoopStatus.DIES
     assert found.outputs[0].after.gain > 100.0
     assert found.outputs[0].rivalry > 1.0
 
@@ -61,9 +56,7 @@ def test_units_change_nothing(
     other = changed(one, (-op if mirrored else op, shift), (pv, -shift), time)
     before, after = closed(one), closed(other)
     was, now = before.valves[0], after.valves[0]
-    assert now.status is was.status
-    assert now.with_friction.ratio == pytest.approx(was.with_friction.ratio, rel=1e-4)
-    assert now.without_friction.ratio == pytest.approx(was.without_friction.ratio, abs=1e-4)
+    assert now.moved_with == pytest.approx(was.moved_with, rel=1e-3)
     assert now.band_share == pytest.approx(was.band_share, rel=1e-6)
     assert now.gone == pytest.approx(was.gone, abs=1e-3)
     first, second = before.outputs[0], after.outputs[0]
@@ -101,20 +94,18 @@ def test_what_turns_at_each_sample_has_a_period_of_two() -> None:
     assert 0.3 < found[0].growth < 1.0
 
 
-def test_a_loop_whose_controller_is_not_found_is_untestable() -> None:
+def test_a_loop_whose_controller_is_not_found_says_why() -> None:
     one = known(STICKY)
     rng = np.random.default_rng(2)
     loose = np.cumsum(rng.standard_normal((900, 1)), axis=0)
     record = type(one.record)("loose", 5.0, ("V1",), ("PV1",), loose, one.record.pv, one.record.sp)
     valve = close_loop(record, one.found).valves[0]
-    assert valve.status is LoopStatus.UNTESTABLE
     assert "explains" in valve.reason
 
 
-def test_a_healthy_valve_has_nothing_to_sustain() -> None:
+def test_of_a_healthy_valve_nothing_goes_away() -> None:
     valve = closed(known(Kind(noise=0.05))).valves[0]
-    assert valve.status is LoopStatus.UNTESTABLE
-    assert "no friction" in valve.reason
+    assert valve.gone < 0.05
     assert valve.band_share == 0.0
 
 

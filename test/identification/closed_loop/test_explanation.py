@@ -201,7 +201,7 @@ def test_units_change_only_units(
 
 
 def test_the_keys_of_the_contract() -> None:
-    document = told(known(Kind(friction=(3.0, 1.0)))).to_json()
+    document = told(known(Kind(friction=(3.0, 1.0)))).to_dict()
     found = document["outputs"][0]["cause"]
     assert list(found) == ["kind", "period", "regularity", "amplitude"]
     assert found["kind"] == "valve"

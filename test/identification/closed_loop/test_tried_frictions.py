@@ -25,7 +25,7 @@ def test_both_ends_are_those_of_the_intervals_where_the_sum_has_none_of_its_own(
 def test_a_band_of_its_own_is_kept_at_both_ends() -> None:
     told = dataclasses.replace(VALVE, band_interval=(3.0, 5.0))
     assert told.sum_interval == (3.0, 5.0)
-    assert told.to_json()["band_interval"] == [3.0, 5.0]
+    assert told.to_dict()["band_interval"] == [3.0, 5.0]
     tried = tried_frictions(told)
     assert tried.tolist() == [[3.0, 1.0], [2.0, 1.0], [4.5, 0.5]]
 

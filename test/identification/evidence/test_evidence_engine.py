@@ -14,8 +14,8 @@ def test_the_whole_way_from_a_record_to_valve_process_and_cause() -> None:
     assert found.method == "evidence"
     assert valve.figures is not None
     assert valve.probability is not None
-    assert valve.evidence == valve.figures.to_json()
-    assert found.to_json()["rate"] == {"sample_time": 1.0, "used": found.row_samples}
+    assert valve.evidence == valve.figures.to_dict()
+    assert found.to_dict()["rate"] == {"sample_time": 1.0, "used": found.row_samples}
     assert valve.stability is not None
     assert [look.name for look in valve.stability.tried] == [
         *("rows of 1 s", "rows of 2 s", "rows of 4 s", "first half", "second half")
@@ -42,6 +42,7 @@ def test_an_ideal_valve_is_not_called_sticky() -> None:
         assert found.valves[0].verdict is not VerdictKind.STICKY
 
 
+@pytest.mark.trial
 def test_friction_is_found_where_a_historian_held_every_other_sample() -> None:
     record = pi_loop(3.0, 1.0, samples=1600, noise=0.1)
     slow = record.pv.copy()

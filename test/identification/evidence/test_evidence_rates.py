@@ -9,6 +9,7 @@ from evidence_loops import pi_loop, slow_loop
 from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.accepted import Accepted
+from stiction_ros.identification.evidence.candidate import ideal
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
@@ -22,7 +23,7 @@ from stiction_ros.identification.evidence.rates import (
     looks,
     samples_between_reports,
 )
-from stiction_ros.identification.evidence.search import Parts, search, search_again
+from stiction_ros.identification.evidence.search import Found, search, search_again
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +79,8 @@ def test_there_is_a_look_for_each_rate_that_leaves_rows_enough(seen: tuple[Look,
 
 def test_what_is_best_at_one_rate_is_tried_at_the_others() -> None:
     problem = Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1))
-    nothing = Parts(growing=False, triangle=False)
-    poor = search(problem, nothing)  # nothing but the friction-free fit
+    free = ideal(problem)
+    poor = Found(free, free, (free,), (free,))
     slow = search(Problem.of(pi_loop(3.0, 1.0, samples=1600, noise=0.1), rate=2))
     better = search_again(problem, poor, [slow.best])
     assert better.best.loss < poor.best.loss - 100.0

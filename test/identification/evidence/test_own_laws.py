@@ -31,7 +31,7 @@ def test_a_law_that_explains_pv_better_is_named_and_its_figures_are_true(
 ) -> None:
     (valve,) = moving.valves
     assert valve.law == "kano"
-    assert valve.to_json()["law"] == "kano"
+    assert valve.to_dict()["law"] == "kano"
     assert valve.static_interval[0] <= 5.0 <= valve.static_interval[1]
     assert valve.dynamic_interval[0] <= 2.0 <= valve.dynamic_interval[1]
     assert valve.jump == pytest.approx(3.0, abs=0.1)

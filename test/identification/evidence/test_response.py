@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
 from evidence_loops import pi_loop
 
 from stiction_ros.identification import Identification, identify
@@ -23,10 +24,11 @@ def test_a_stem_that_never_moves_is_named() -> None:
     valve = stuck(3).valves[0]
     assert not valve.responds
     assert not valve.verdict.has_friction
-    assert valve.to_json()["responds"] is False
+    assert valve.to_dict()["responds"] is False
     assert valve.experiment.startswith("PV does not answer OP of V1: the stem is stuck")
 
 
+@pytest.mark.trial
 def test_a_pv_that_answers_is_told_so() -> None:
     for record in (pi_loop(0.0, 0.0, samples=900), pi_loop(3.0, 1.0, samples=900)):
         assert identify(dataclasses.replace(record, name="loop")).valves[0].responds

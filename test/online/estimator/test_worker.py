@@ -49,6 +49,7 @@ def test_a_process_that_still_compiles_is_not_waited_for() -> None:
             process.kill()
 
 
+@pytest.mark.trial
 def test_a_fit_stands_back_behind_the_loop() -> None:
     worker = FitWorker()
     try:

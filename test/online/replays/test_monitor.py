@@ -54,9 +54,9 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
             made.diagnostics(stamp, "estimator: status", {"sample": str(k + 1)})
         look = monitoring.add(k, recorded.op[k], recorded.pv[k])
         if look is not None:
-            _tell(made, stamp, "gap", "look", json_text(look.to_json(), indent=None))
+            _tell(made, stamp, "gap", "look", json_text(look.to_dict(), indent=None))
         for found in monitoring.collect():
-            _tell(made, stamp, "finding", "finding", json_text(found.to_json(), indent=None))
+            _tell(made, stamp, "finding", "finding", json_text(found.to_dict(), indent=None))
     made.writer.close()
     return path
 
@@ -114,7 +114,7 @@ def test_what_does_not_come_again_is_named(bag: Path, tmp_path: Path) -> None:
 
 @pytest.mark.trial
 def test_the_json_tells_what_was_compared(bag: Path) -> None:
-    document = json.loads(json_text(replay(bag).to_json()))
+    document = json.loads(json_text(replay(bag).to_dict()))
     assert document["monitor"]["looks"] == 12
     assert document["monitor"]["match"] == "equal"
 

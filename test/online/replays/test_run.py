@@ -104,7 +104,7 @@ def test_the_whole_replay_is_equal_without_notes(whole: Replay) -> None:
 def test_the_json_tells_fits_modes_and_swap(
     whole: Replay, live: tuple[Path, LiveRun], swap: int
 ) -> None:
-    document = whole.to_json()
+    document = whole.to_dict()
     assert document["match"] == "equal"
     assert document["swap"] == {"recorded": swap, "replayed": swap}
     fits = live[1].fits
@@ -141,7 +141,7 @@ def test_with_all_recorded_fits_the_swap_of_a_late_bag_is_the_same(
     found = replay(cut_bag(bag, tmp_path / "bag", first=121.0))
     assert found.modes is not None
     assert (found.modes.match, found.modes.difference) == (Match.EQUAL, "")
-    assert found.to_json()["swap"] == {"recorded": swap, "replayed": swap}
+    assert found.to_dict()["swap"] == {"recorded": swap, "replayed": swap}
 
 
 def test_where_trust_is_not_known_no_mode_is_compared(bag: Path, tmp_path: Path) -> None:
@@ -275,6 +275,7 @@ def test_a_parameter_of_another_version_is_one_clear_error(bag: Path, tmp_path: 
         replay(copy_bag(bag, tmp_path / "bag", spoil))
 
 
+@pytest.mark.trial
 def test_another_version_and_pace_are_noted(bag: Path, tmp_path: Path) -> None:
     def older(told: str) -> str:
         return told.replace("version: ", "version: 0.0.").replace("lockstep", "realtime")
@@ -298,6 +299,7 @@ def test_a_bag_without_op_has_nothing_to_replay(bag: Path, tmp_path: Path) -> No
             read_replay_bag(path, namespace=namespace)
 
 
+@pytest.mark.trial
 def test_of_several_loops_one_is_chosen_by_its_namespace(bag: Path, tmp_path: Path) -> None:
     path = tmp_path / "two"
     with BagWriter(path) as writer:

@@ -34,7 +34,7 @@ def test_a_restart_is_a_new_run_and_goes_on_beyond_the_end_of_the_old_one() -> N
     assert told(first + second) == [first, second]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.integers(12, 60),
     st.integers(12, 60),

@@ -97,7 +97,7 @@ def logs(draw: st.DrawFn) -> list[Message]:
     return log
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(logs())
 def test_what_is_good_was_sent_for_that_sample_by_that_run(log: list[Message]) -> None:
     try:

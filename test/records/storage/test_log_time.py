@@ -41,7 +41,7 @@ def test_two_clocks_that_alternate_are_the_later_one() -> None:
     ]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 40)), max_size=200))
 def test_it_never_runs_backwards_once_time_is_simulated(
     events: list[tuple[bool, int]],

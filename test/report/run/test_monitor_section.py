@@ -3,6 +3,8 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import pytest
+
 from stiction_ros.records.run.gap_log import GapLog
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.run.monitor_section import monitor_section
@@ -37,6 +39,7 @@ def test_every_measurement_is_told_with_what_was_found(log: RunLog) -> None:
     assert part.count("as in the baseline") == 1
 
 
+@pytest.mark.trial
 def test_the_report_of_a_run_holds_it(log: RunLog, tmp_path: Path) -> None:
     page = write_run(tell(told(log)), tmp_path / "run.html").page.read_text(encoding="utf-8")
     assert "<h2>The monitor</h2>" in page

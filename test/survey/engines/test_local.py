@@ -115,6 +115,7 @@ def test_a_loop_whose_worker_died_may_be_tried_again_and_one_that_was_judged_not
     assert again == {"0": False, "bad": True}
 
 
+@pytest.mark.trial
 def test_workers_end_when_the_survey_is_broken_off() -> None:
     engine = LocalEngine(2)
     run = engine.run(_tasks(50), OPTIONS)

@@ -49,7 +49,7 @@ def identified(method: str, record: Record) -> Mapping[str, Any]:
     """Return the mapping of ``identify --json`` by a method, else with default options."""
     from stiction_ros.identification import IdentificationOptions, identify
 
-    return identify(record, IdentificationOptions(method=method)).to_json()
+    return identify(record, IdentificationOptions(method=method)).to_dict()
 
 
 @dataclasses.dataclass(frozen=True)

@@ -126,7 +126,7 @@ def judge(family: str, seed: int, full: bool) -> Scored:
 
     seen, truth = blind_loop(seed, family)
     found = find_discrepancy(seen.model, [seen.record], GapOptions(quick=not full))
-    return score(truth, seen.model, found.to_json(), gains_beyond_margin(seen, truth))
+    return score(truth, seen.model, found.to_dict(), gains_beyond_margin(seen, truth))
 
 
 def judge_all(

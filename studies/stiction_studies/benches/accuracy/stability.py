@@ -190,7 +190,7 @@ def varied(method: str, record: Record, variant: Variant) -> Answer:
     options = IdentificationOptions(method=method)
     if variant.delay is not None:
         options = dataclasses.replace(options, delay=variant.delay)
-    said = answer_of(variant.applied(record), lambda changed: identify(changed, options).to_json())
+    said = answer_of(variant.applied(record), lambda changed: identify(changed, options).to_dict())
     factor = abs(variant.op[0])
 
     def back(interval: Interval | None) -> Interval | None:

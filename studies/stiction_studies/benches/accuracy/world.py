@@ -121,7 +121,7 @@ def judge(full: bool, log: Path, case: Case) -> WorldScore:
     begun = time.process_time()
     found = find_discrepancy(model, [loop.record], GapOptions(quick=not full))
     seconds = time.process_time() - begun
-    row = score(loop, given, found.to_json(), oracle(loop), seconds)
+    row = score(loop, given, found.to_dict(), oracle(loop), seconds)
     line = json_text({"full": full} | row.to_mapping(), indent=None) + "\n"
     with log.open("ab", buffering=0) as file:  # one write: workers share the file
         file.write(line.encode())

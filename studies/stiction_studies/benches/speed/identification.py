@@ -13,17 +13,22 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, IdentificationOptions, identify
-from stiction_ros.identification.problem.equation_error import ArxOrders, squared_error
+from stiction_ros.paper.equation_error import squared_error
 from stiction_ros.paper.grid_search import count_points
 from stiction_ros.paper.methods import identify as identify_as_paper
 from stiction_ros.paper.one_step_result import check_record, friction_limits
 from stiction_ros.paper.paper_options import PaperOptions
+from stiction_ros.paper.search_log import PaperIdentification
+from stiction_ros.signals.arx_fit import ArxOrders
 from stiction_studies.benches.speed.row import Row, row
 from stiction_studies.examples import Example, coupled_loop, example1, example2_of_one_round
 
 PATIENCE = 30.0  # s; a run of the exact search that took longer is not repeated
 EXACT = "exact"
 DEFAULT = "evidence"
+
+EQUAL = 0.1
+"""Step of a grid that is as near as the other methods in every friction parameter, %."""
 
 Show = Callable[[float, str], None]
 Progress = Callable[[float], None]
@@ -200,10 +205,14 @@ def fight(plan: Plan, duel: Duel, begin: Callable[[str], Progress]) -> list[Row]
         one.found.method: _answer(example, one.found, scale) for one in (exact, default, nlp, grid)
     }
     limits = ", ".join(f"{limit:.3g}" for limit in friction_limits(record, nlp_options))
+    assert isinstance(nlp.found, PaperIdentification)
     log = nlp.found.search
     assert log is not None
     end = f"f_max {limits} %, SE with n_a = n_b = {duel.order}"
-    rivals = (
+    points = count_points(record, grid_options)
+    fine = count_points(record, dataclasses.replace(grid_options, grid_step=EQUAL))
+    as_near = Timed(grid.found, tuple(fine / points * time for time in grid.times))
+    rivals = [
         (
             f"paper's NLP, M = {nlp_options.starts}",
             nlp,
@@ -212,9 +221,12 @@ def fight(plan: Plan, duel: Duel, begin: Callable[[str], Progress]) -> list[Row]
         (
             f"paper's grid, step {step:g} %",
             grid,
-            f"{count_points(record, grid_options)} points, all of them worked through",
+            f"{points} points, all of them worked through",
         ),
-    )
+    ]
+    if step > EQUAL:
+        said = f"{fine} points at the cost of one of the {points} that were worked through"
+        rivals.append((f"paper's grid, step {EQUAL:g} %", as_near, said))
     return [
         row(
             case,
@@ -284,6 +296,7 @@ def timed(
     while True:
         begun = time.perf_counter()
         share = _part(progress, len(times), repeat)
+        found: Identification
         if isinstance(options, PaperOptions):
             found = identify_as_paper(example.record, options, share)
         else:
@@ -313,11 +326,7 @@ def _answer(example: Example, found: Identification, orders: ArxOrders) -> str:
     error = squared_error(record, friction, delays, orders)
     flat = sorted({delay for line in delays for delay in line})
     told = ", ".join(map(str, flat)) if len(flat) == 1 else str([list(line) for line in delays])
-    text = f"{found.method}: {_friction(found)}, delay {told}, SE {error:.6g}"
-    if found.method == EXACT and found.search is not None:
-        log = found.search
-        text += f" (lowest SE it met {log.squared_error:.6g} with n_a = {log.output_order})"
-    return text
+    return f"{found.method}: {_friction(found)}, delay {told}, SE {error:.6g}"
 
 
 def _friction(found: Identification) -> str:

@@ -93,7 +93,7 @@ class BridgeOutcome:
         """Whether everything is as expected."""
         return not self.reasons
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self) | {"passed": self.passed}
 

@@ -54,7 +54,7 @@ class Outcome:
         """Whether everything is as expected."""
         return not self.reasons
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self) | {"passed": self.passed}
 

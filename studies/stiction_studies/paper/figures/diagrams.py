@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
 from stiction_ros.processes.stirred_tank import TankParameters
-from stiction_ros.report.drawing import BLUE, DPI, GREY, INK, ORANGE, PALE, WIDTH, Drawing, style
+from stiction_studies.drawing import BLUE, DPI, GREY, INK, ORANGE, PALE, WIDTH, Drawing, style
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.sources import Sources
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification
-from stiction_ros.report.drawing import BLUE, GREEN, GREY, ORANGE, Drawing, panels, style
 from stiction_ros.report.shapes import step_response, true_response
+from stiction_studies.drawing import BLUE, GREEN, GREY, ORANGE, Drawing, panels, style
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
 from stiction_studies.paper.sources import Sources
@@ -147,7 +147,7 @@ def _draw(
     for label, values in printed:
         axis.plot(at, values, color=GREY, linestyle=(0, (5, 2)), label=label)
     for method, label, colour in METHODS:
-        output = sources.found(number, method).identification.outputs[i].to_json()
+        output = sources.found(number, method).identification.outputs[i].to_dict()
         axis.plot(at, step_response(output, valve, count), color=colour, label=label)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from stiction_studies.examples import compare
-from stiction_studies.pages.example_report import draw_example
+from stiction_studies.pages.example_report import draw_window
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.sources import Sources
 
@@ -13,10 +13,8 @@ from stiction_studies.paper.sources import Sources
 def figure3(sources: Sources) -> Exhibit:
     """Return PV, OP and stem around a set-point move, and how well they fit."""
     example, found = sources.example(1), sources.found(1, "nlp").identification
-    drawn = {drawing.name: drawing for drawing in draw_example(example, found)}
-    drawing = dataclasses.replace(
-        drawn["window"], name="figure3", title="Figure 3: Example 1, measured and estimated trends"
-    )
+    title = "Figure 3: Example 1, measured and estimated trends"
+    drawing = dataclasses.replace(draw_window(example, found), name="figure3", title=title)
     compared = compare(example, found)
     output = found.outputs[0]
     error = compared.stem_error / len(example.record)

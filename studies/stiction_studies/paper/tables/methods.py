@@ -6,6 +6,7 @@ import platform
 
 from stiction_ros.config_files import find_config
 from stiction_ros.paper.grid_search import count_points
+from stiction_ros.paper.search_log import PaperIdentification
 from stiction_ros.paper.sustained_oscillation import sustained_oscillations
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
@@ -32,7 +33,8 @@ def table_of_times(sources: Sources) -> Exhibit:
         times["grid"] = printed.grid_seconds
         for method, name in NAMES.items():
             found = sources.found(number, method)
-            log = found.identification.search
+            told = found.identification
+            log = told.search if isinstance(told, PaperIdentification) else None
             points = count_points(example.record, printed.options(example, "grid"))
             work = {"exact": "", "evidence": "", "grid": f", {points} points"}.get(
                 method, f", {log.solves if log else 0} runs of IPOPT"

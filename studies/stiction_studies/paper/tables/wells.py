@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.problem.equation_error import Delays, fit_outputs
+from stiction_ros.paper.equation_error import fit_outputs
 from stiction_ros.paper.one_step_result import check_record, friction_limits
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
 from stiction_ros.paper.programme.friction_programme import FrictionProgramme
@@ -13,6 +13,7 @@ from stiction_ros.paper.programme.nlp import WIDTH
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme
 from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
+from stiction_ros.signals.arx_fit import Delays
 from stiction_studies.examples import Example
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example

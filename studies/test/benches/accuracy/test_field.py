@@ -179,7 +179,7 @@ def test_variants_change_what_they_say() -> None:
 
 def test_frictions_come_back_in_the_record_s_own_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     class Found:
-        def to_json(self) -> dict[str, Any]:
+        def to_dict(self) -> dict[str, Any]:
             valve = {"verdict": "sticky", "f_s_interval": [20.0, 40.0], "f_d_interval": [0.0, 2.0]}
             return {"valves": [valve], "outputs": [{}]}
 

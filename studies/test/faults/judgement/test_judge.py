@@ -293,6 +293,6 @@ def test_what_the_fault_itself_finds_wrong_fails():
 
 
 def test_an_outcome_is_plain_values():
-    document = outcome().to_json()
+    document = outcome().to_dict()
     assert document["passed"] is True
     assert document["fault"] == "made-up"

@@ -105,7 +105,16 @@ def found(cause: str, first: int = 700, integrating: bool | None = None) -> Hidd
     raise AssertionError(cause)
 
 
-@pytest.mark.parametrize("cause", ["valve stiction", "load step", "process gain", "sensor clip"])
+@pytest.mark.parametrize(
+    "cause",
+    [
+        "valve stiction",
+        *(
+            pytest.param(c, marks=pytest.mark.trial)
+            for c in ("load step", "process gain", "sensor clip")
+        ),
+    ],
+)
 def test_what_is_hidden_is_gained_by_the_oracle(cause: str) -> None:
     loop = found(cause)
     (gain,) = oracle(loop)
@@ -114,6 +123,7 @@ def test_what_is_hidden_is_gained_by_the_oracle(cause: str) -> None:
     assert gain.rival not in family(loop, loop.hidden[0])
 
 
+@pytest.mark.trial
 def test_what_is_not_there_gains_nothing() -> None:
     loop = found("none")
     absent = dataclasses.replace(loop, hidden=(Effect(PROCESS, "gain", {"factor": 1.1}),))
@@ -154,6 +164,7 @@ def test_a_healthy_loop_leaves_its_declared_noise_and_nothing_else() -> None:
     assert clean >= 4
 
 
+@pytest.mark.trial
 def test_of_two_each_is_gained_beside_the_other() -> None:
     loop = hidden_loop(901, "two")
     both = oracle(loop)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from stiction_ros.identification.problem.equation_error import Delays
+from stiction_ros.identification.result.identification import Identification
+from stiction_ros.signals.arx_fit import Delays
 
 CAPPED = "Maximum_Iterations_Exceeded"
 
@@ -40,7 +41,7 @@ class SolvedStart:
         """Whether it may win."""
         return self.feasible and self.stable
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self)
 
@@ -52,7 +53,7 @@ class SearchLog:
     Attributes:
         squared_error: (12a) of the answer's (f_S, f_D, delays) under He's hard law with
             least-squares coefficients, squared engineering units;
-            see :func:`stiction_ros.identification.problem.equation_error.squared_error`.
+            see :func:`stiction_ros.paper.equation_error.squared_error`.
         objective: what the method itself minimised, same units.
         output_order, input_order, first: n_a, n_b and ε of both.
         points: grid points, or frictions at which the programme evaluated (12a).
@@ -83,6 +84,24 @@ class SearchLog:
         """Runs of IPOPT that ended at their limit of iterations."""
         return sum(start.status == CAPPED for start in self.starts)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return dataclasses.asdict(self)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class PaperIdentification(Identification):
+    """What one of the paper's methods makes of a record.
+
+    Attributes:
+        search: what the method tried and its squared error.
+    """
+
+    search: SearchLog | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mapping of ``identify --json`` but for ``record``."""
+        document = super().to_dict()
+        if self.search is not None:
+            document["model"]["search"] = self.search.to_dict()
+        return document

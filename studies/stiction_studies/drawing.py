@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import dataclasses
 import functools
@@ -17,6 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.pages.frame import SCROLLED, text
 
 # Okabe and Ito's colours, told apart with every kind of colour vision.
 BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY = (
@@ -28,7 +30,6 @@ BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY = (
     "#56B4E9",
 )
 INK, GREY, PALE = "#222222", "#767676", "#D9D9D9"
-MODE_COLOURS = {"unaware": "#F0C9A8", "embedding": "#A9D8C4", "inversion": "#B7D5EE", "hold": PALE}
 WIDTH = 10.0  # inches; at 150 dots per inch 1500 pixels
 DPI = 150
 
@@ -135,6 +136,16 @@ class TimeAxis:
         return f"time since the first sample ({self.unit})"
 
 
+def embedded(drawing: Drawing) -> str:
+    """Return a figure with its picture inside the page."""
+    data = base64.b64encode(drawing.png).decode("ascii")
+    return (
+        f'<figure id="{text(drawing.name)}">{SCROLLED}<img alt="{text(drawing.title)}" '
+        f'src="data:image/png;base64,{data}"></div><figcaption><b>{text(drawing.title)}.</b> '
+        f"{text(drawing.caption)}</figcaption></figure>"
+    )
+
+
 def legend(axis: Any, columns: int = 6) -> None:
     """Put the legend above the axes at the right, where it covers no data."""
     axis.legend(
@@ -147,14 +158,14 @@ def legend(axis: Any, columns: int = 6) -> None:
     )
 
 
-def mark_swap(axis: Any, at: float | None, text: str = "") -> None:
-    """Draw the swap as a vertical line, named above the panel when there is a text."""
+def mark_swap(axis: Any, at: float | None, said: str = "") -> None:
+    """Draw the swap as a vertical line, named above the panel when there is a word for it."""
     if at is None:
         return
     axis.axvline(at, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
-    if text:
+    if said:
         axis.annotate(
-            text,
+            said,
             (at, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 3),

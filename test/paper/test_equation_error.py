@@ -9,13 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.identification.problem.equation_error import (
-    ArxOrders,
-    evaluate,
-    fit_arx,
-    squared_error,
-    stable_arx,
-)
+from stiction_ros.paper.equation_error import evaluate, squared_error
+from stiction_ros.signals.arx_fit import ArxOrders, fit_arx, stable_arx
 
 TRUTH = np.array([[5.0, 2.0]])
 

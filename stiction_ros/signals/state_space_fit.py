@@ -11,29 +11,16 @@ free-run error, driven by χ and y through A − K C the one-step error.
 from __future__ import annotations
 
 import dataclasses
-import enum
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.linear.subspace_projection import StateSequence
 from stiction_ros.signals.state_space import responses
+from stiction_ros.signals.subspace_projection import StateSequence
 
 TINY = 1e-24
 """Variance, in that of the outputs, below which an error counts as none."""
-
-
-class Refinement(enum.StrEnum):
-    """Error that B, the initial state and the offset are refined on, by least squares.
-
-    The free-run error is right in open loop; where a controller feeds noise back, only the
-    one-step error is.
-    """
-
-    NONE = "none"
-    FREE_RUN = "free_run"
-    ONE_STEP = "one_step"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -172,14 +159,15 @@ def _free_decay(transition: FloatArray, c: FloatArray, samples: int) -> FloatArr
     return out
 
 
-def refine(model: Realisation, u: FloatArray, y: FloatArray, error: Refinement) -> Realisation:
+def refine(model: Realisation, u: FloatArray, y: FloatArray, one_step: bool) -> Realisation:
     """Return ``model`` with B, ξ_0 and y_0 that minimise the sum of squares of one error.
 
-    The model comes back unchanged for ``Refinement.NONE`` and where the error diverges.
+    The free-run error is right in open loop; where a controller feeds noise back, only the
+    one-step error is. The model comes back unchanged where the error diverges.
     """
-    k = model.k if error is Refinement.ONE_STEP else np.zeros_like(model.k)
+    k = model.k if one_step else np.zeros_like(model.k)
     transition = model.a - k @ model.c
-    if error is Refinement.NONE or spectral_radius(transition) >= 1.0:
+    if spectral_radius(transition) >= 1.0:
         return model
     (n, m), (p, samples) = model.b.shape, y.shape
     drives = np.zeros((samples, n, m * n + p + 1))

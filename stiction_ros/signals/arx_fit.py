@@ -1,11 +1,10 @@
-r"""The one-step criterion of the paper, shared by all methods.
+r"""ARX models of one output by least squares, and the one-step criterion of the paper.
 
 .. math:: y_k = \phi_k^T \theta + c + v_k \quad (9), (13), \qquad
           \mathrm{SE} = \sum_{k \ge \varepsilon} (y_k - \phi_k^T \theta - c)^2 \quad (14)
 
-The constant c is always fitted. The criterion of a record is the mean of SE over its outputs,
-(12a), in squared engineering units of PV. Rivals with different delays are compared over the
-same rows: ε is computed with the longest delay that is tried.
+The constant c is always fitted. Rivals with different delays are compared over the same rows: ε is
+computed with the longest delay that is tried.
 """
 
 from __future__ import annotations
@@ -16,10 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import lstsq
 
-from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.errors import InputError
-from stiction_ros.records.record import Record
 from stiction_ros.signals.arx import arx_columns
 from stiction_ros.signals.free_run import driven
 from stiction_ros.signals.polynomials import largest_root, recursion, stabilised
@@ -132,24 +129,6 @@ class ArxFit:
         return recursion(np.append(1.0, self.a), drive, y[first - len(self.a) : first])
 
 
-@dataclasses.dataclass(frozen=True)
-class EquationError:
-    """The criterion of one record at one friction.
-
-    Attributes:
-        fits: one ARX model per output.
-        stems: simulated stem positions, shape (m, N), %.
-    """
-
-    fits: tuple[ArxFit, ...]
-    stems: FloatArray
-
-    @property
-    def squared_error(self) -> float:
-        """Mean of SE over the outputs, (12a), squared engineering units."""
-        return float(np.mean([fit.squared_error for fit in self.fits]))
-
-
 def regressors(
     y: FloatArray, stems: FloatArray, delays: tuple[int, ...], orders: ArxOrders
 ) -> FloatArray:
@@ -217,16 +196,17 @@ def stable_arx(
     delays: tuple[int, ...],
     orders: ArxOrders,
     kept: BoolArray | None = None,
+    radius: float = 0.99,
 ) -> ArxFit:
     """Return :func:`fit_arx`, or where that is unstable a stable model near it.
 
-    Roots outside 0.99 are pulled onto that circle; then b and c are fitted again.
+    Roots outside ``radius`` are pulled onto that circle; then b and c are fitted again.
     """
     fit = fit_arx(y, stems, delays, orders, kept)
     if fit.largest_root < 1.0:
         return fit
     free = np.ones(len(stems) * orders.input, bool) if kept is None else kept[orders.output :]
-    a = stabilised(np.concatenate([[1.0], fit.a]))[1:]
+    a = stabilised(np.concatenate([[1.0], fit.a]), radius)[1:]
     phi = regressors(y, stems, delays, orders)
     rest = y[orders.first :] - phi[:, : orders.output] @ a
     columns = np.column_stack([phi[:, orders.output :][:, free], np.ones(len(rest))])
@@ -237,67 +217,3 @@ def stable_arx(
     b = flat.reshape(len(stems), orders.input)
     error = float(residuals @ residuals)
     return ArxFit(delays, a, b, float(solution[-1]), error, residuals)
-
-
-def fit_outputs(
-    pv: FloatArray, stems: FloatArray, delays: Delays, orders: ArxOrders
-) -> EquationError:
-    """Fit every output.
-
-    Args:
-        pv: shape (N, p), engineering units.
-        stems: shape (m, N), %.
-        delays: for each output the t_d of each valve, samples.
-        orders: n_a, n_b, ε.
-    """
-    fits = tuple(
-        fit_arx(y, stems, row, orders, orders.kept(i, len(stems)))
-        for i, (y, row) in enumerate(zip(pv.T, delays, strict=True))
-    )
-    return EquationError(fits, stems)
-
-
-def simulate_stems(op: FloatArray, friction: FloatArray) -> FloatArray:
-    """Return stem positions under He's law (4), shape (m, N), %.
-
-    The stem before the first sample is the first OP.
-
-    Args:
-        op: shape (N, m), %.
-        friction: rows (f_S, f_D), shape (m, 2), %; f_D above f_S is taken as f_S.
-    """
-    rows = np.column_stack([friction[:, 0], np.minimum(friction[:, 0], friction[:, 1])])
-    stems = [
-        HeStiction.simulate_grid(row[None, :], u, float(u[0]))[:, 0]
-        for u, row in zip(op.T, rows, strict=True)
-    ]
-    return np.array(stems)
-
-
-def evaluate(
-    record: Record, friction: FloatArray, delays: Delays, orders: ArxOrders
-) -> EquationError:
-    """Simulate He's valve (4) and fit every output: any method's answer on equal terms.
-
-    Args:
-        record: what was measured.
-        friction: rows (f_S, f_D) per valve, shape (m, 2), %.
-        delays: for each output the t_d of each valve, samples.
-        orders: n_a, n_b, ε.
-
-    Raises:
-        InputError: shapes that do not fit the record, or a friction that is no number ≥ 0.
-    """
-    friction = np.asarray(friction, dtype=float)
-    if friction.shape != (len(record.valves), 2):
-        raise InputError(f"friction has shape {friction.shape}", where=record.name)
-    if not (np.isfinite(friction).all() and (friction >= 0.0).all()):
-        raise InputError("friction is negative or not finite", where=record.name)
-    if [len(row) for row in delays] != [len(record.valves)] * len(record.outputs):
-        raise InputError("delays need one row per output, one entry per valve", where="delay")
-    return fit_outputs(record.pv, simulate_stems(record.op, friction), delays, orders)
-
-
-def squared_error(record: Record, friction: FloatArray, delays: Delays, orders: ArxOrders) -> float:
-    """Return (12a) of :func:`evaluate`: SE under He's hard law, squared engineering units."""
-    return evaluate(record, friction, delays, orders).squared_error
