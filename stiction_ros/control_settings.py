@@ -11,7 +11,7 @@ import numpy as np
 from stiction_ros.control.design import ControlDesign
 from stiction_ros.control.embedding import EmbeddingTuning
 from stiction_ros.control.horizon import HorizonLimits, HorizonWeights
-from stiction_ros.control.observer import ObserverKind, ObserverTuning
+from stiction_ros.control.observer import Observer, ObserverKind, ObserverTuning
 from stiction_ros.control.strategies import FallbackRule
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
@@ -26,7 +26,16 @@ from stiction_ros.paper.controllers.weights import (
     plain_weights,
     unaware_weights,
 )
+from stiction_ros.processes import LinearModel
 from stiction_ros.settings import check_choices, setting
+
+MOVE_SHARES = {"move_weights": 0.1, "embedding_move_weights": 0.01}
+"""Weight of a move over that of what it does to the outputs, squared: as printed for Example 1,
+whose outputs move by 1 for a stem of 1 %."""
+
+FINEST = 0.01
+"""Stem move, %, by which a load is thought to wander in a sample, and below which no measurement is
+believed: as in the scenario of Example 1."""
 
 
 class Formulations(enum.StrEnum):
@@ -67,10 +76,16 @@ class ControlSettings:
     state_weight: float = setting(0.0, "weight added to Q on every state", low=0.0)
     terminal_weight: float = setting(0.0, "weight added to V_F on every state", low=0.0)
     move_weights: tuple[float, ...] = setting(
-        (0.1,), "S: weight of each squared OP move, stiction-unaware", low=1e-9
+        (0.0,),
+        "S: weight of each squared OP move, stiction-unaware; 0: a tenth of the weighed square of "
+        "what a stem move of 1 % does to the outputs within the horizon",
+        low=0.0,
     )
     embedding_move_weights: tuple[float, ...] = setting(
-        (0.01,), "weight of each squared stem move, stiction-embedding", low=1e-9
+        (0.0,),
+        "weight of each squared stem move, stiction-embedding; 0: a hundredth of that square, and "
+        "each jump costs what an offset as large as its estimate is unsure costs while it lasts",
+        low=0.0,
     )
     move_worth: tuple[float, ...] = setting(
         (0.0,),
@@ -97,12 +112,18 @@ class ControlSettings:
     observer: str = setting(
         "kalman", "observer design", choices=tuple(kind.value for kind in ObserverKind)
     )
-    state_noise: float = setting(1.0, "variance of stem-like process noise, %²", low=0.0)
+    state_noise: float = setting(0.01, "variance of stem-like process noise, %²", low=0.0)
     disturbance_noise: tuple[float, ...] = setting(
-        (1e-5,), "variance per sample of each output disturbance", low=1e-15
+        (0.0,),
+        "variance per sample of each output disturbance; 0: that of a load that wanders by what "
+        "0.01 % of stem does",
+        low=0.0,
     )
     measurement_noise: tuple[float, ...] = setting(
-        (1e-4,), "variance of the noise of each measurement", low=1e-15
+        (0.0,),
+        "variance of the noise of each measurement; 0: that of the loop model, at least what "
+        "0.01 % of stem does",
+        low=0.0,
     )
     outlier_gate: float = setting(
         20.0, "innovations beyond this many standard deviations are held back", low=3.0
@@ -113,9 +134,9 @@ class ControlSettings:
     luenberger_gain: float = setting(0.2, "K_d of the Luenberger observer", low=1e-6, high=1.0)
     jump_price: float = setting(0.0, "cost added per jump of a sticky valve", low=0.0)
     kick_limits: tuple[float, ...] = setting(
-        (25.0,),
-        "largest move of OP in one sample at which a sticky valve jumps, %; its smallest jump "
-        "is always allowed",
+        (math.inf,),
+        "largest move of OP in one sample at which a sticky valve jumps, %, where it is below "
+        "op_rate_limits; its smallest jump is always allowed",
         low=1e-6,
     )
     jump_margin: float = setting(
@@ -187,16 +208,31 @@ class ControlSettings:
         """
         linear = model.process.linear(model.sample_time)
         p, m, n = len(model.outputs), len(model.valves), linear.order
-        for name in ("move_weights", "embedding_move_weights"):
-            self._list(name, m)
+        reached = _reached(linear, model, self.horizon)
+        answer = self._list("output_weights", p) @ reached**2
+        most = np.maximum(reached.max(axis=1), 1e-9) ** 2
         state = linear.c.T @ (self._list("output_weights", p)[:, None] * linear.c)
         stage = state + self.state_weight * np.eye(n)
         terminal = state + self.terminal_weight * np.eye(n)
         weights = {
-            name: HorizonWeights(self.horizon, stage, np.diag(self._list(name, m)), terminal)
-            for name in ("move_weights", "embedding_move_weights")
+            name: HorizonWeights(
+                self.horizon,
+                stage,
+                np.diag(self._scaled(name, np.maximum(share * answer, 1e-9))),
+                terminal,
+            )
+            for name, share in MOVE_SHARES.items()
         }
-        _check_reach(model, self.horizon)
+        noise = np.array([one.std**2 for one in model.process.noise])
+        observer = ObserverTuning(
+            ObserverKind(self.observer),
+            self.state_noise,
+            self._scaled("disturbance_noise", FINEST**2 * most),
+            self._scaled("measurement_noise", np.maximum(noise, FINEST**2 * most)),
+            self.luenberger_gain,
+            self.outlier_gate,
+            self.outlier_samples,
+        )
         output = np.column_stack([self._list("pv_low", p), self._list("pv_high", p)])
         if np.any(output[:, 0] >= output[:, 1]):
             raise InputError("pv_low is not below pv_high", where="pv_low")
@@ -213,17 +249,9 @@ class ControlSettings:
                 weights["embedding_move_weights"], look_ahead=self.look_ahead
             ),
             target_weights=self._list("target_weights", p),
-            observer=ObserverTuning(
-                ObserverKind(self.observer),
-                self.state_noise,
-                self._list("disturbance_noise", p),
-                self._list("measurement_noise", p),
-                self.luenberger_gain,
-                self.outlier_gate,
-                self.outlier_samples,
-            ),
+            observer=observer,
             jumps=EmbeddingTuning(
-                self.jump_price,
+                self.jump_price + self._unsure(linear, observer),
                 self.jump_margin,
                 self.least_jump_margin,
                 self._list("kick_limits", m),
@@ -238,6 +266,20 @@ class ControlSettings:
             output_names=model.outputs,
         )
         return self._as_printed(self._with_preset(design))
+
+    def _unsure(self, linear: LinearModel, observer: ObserverTuning) -> float:
+        """Return what an offset costs that is as large as its estimate is unsure.
+
+        By the gain K of a filter the estimate of a disturbance has the variance K R, for noise of
+        variance R. Jumps after less than that would follow the noise.
+        """
+        m = len(linear.stem0)
+        if np.all(self._list("embedding_move_weights", m) + self._list("move_worth", m) > 0.0):
+            return 0.0
+        gain = np.diag(Observer(linear, observer).gain[linear.order :])
+        weights = self._list("output_weights", len(gain))
+        lasts = self.horizon + self.look_ahead
+        return float(lasts * weights @ (gain * observer.measurement_noise))
 
     def _move_prices(self, model: LoopModel) -> FloatArray:
         """Return what the smallest jump of each valve costs, 0 where its worth is not given.
@@ -301,6 +343,11 @@ class ControlSettings:
             )
         return np.column_stack([low, high])
 
+    def _scaled(self, name: str, otherwise: FloatArray) -> FloatArray:
+        """Return the entries of a list, each 0 replaced by what follows from the loop."""
+        values = self._list(name, len(otherwise))
+        return np.where(values > 0.0, values, otherwise)
+
     def _list(self, name: str, count: int) -> FloatArray:
         values = getattr(self, name)
         if len(values) not in (1, count):
@@ -310,18 +357,18 @@ class ControlSettings:
         return np.array(np.broadcast_to(np.array(values, dtype=float), count))
 
 
-def _check_reach(model: LoopModel, horizon: int) -> None:
-    """Raise InputError when a valve moves no output within the horizon."""
-    linear = model.process.linear(model.sample_time)
-    effect = linear.b
-    moved = np.zeros(effect.shape[1], dtype=bool)
-    for _ in range(horizon):
-        moved |= np.any(linear.c @ effect != 0.0, axis=0)
-        effect = linear.a @ effect
-    for name, reaches in zip(model.valve_names, moved, strict=True):
-        if not reaches:
+def _reached(linear: LinearModel, model: LoopModel, horizon: int) -> FloatArray:
+    """Return how far each output moves within the horizon after a stem step of 1 %, (p, m).
+
+    Raises:
+        InputError: a valve moves no output.
+    """
+    found: FloatArray = np.abs(linear.step_responses(horizon + 1)).max(axis=0)
+    for name, reach in zip(model.valve_names, found.T, strict=True):
+        if not reach.any():
             raise InputError(
                 f"valve {name} moves no output within {horizon} samples",
                 where="horizon",
                 fix="make it longer than the dead time and the settling",
             )
+    return found

@@ -29,7 +29,9 @@ class Setting:
         description: one line for people.
         low, high: closed range of numbers (of each element of a list).
         choices: accepted texts; empty for any.
-        fixed: whether it cannot change while the node runs.
+        fixed: whether it cannot change while the node is configured.
+        once: whether it is read only when the process starts.
+        beside: name and value of another setting, without which this one has no effect.
     """
 
     name: str
@@ -40,6 +42,8 @@ class Setting:
     high: float
     choices: tuple[str, ...]
     fixed: bool
+    once: bool
+    beside: tuple[str, str]
 
 
 def setting(
@@ -50,9 +54,11 @@ def setting(
     high: float = math.inf,
     choices: tuple[str, ...] = (),
     fixed: bool = False,
+    once: bool = False,
+    beside: tuple[str, str] = ("", ""),
 ) -> Any:
     """Declare a field of a settings dataclass."""
-    metadata = {"setting": (description, low, high, choices, fixed)}
+    metadata = {"setting": (description, low, high, choices, fixed, once, beside)}
     return dataclasses.field(default=default, metadata=metadata)
 
 
@@ -98,6 +104,38 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], where: str) -> T:
             )
         checked[name] = check(known[name], value, where)
     return cls(**checked)
+
+
+def changed(settings: Any, values: Mapping[str, Any], node: str, configured: bool) -> Any:
+    """Return ``settings`` with other ``values``, which take effect in ``node``.
+
+    Args:
+        settings: in force.
+        values: to be changed, by name.
+        node: its full name.
+        configured: whether it is; at rest a node reads all when it is configured.
+
+    Raises:
+        InputError: a value that cannot be used, or that would change nothing.
+    """
+    for entry in settings_of(type(settings)):
+        if entry.name not in values:
+            continue
+        value, (other, needed) = check(entry, values[entry.name], node), entry.beside
+        where, start = f"{node}: {entry.name}", f"start the node with -p {entry.name}:=VALUE"
+        if entry.once:
+            raise InputError("is read when the process starts", where=where, fix=start)
+        if value == getattr(settings, entry.name):
+            continue
+        if configured and entry.fixed:
+            rest = f"deactivate and clean it up (ros2 lifecycle set {node} …), set it, configure"
+            what = "cannot change while the node is configured"
+            raise InputError(what, where=where, fix=f"{rest} and activate it; or {start}")
+        if configured and other and getattr(settings, other) != needed:
+            found = f"{other} is {getattr(settings, other)}"
+            raise InputError(f"has no effect while {found}", where=where, fix=f"use {needed}")
+        settings = dataclasses.replace(settings, **{entry.name: value})
+    return settings
 
 
 def check(entry: Setting, value: Any, where: str) -> Any:

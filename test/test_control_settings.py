@@ -93,3 +93,32 @@ def test_two_moves_cost_as_much_as_the_offset_whose_iae_they_are_worth() -> None
     assert prices[1] == 0.0
     assert design.embedding.look_ahead == 70
     assert design.unaware.look_ahead == 0
+
+
+def first_order(gain: float, noise: float) -> LoopModel:
+    output = {"name": "PV1", "a": [-0.9], "b": {"V1": [0.1 * gain]}, "noise": {"std": noise}}
+    return LoopModel.from_mapping(
+        {
+            "loop": "own",
+            "sample_time": 1.0,
+            "valves": [{"name": "V1"}],
+            "process": {"kind": "arx", "outputs": [output]},
+        },
+        "own",
+    )
+
+
+def test_by_default_a_loop_in_other_units_has_the_same_controller() -> None:
+    one, other = (ControlSettings().design(first_order(g, 0.05 * abs(g))) for g in (1.0, -20.0))
+    assert other.unaware.move == pytest.approx(400.0 * one.unaware.move)
+    assert other.embedding.move == pytest.approx(400.0 * one.embedding.move)
+    assert other.jumps.jump_price == pytest.approx(400.0 * one.jumps.jump_price)
+    assert other.observer.measurement_noise == pytest.approx(400.0 * one.observer.measurement_noise)
+    assert other.observer.disturbance_noise == pytest.approx(400.0 * one.observer.disturbance_noise)
+
+
+def test_by_default_a_jump_costs_more_where_the_estimate_is_less_sure() -> None:
+    quiet, loud = (ControlSettings().design(first_order(1.0, std)) for std in (0.05, 0.5))
+    assert loud.jumps.jump_price > quiet.jumps.jump_price > 0.0
+    given = ControlSettings(embedding_move_weights=(0.01,)).design(first_order(1.0, 0.5))
+    assert given.jumps.jump_price == 0.0

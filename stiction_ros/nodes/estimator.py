@@ -92,6 +92,7 @@ class EstimatorNode(ManagedNode):
 
     def retune(self, settings: EstimatorNodeSettings) -> None:
         settings.options()
+        self._pairs.retune(*settings.bridges())
         if self.live is not None:
             self.live.retune(settings)
             self.monitoring.retune(settings)

@@ -8,7 +8,7 @@ from stiction_ros.online.controller.settings import LiveControllerSettings
 from stiction_ros.online.estimator.live import EstimatorSettings
 from stiction_ros.online.monitor.gap_monitor import MonitorRule
 from stiction_ros.online.pairing import BRIDGED, Pairing
-from stiction_ros.online.plain_settings import PACES, NodeSettings
+from stiction_ros.online.plain_settings import PACES, SPEED, NodeSettings, speed_setting
 from stiction_ros.settings import setting
 
 
@@ -23,16 +23,16 @@ class ControllerNodeSettings(LiveControllerSettings, NodeSettings):
         choices=PACES,
         fixed=True,
     )
-    speed: float = setting(
-        1.0, "simulated seconds per second of realtime pace, as of the plant", low=1e-3, high=1e6
-    )
+    speed: float = speed_setting(f"{SPEED}, as of the plant")
     sp_source: str = setting(
         "schedule",
         "schedule: in lockstep each pv has its own sp; external: the last (transient local) holds",
         choices=("schedule", "external"),
         fixed=True,
     )
-    fit_timeout: float = setting(120.0, "s to wait for an awaited fit", low=0.1, high=1e5)
+    fit_timeout: float = setting(
+        120.0, "s to wait for an awaited fit", low=0.1, high=1e5, beside=("pace", "lockstep")
+    )
     prediction_points: int = setting(11, "points of the published plan", low=1, high=1001)
 
 
@@ -48,7 +48,7 @@ class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
         choices=PACES,
         fixed=True,
     )
-    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
+    speed: float = speed_setting()
     monitor_model: str = setting(
         "",
         "loop model file the monitor compares with; empty for the loop as it is identified",
@@ -57,4 +57,8 @@ class EstimatorNodeSettings(EstimatorSettings, MonitorRule, NodeSettings):
 
     def pairing(self) -> Pairing:
         """Return what pairs PV and OP; no bridge is longer than what a fit can wait for."""
-        return Pairing(self.sample_time, self.window, min(BRIDGED, self.fit_latency - 1))
+        return Pairing(self.sample_time, *self.bridges())
+
+    def bridges(self) -> tuple[int, int]:
+        """Return window and longest bridge of the pairing, samples."""
+        return self.window, min(BRIDGED, self.fit_latency - 1)

@@ -79,6 +79,10 @@ class Pairing:
         self.origin: int | None = None
         self.counts: Counter[str] = Counter()
 
+    def retune(self, window: int, longest: int) -> None:
+        """Bridge as for this ``window`` from the next sample on."""
+        self._window, self._longest = window, longest
+
     @property
     def behind(self) -> int:
         """How many PVs wait for their OP."""

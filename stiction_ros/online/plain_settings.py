@@ -6,17 +6,24 @@ They stand apart so that these nodes load nothing of control and identification.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from stiction_ros.settings import setting
 
 PACES = ("lockstep", "realtime")
+SPEED = "simulated seconds per second of realtime pace"
+
+
+def speed_setting(description: str = SPEED) -> Any:
+    """Declare the speed, which has no effect in lockstep."""
+    return setting(1.0, description, low=1e-3, high=1e6, beside=("pace", "realtime"))
 
 
 @dataclasses.dataclass(frozen=True)
 class NodeSettings:
     """Start-up, the same for every node."""
 
-    autostart: bool = setting(True, "configure and activate without being told", fixed=True)
+    autostart: bool = setting(True, "configure and activate without being told", once=True)
     wait_for: tuple[str, ...] = setting(
         (),
         "nodes of this package that must be ready, and topics (/pv, topic:pv) that must be "
@@ -47,7 +54,7 @@ class PlantNodeSettings(NodeSettings):
         choices=PACES,
         fixed=True,
     )
-    speed: float = setting(1.0, "simulated seconds per second of realtime pace", low=1e-3, high=1e6)
+    speed: float = speed_setting()
     commander: str = setting(
         "controller",
         "the only node whose op is taken, as it names itself in frame_id; without a leading "
@@ -55,7 +62,11 @@ class PlantNodeSettings(NodeSettings):
         fixed=True,
     )
     op_timeout: float = setting(
-        120.0, "s to wait for op in lockstep before the run is given up", low=0.1, high=1e5
+        120.0,
+        "s to wait for op in lockstep before the run is given up",
+        low=0.1,
+        high=1e5,
+        beside=("pace", "lockstep"),
     )
     start_time: float = setting(
         1.0, "simulated time of the first sample, s", low=0.0, high=4e9, fixed=True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from stiction_ros.errors import InputError
 from stiction_ros.settings import setting
 
 
@@ -19,6 +20,15 @@ class FitSchedule:
     fit_first: int = setting(1000, "samples before the first fit", low=1)
     fit_every: int = setting(250, "samples between two fits", low=1)
     fit_latency: int = setting(5, "samples from the end of a window to its effect", low=1)
+
+    def check_latency(self) -> None:
+        """Raise InputError where the next window ends before a fit takes effect."""
+        if self.fit_every < self.fit_latency:
+            raise InputError(
+                f"{self.fit_every} is less than fit_latency = {self.fit_latency}",
+                where="fit_every",
+                fix="a fit must take effect before the next window ends",
+            )
 
     def due(self, sample: int) -> bool:
         """Return whether the window that ends at ``sample`` is fitted."""

@@ -17,12 +17,12 @@ from stiction_ros import Scenario, find_config, run_live
 
 PAGE = Path(__file__).parents[2] / "docs" / "connect.md"
 SAMPLES, FIRST, LAST = 700, 200, 690
-TUNING = ("move_worth", "measurement_noise", "state_noise", "disturbance_noise")
+TUNING = ("move_worth",)
 CASES = {
-    "`mode: unaware`, none of them": ("unaware", ()),
-    "embedding, none of them": ("embedding", ()),
-    "embedding, the noise alone": ("embedding", TUNING[1:]),
-    "embedding, all of them": ("embedding", TUNING),
+    "`mode: unaware`": ("unaware", ()),
+    "`mode: inversion`": ("inversion", ()),
+    "embedding, without `move_worth`": ("embedding", ()),
+    "embedding": ("embedding", TUNING),
 }
 
 

@@ -26,6 +26,7 @@ from stiction_ros.nodes.shared.messages import status, to_stamp
 from stiction_ros.nodes.shared.peers import Inlet, Outlet, Patience, Peers
 from stiction_ros.nodes.shared.typed import Log, log_of, quality
 from stiction_ros.online.health import LEVELS, Noticed
+from stiction_ros.settings import changed
 
 SIGNAL_QOS = quality(100, ReliabilityPolicy.RELIABLE)
 # What waits for a process that is busy for a moment; writers keep SIGNAL_QOS.
@@ -62,10 +63,11 @@ class ManagedNode(LifecycleNode):
         self.inlets: dict[str, Inlet] = {}
         self.noticed = Noticed(time.monotonic)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._ready = self._linked = self._tunable = False
+        self._ready = self._linked = self._configured = False
         self._link_timer: Timer | None = None
         parameters.declare(self, settings)
         self.settings: Any = settings()  # of the class that the subclass declares
+        self.add_on_set_parameters_callback(self._on_set)
 
     @property
     def log(self) -> Log:
@@ -144,8 +146,7 @@ class ManagedNode(LifecycleNode):
         self._looks, self._told_level = 0, "ok"
         self._beat = self.create_timer(LOOK_PERIOD, self._look_around)
         self.configure()
-        self.add_on_set_parameters_callback(self._on_set)
-        self._tunable = True
+        self._configured = True
 
     def _activate(self) -> None:
         self._ready = self._linked = False
@@ -163,9 +164,7 @@ class ManagedNode(LifecycleNode):
     def _tear_down(self) -> None:
         self._stop()
         self._linked = False
-        if self._tunable:
-            self.remove_on_set_parameters_callback(self._on_set)
-            self._tunable = False
+        self._configured = False
         self.destroy_timer(self._beat)
         for subscription in list(self.subscriptions):
             if subscription is not self._time_source._clock_sub:  # that of use_sim_time
@@ -287,13 +286,22 @@ class ManagedNode(LifecycleNode):
     def retune(self, settings: Any) -> None:
         """React to changed settings; InputError refuses them."""
 
-    def _on_set(self, changed: list[Any]) -> Any:
-        known = {p.name: p.value for p in changed if hasattr(self.settings, p.name)}
-        if not known:
-            return parameters.accepted()
+    def set_parameters_atomically(self, parameter_list: list[Any]) -> Any:
+        """Set parameters as ROS does, but say which one is unknown."""
         try:
-            settings = parameters.read(self, self.settings_class, known)
-            self.retune(settings)
+            for parameter in parameter_list:
+                parameters.check_known(self, parameter.name)
+        except InputError as error:
+            return parameters.refusal(error)
+        return super().set_parameters_atomically(parameter_list)
+
+    def _on_set(self, wanted: list[Any]) -> Any:
+        values = {p.name: p.value for p in wanted}
+        try:
+            name = self.get_fully_qualified_name()
+            settings = changed(self.settings, values, name, self._configured)
+            if self._configured and settings is not self.settings:
+                self.retune(settings)
         except InputError as error:
             return parameters.refusal(error)
         self.settings = settings

@@ -35,8 +35,8 @@ def declare(node: Node, cls: type[Any]) -> None:
         node.declare_parameter(entry.name, _default(entry), _descriptor(entry))
 
 
-def read(node: Node, cls: type[Any], changed: dict[str, Any] | None = None) -> Any:
-    """Build ``cls`` from the node's parameters, with ``changed`` values in their place.
+def read(node: Node, cls: type[Any]) -> Any:
+    """Build ``cls`` from the node's parameters.
 
     Raises:
         InputError: a value out of range, which an array's range cannot refuse by itself.
@@ -46,8 +46,6 @@ def read(node: Node, cls: type[Any], changed: dict[str, Any] | None = None) -> A
         value = node.get_parameter_or(entry.name).value
         if value is None:  # an empty list in a parameter file has no type
             value = entry.default
-        if changed is not None and entry.name in changed:
-            value = changed[entry.name]
         values[entry.name] = check(entry, value, node.get_name())
     return cls(**values)
 
@@ -58,11 +56,17 @@ def refuse_unknown(node: Node) -> None:
     rclpy itself passes over it without a word.
     """
     for name in node._parameter_overrides:  # there is no public way to these names
-        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
-            known = ", ".join(sorted(node.get_parameters_by_prefix("")))
-            raise InputError(
-                f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
-            )
+        if not name.startswith("qos_overrides."):
+            check_known(node, name)
+
+
+def check_known(node: Node, name: str) -> None:
+    """Raise InputError where ``node`` has no parameter ``name``."""
+    if not node.has_parameter(name):
+        known = ", ".join(sorted(node.get_parameters_by_prefix("")))
+        raise InputError(
+            f"unknown parameter {name!r}", where=node.get_name(), fix=f"known: {known}"
+        )
 
 
 def refusal(error: InputError) -> SetParametersResult:
@@ -93,7 +97,6 @@ def _descriptor(entry: Setting) -> ParameterDescriptor:
         name=entry.name,
         type=_TYPES[entry.kind].value,
         description=entry.description,
-        read_only=entry.fixed,
         additional_constraints=_constraint(entry),
     )
     bounded = math.isfinite(entry.low) or math.isfinite(entry.high)
@@ -115,8 +118,13 @@ def _descriptor(entry: Setting) -> ParameterDescriptor:
 
 
 def _constraint(entry: Setting) -> str:
+    said = []
     if entry.choices:
-        return "one of " + ", ".join(entry.choices)
+        said.append("one of " + ", ".join(entry.choices))
     if entry.kind == "floats" and (math.isfinite(entry.low) or math.isfinite(entry.high)):
-        return f"each in [{entry.low:g}, {entry.high:g}]"
-    return ""
+        said.append(f"each in [{entry.low:g}, {entry.high:g}]")
+    if entry.once or entry.fixed:
+        said.append(f"read when the {'process starts' if entry.once else 'node is configured'}")
+    if entry.beside[0]:
+        said.append(f"in force with {entry.beside[0]}: {entry.beside[1]}")
+    return "; ".join(said)

@@ -71,12 +71,7 @@ class LiveController:
         Raises:
             InputError: settings that do not fit the model.
         """
-        if settings.fit_every < settings.fit_latency:
-            raise InputError(
-                f"{settings.fit_every} is less than fit_latency = {settings.fit_latency}",
-                where="fit_every",
-                fix="a fit must take effect before the next window ends",
-            )
+        settings.check_latency()
         self.settings, self.model = settings, model
         self._design: ControlDesign = settings.design(model)
         self._build = functools.partial(controller_of, model.valve_names)
@@ -195,6 +190,7 @@ class LiveController:
         Raises:
             InputError: settings that do not fit; the old ones stay in force.
         """
+        settings.check_latency()
         design = settings.design(self.model)
         self._build(design, self._known, settings.mode, self._raised)  # may refuse
         waiting = self._offered

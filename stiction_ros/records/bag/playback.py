@@ -172,7 +172,7 @@ class Playback:
                 f"{options.start:g} s is not within the bag, which lasts {content.seconds:g} s",
                 where="start",
             )
-        self._path, self._wanted, self._clock, self._options = path, wanted, clock, options
+        self._path, self._wanted, self._clock = path, wanted, clock
         self._bag_time = self._since = 0
         self._begin = content.first + round(options.start * SECOND)
         self._latched = {
@@ -180,7 +180,7 @@ class Playback:
             for name, topic in content.topics.items()
             if offered_qos(topic).durability == "transient_local"
         }
-        self._rate = options.rate
+        self._rate, self._loop = options.rate, options.loop
         self.paused = True
         self.finished = False
         self.rounds = 0
@@ -249,7 +249,7 @@ class Playback:
         message, self._next = self._next, next(self._messages, None)
         self.played += 1
         if self._next is None:
-            if self._options.loop:
+            if self._loop:
                 self.rounds += 1
                 self._rewind()
             else:

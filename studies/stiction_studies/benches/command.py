@@ -45,6 +45,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "plant": ("truth", "survey"),
     "stability": ("seeds", "method", "data", "jobs"),
     "exports": ("seeds", "jobs"),
+    "own": ("seeds", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
@@ -57,8 +58,8 @@ def add(commands: Any) -> None:
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
         "loops that share nothing with it), how often identification is (field), whether its "
         "answers hold still (stability), whether what gain promises comes about (gain), what "
-        "the list of a survey is worth (plant), and whether exports are read as they were "
-        "written (exports).",
+        "the list of a survey is worth (plant), whether exports are read as they were written "
+        "(exports), and what each controller makes of plants that it was not tuned for (own).",
     )
     parser.add_argument(
         "name",
@@ -239,6 +240,12 @@ def _exports(options: argparse.Namespace, machine: str) -> int:
     return bench_exports.run(options, machine)
 
 
+def _own(options: argparse.Namespace, machine: str) -> int:
+    from stiction_studies.benches.accuracy import own_plant as bench_own_plant
+
+    return bench_own_plant.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -252,5 +259,6 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "plant": bench_plant.run,
     "stability": bench_stability.run,
     "exports": _exports,
+    "own": _own,
     "world": bench_world.run,
 }
