@@ -22,7 +22,6 @@ from stiction_studies.benches import against
 from stiction_studies.benches.accuracy import field as bench_field
 from stiction_studies.benches.accuracy import gap as bench_gap
 from stiction_studies.benches.accuracy import plant as bench_plant
-from stiction_studies.benches.accuracy import stability as bench_stability
 from stiction_studies.benches.accuracy import world as bench_world
 from stiction_studies.benches.speed.row import Row
 from stiction_studies.commands import choices
@@ -43,7 +42,6 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "field": ("seeds", "method", "jobs", "oracle"),
     "gain": ("seeds", "jobs"),
     "plant": ("truth", "survey"),
-    "stability": ("seeds", "method", "data", "jobs"),
     "exports": ("seeds", "jobs"),
     "own": ("seeds", "jobs"),
 }
@@ -56,10 +54,10 @@ def add(commands: Any) -> None:
         "bench",
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
-        "loops that share nothing with it), how often identification is (field), whether its "
-        "answers hold still (stability), whether what gain promises comes about (gain), what "
-        "the list of a survey is worth (plant), whether exports are read as they were written "
-        "(exports), and what each controller makes of plants that it was not tuned for (own).",
+        "loops that share nothing with it), how often identification is (field), whether "
+        "what gain promises comes about (gain), what the list of a survey is worth (plant), "
+        "whether exports are read as they were written (exports), and what each controller makes "
+        "of plants that it was not tuned for (own).",
     )
     parser.add_argument(
         "name",
@@ -89,7 +87,6 @@ def add(commands: Any) -> None:
     bench_gap.add_options(parser)
     bench_world.add_options(parser)
     bench_field.add_options(parser)
-    bench_stability.add_options(parser)
     bench_plant.add_options(parser)
     turns = parser.add_argument_group("another version, side by side")
     turns.add_argument(
@@ -257,7 +254,6 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
     "gain": _gain,
     "plant": bench_plant.run,
-    "stability": bench_stability.run,
     "exports": _exports,
     "own": _own,
     "world": bench_world.run,
