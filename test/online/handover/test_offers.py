@@ -19,6 +19,7 @@ PROCESS = LoopModel.load(find_config("example1_process.loop.yaml"))
 MOVES = SetPoints.load(find_config("siso.set_points.yaml"), ("PV1",))
 TUNING = {
     "horizon": 40,
+    "move_weights": (0.1,),
     "state_noise": 0.01,
     "disturbance_noise": (1e-4,),
     "measurement_noise": (1e-4,),
