@@ -33,6 +33,7 @@ COMMANDS = {
     "replay": "run estimator and controller over a bag as they ran live",
     "report": "make the report of a bag or a record",
     "repair": "finish a bag whose recorder was killed, or salvage a damaged one",
+    "valve-test": "test a valve in manual: the moves that would decide, and their verdict",
     "survey": "every loop of a plant, ranked by what to service first",
     "certificates": "certificates of the link to a control system (OPC UA)",
     "browse-tags": "make a tag map by browsing a control system (OPC UA)",

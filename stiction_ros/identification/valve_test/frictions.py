@@ -16,7 +16,7 @@ SMALLEST = 0.4
 """Smallest f_S of interest, %: a valve with less follows its signal as good positioners do."""
 LARGEST = 15.0
 """Largest f_S of all, %."""
-CELLS = (30, 16, 8)
+CELLS = (30, 16, 6)
 """Cells over log f_S, f_D / f_S and the start, before they are refined."""
 RAMP = 12  # parts of a step behind an actuator's lag
 LEVELS = 5
@@ -103,7 +103,7 @@ class Frictions:
         likely = np.zeros(len(best), dtype=bool)
         likely[np.argsort(best)[-REFINED:]] = True
         chosen = np.flatnonzero(likely[self.which] & self.moved)
-        chosen = chosen[np.argsort(shares[chosen])[-8 * REFINED :]]
+        chosen = chosen[np.argsort(shares[chosen])[-4 * REFINED :]]
         parts = []
         for signs in itertools.product((-0.25, 0.25), repeat=3):
             parts.append(self.middles[chosen] + np.array(signs) * self.widths[chosen])
@@ -117,6 +117,12 @@ class Frictions:
             np.concatenate([self.lags[keep], np.tile(self.lags[chosen], count)]),
             np.concatenate([self.logs[keep], np.tile(self.logs[chosen] - np.log(count), count)]),
         )
+
+    @functools.cached_property
+    def prior(self) -> FloatArray:
+        """Log of the prior of each set of moves, shape (U,)."""
+        sums = np.bincount(self.which, np.exp(self.logs), len(self.moves))
+        return np.asarray(np.log(sums))
 
     @property
     def static(self) -> FloatArray:

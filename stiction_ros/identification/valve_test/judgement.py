@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.errors import InputError
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.evidence.sensor_hold import held_rows
 from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.identification.valve_test.frictions import SMALLEST, Frictions
-from stiction_ros.identification.valve_test.likelihood import log_sum
-from stiction_ros.identification.valve_test.search import Explanation, Known, Trial
+from stiction_ros.identification.valve_test.likelihood import Shape, log_sum
+from stiction_ros.identification.valve_test.search import Explanation, Trial
 from stiction_ros.identification.valve_test.steps import Steps
 
 DECIDED = 0.95
@@ -53,6 +52,51 @@ class Judgement:
     sticky: Explanation
     frictions: Frictions
 
+    @property
+    def decided(self) -> bool:
+        """Whether there is a verdict."""
+        return self.verdict is not VerdictKind.UNDECIDED
+
+    @property
+    def gain(self) -> float:
+        """What 1 % of the stem makes of PV within a hold by the likelier explanation."""
+        best, row = self.ideal, 0
+        if self.probability > 0.5:
+            best = self.sticky
+            row = int(self.frictions.which[np.argmax(best.cells(self.frictions))])
+        shape = Shape.of(best.dynamics, self.trial.hold)
+        return float(best.gains[row]) * shape.shown(self.trial.hold)
+
+    @property
+    def sentence(self) -> str:
+        """What is said of the valve, in a sentence or two."""
+        sure = f"{100.0 * max(self.probability, 1.0 - self.probability):.1f} %"
+        low, high = self.f_s_interval
+        if self.verdict is VerdictKind.HEALTHY:
+            return (
+                f"Healthy, with probability {sure}: the stem follows OP, without friction of "
+                f"{SMALLEST:g} % or more."
+            )
+        reach = float(np.ptp(self.trial.steps.levels))
+        if not self.responded:
+            return (
+                f"Undecided: PV does not surely answer OP that went over {reach:.3g} %. The stem "
+                "is held by more friction than that, the gain is too small for the noise, or the "
+                "valve is bypassed or another one."
+            )
+        if self.verdict is VerdictKind.UNDECIDED:
+            return (
+                f"Undecided: friction is {100.0 * self.probability:.0f} % likely, f_S up to "
+                f"{high:.3g} %."
+            )
+        rests = (
+            f"with probability {sure}: the stem rests until OP leads it by f_S, "
+            f"{low:.3g} to {high:.3g} %"
+        )
+        if self.verdict is VerdictKind.BACKLASH:
+            return f"Backlash, {rests}, and then follows without a jump."
+        return f"Sticky, {rests}."
+
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``valve-test judge --json`` but for the next moves."""
         return {
@@ -67,31 +111,20 @@ class Judgement:
         }
 
 
-def judged(op: FloatArray, pv: FloatArray, known: Known | None = None) -> Judgement:
+def judged(op: FloatArray, pv: FloatArray) -> Judgement:
     """Return the verdict on a test.
 
     Args:
         op: that moves by steps, %, shape (N,).
         pv: engineering units, shape (N,).
-        known: before the test; None for nothing.
-
-    Raises:
-        InputError: OP does not move as by hand.
     """
-    steps = Steps.of(op)
-    if why := steps.refusal():
-        raise InputError(
-            f"is no test in manual: {why}",
-            where="OP",
-            fix="give a record of OP moved by hand, or let stiction identify judge the loop",
-        )
-    trial = Trial(pv, ~held_rows(pv), steps, known or Known.of())
+    trial = Trial(pv, ~held_rows(pv), Steps.of(op))
     ideal, still, sticky, frictions = trial.explained()
     share = 0.5 * (1.0 - NO_LINK)
     logs = np.array([ideal.evidence, sticky.evidence, still.evidence])
     logs += np.log([share, share, NO_LINK])
     ideal_share, friction, no_link = np.exp(logs - log_sum(logs)).tolist()
-    cells = np.exp(sticky.logs - sticky.evidence)
+    cells = sticky.cells(frictions)
     moved = 1.0 - no_link - friction * float(cells[~frictions.moved].sum())
     verdict = VerdictKind.UNDECIDED
     if ideal_share >= DECIDED:
@@ -99,8 +132,8 @@ def judged(op: FloatArray, pv: FloatArray, known: Known | None = None) -> Judgem
     elif friction >= DECIDED:
         even = float(cells[frictions.even].sum())
         verdict = VerdictKind.BACKLASH if even >= DECIDED else VerdictKind.STICKY
-    static = _spread(frictions.static, cells)
-    dynamic = _spread(np.maximum(frictions.dynamic, 0.0), cells)
+    static = _spread(frictions.static, cells, frictions.even)
+    dynamic = _spread(np.maximum(frictions.dynamic, 0.0), cells, frictions.even)
     low, high = bracket(trial.steps, frictions, cells)
     static = min(static[0], low), static[1], max(static[2], high)
     if verdict is VerdictKind.HEALTHY:
@@ -123,8 +156,25 @@ def judged(op: FloatArray, pv: FloatArray, known: Known | None = None) -> Judgem
     )
 
 
-def _spread(values: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Return low end, median and high end of what is possible."""
+def _spread(values: FloatArray, weights: FloatArray, even: BoolArray) -> tuple[float, float, float]:
+    """Return low end, median and high end of what is possible, with a jump or without.
+
+    Args:
+        values: of each cell, shape (G,).
+        weights: how likely each is, shape (G,).
+        even: whether it is without a jump, shape (G,).
+    """
+    shares = float(weights[even].sum()), float(weights[~even].sum())
+    parts = [
+        _quantiles(values[part], weights[part])
+        for part, share in zip((even, ~even), shares, strict=True)
+        if share > (1.0 - DECIDED) * sum(shares)
+    ]
+    middle = _quantiles(values, weights)[1]
+    return min(part[0] for part in parts), middle, max(part[2] for part in parts)
+
+
+def _quantiles(values: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
     order = np.argsort(values)
     sums = np.cumsum(weights[order]) / weights.sum()
     rows = np.minimum(np.searchsorted(sums, (INTERVAL[0], 0.5, INTERVAL[1])), len(order) - 1)

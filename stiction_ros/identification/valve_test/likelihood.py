@@ -81,6 +81,10 @@ class Shape:
             np.array([_share(dynamics.kept), math.exp(dynamics.noise)]),
         )
 
+    def shown(self, samples: float) -> float:
+        """Return how much of a step PV shows after some samples, but for the second lag."""
+        return -math.expm1(-max(samples - self.dead, 0.0) / self.first)
+
 
 def log_sum(logs: FloatArray) -> float:
     """Return log Σ exp of some numbers."""
@@ -139,14 +143,11 @@ class Answered:
             np.diff(lead**2),
         )
 
-    def likelihoods(
-        self, moves: FloatArray, gain: tuple[float, float] | None
-    ) -> tuple[FloatArray, FloatArray]:
+    def likelihoods(self, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the log likelihood of moves of the stem, and K, shape (U,) each.
 
         Args:
             moves: at each step of OP, %, shape (U, M).
-            gain: mean and standard deviation of what is known of K; None for nothing.
         """
         with_pv, own = moves @ self.beside, _forms(moves, self.gram)
         best = int(np.argmax(with_pv**2 / own))
@@ -157,17 +158,12 @@ class Answered:
         with_pv = moves @ (self.beside - self.gram @ (taken @ self.beside))
         own = _forms(moves, self.gram - self.gram @ taken @ self.gram)
         energy = self.energy - float(self.beside @ taken @ self.beside)
-        known, mean = own / self.count, 0.0
-        if gain is not None:
-            mean = gain[0]
-            known = np.full(len(own), variance / gain[1] ** 2)
-        gains = (with_pv + known * mean) / (own + known)
-        left = energy + known * mean**2 - gains * (with_pv + known * mean)
+        left = energy - with_pv**2 / own * (self.count / (self.count + 1.0))
         half = 0.5 * self.count
-        moved = -half * np.log(left) + 0.5 * np.log(known / (own + known))
-        moved += 0.5 * np.linalg.slogdet(inner)[1]
-        still = -half * math.log(self.energy)
-        return self.constant + np.where(np.any(moves != 0.0, axis=1), moved, still), gains
+        found = -half * np.log(left) - 0.5 * math.log1p(self.count)
+        found += 0.5 * np.linalg.slogdet(inner)[1]
+        found[~moves.any(axis=1)] = -half * math.log(self.energy)
+        return self.constant + found, with_pv / own
 
     def _spread(self, scale: float) -> FloatArray:
         """Return the covariance of δ K / σ, shape (M, M)."""
@@ -177,4 +173,4 @@ class Answered:
 
 def _forms(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     """Return x A x of each row x, above 0, shape (U,)."""
-    return np.asarray(np.maximum(((rows @ matrix) * rows).sum(axis=1), 1e-300))
+    return np.asarray(np.maximum(np.einsum("ij,ij->i", rows @ matrix, rows), 1e-300))

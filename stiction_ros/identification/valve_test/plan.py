@@ -5,27 +5,33 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from stiction_ros.identification.answer.experiment import CLEAR
+import numpy as np
+
 from stiction_ros.identification.valve_test.frictions import LARGEST, SMALLEST
+from stiction_ros.identification.valve_test.judgement import Judgement
 from stiction_ros.texts import spoken
 
+CLEAR = 4.0
+"""Standard deviations of PV's noise that the answer to the first pair makes, where it may."""
 WIDENS = 2.5
-"""Times by which a pair is wider than the one before: six pairs go from the smallest friction of
+"""Times by which a pair is wider than the one before: five go from the smallest friction of
 interest to the largest."""
-PAIRS = 2  # of a round
+PAIRS = 3  # of a round
 ROUNDS = 3
+STOPS = 0.99
+"""Probability at which a test that goes on ends, so that one of a hundred ends wrongly."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """What is known of a loop before its test.
+    """What is known of a loop before a round of its test.
 
     Attributes:
         valve: tag.
         op, pv: where the test begins, % and engineering units.
         gain: what 1 % of the stem makes of PV within a hold, engineering units, sign included; None
             where it is not known.
-        noise: standard deviation of PV about its mean over a hold, same units.
+        noise: standard deviation of the mean of PV over a hold, same units.
         hold: s between two moves.
         op_limit: how far OP may go from ``op``, %.
         pv_limit: lowest and highest PV, engineering units.
@@ -40,12 +46,14 @@ class Facts:
     op_limit: float
     pv_limit: tuple[float, float]
 
+    @property
     def widest(self) -> float:
-        """Return how far OP may go from its start without PV passing its limit, %."""
+        """How far OP may go from its start without PV passing its limit, %."""
+        most = min(self.op_limit, LARGEST)
         if not self.gain:
-            return self.op_limit
-        room = min(self.pv_limit[1] - self.pv, self.pv - self.pv_limit[0])
-        return min(self.op_limit, max(room, 0.0) / abs(self.gain))
+            return most
+        low, high = self.pv_limit
+        return min(most, max(min(high - self.pv, self.pv - low), 0.0) / abs(self.gain))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,64 +73,69 @@ class Plan:
         """Seconds from the first move until the last has been held."""
         return self.facts.hold * len(self.levels)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the mapping of ``valve-test plan --json``."""
-        facts = self.facts
-        reach = max(abs(level - facts.op) for level in self.levels)
-        moves = [{"after": i * facts.hold, "op": level} for i, level in enumerate(self.levels)]
-        return {
-            "valve": facts.valve,
-            "start": {"op": facts.op, "pv": facts.pv},
-            "moves": moves,
-            "duration": self.duration,
-            "pv_limit": list(facts.pv_limit),
-            "return_op": facts.op,
-            "expected": {
-                "pv_move": None if facts.gain is None else abs(facts.gain) * reach,
-                "decides_above": SMALLEST,
-            },
-            "sentence": self.sentence,
-        }
+    @property
+    def reach(self) -> float:
+        """How far OP goes from its start, %."""
+        return max(abs(level - self.facts.op) for level in self.levels)
+
+    @property
+    def pv_move(self) -> float | None:
+        """How far PV goes from its start with an ideal valve, engineering units."""
+        return None if self.facts.gain is None else abs(self.facts.gain) * self.reach
 
     @property
     def sentence(self) -> str:
         """What is done, in one sentence."""
-        low, high = self.facts.pv_limit
+        facts = self.facts
         levels = ", ".join(f"{level:.4g}" for level in self.levels)
         return (
-            f"In manual, move OP of {self.facts.valve} to {levels} %, each held for "
-            f"{spoken(self.facts.hold)}; return to {self.facts.op:.4g} % at once where PV leaves "
-            f"{low:.4g} to {high:.4g}."
+            f"In manual, move OP of {facts.valve} to {levels} %, each held for "
+            f"{spoken(facts.hold)}; return it to {facts.op:.4g} % at once where PV leaves "
+            "{:.4g} to {:.4g}.".format(*facts.pv_limit)
         )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the mapping of ``valve-test plan --json``."""
+        facts = self.facts
+        return {
+            "valve": facts.valve,
+            "start": {"op": facts.op, "pv": facts.pv},
+            "moves": [{"after": i * facts.hold, "op": op} for i, op in enumerate(self.levels)],
+            "duration": self.duration,
+            "pv_limit": list(facts.pv_limit),
+            "return_op": facts.op,
+            "expected": {"pv_move": self.pv_move, "decides_above": SMALLEST},
+            "sentence": self.sentence,
+        }
 
 
 def first_round(facts: Facts) -> Plan:
     """Return the first round: the smallest pairs whose answer PV's noise does not hide."""
-    least = SMALLEST
-    if facts.gain:
-        least = max(least, 0.5 * CLEAR * facts.noise / abs(facts.gain))
-    return _round(facts, least)
+    seen = 0.5 * CLEAR * facts.noise / abs(facts.gain) if facts.gain else 0.0
+    return _round(facts, max(SMALLEST, seen))
 
 
-def further_round(facts: Facts, reach: float, responded: bool) -> Plan | None:
-    """Return the next round.
+def further_round(facts: Facts, judgement: Judgement) -> Plan | None:
+    """Return the next round: about the widest pair, or wider where PV did not answer.
 
     Args:
         facts: of the loop.
-        reach: how far OP went from its start, %.
-        responded: whether PV answered; the last pair is then repeated.
+        judgement: of the rounds before.
 
     Returns:
-        None where the limits leave no other.
+        None where PV did not answer and the limits leave no wider one.
     """
-    wanted = reach if responded else WIDENS * reach
-    if not responded and reach >= 0.999 * min(facts.widest(), LARGEST):
+    levels = judgement.trial.steps.levels
+    reach = float(np.abs(levels - levels[0]).max())
+    if judgement.responded:
+        return _round(dataclasses.replace(facts, gain=judgement.gain), reach / WIDENS)
+    if reach >= 0.99 * facts.widest:
         return None
-    return _round(facts, wanted)
+    return _round(facts, WIDENS * reach)
 
 
 def _round(facts: Facts, least: float) -> Plan:
-    most = min(facts.widest(), LARGEST)
-    reaches = sorted({min(least * WIDENS**k, most) for k in range(PAIRS)})
+    """Return pairs of moves up and down, which leave a level where it was."""
+    reaches = sorted({min(least * WIDENS**k, facts.widest) for k in range(PAIRS)})
     levels = [facts.op + sign * reach for reach in reaches for sign in (1.0, -1.0)]
     return Plan(facts, (*levels, facts.op))

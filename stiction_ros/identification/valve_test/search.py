@@ -31,47 +31,10 @@ COLD, WARM = 0.7, 0.3
 """First steps of a search over the width of the prior: from its middle, and from a former end."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Known:
-    """What is known of process and noise before a test.
-
-    A test is held for about a dead time and one or two lags; the noise is known to a decade.
-
-    Attributes:
-        start, wide: middle and standard deviation of the prior.
-        gain: what 1 % of the stem makes of PV within a hold, engineering units, sign included; None
-            where it is not known.
-    """
-
-    start: Dynamics
-    wide: Dynamics
-    gain: float | None = None
-
-    @classmethod
-    def of(cls, gain: float | None = None, settles: bool | None = None) -> Known:
-        """Return it; ``settles`` tells whether PV does, as that of a level does not."""
-        lag, wide = {None: (-0.5, 1.7), True: (-0.7, 0.8), False: (3.0, 1.0)}[settles]
-        return cls(
-            Dynamics(lag, -1.0, -1.5, load=-5.0, kept=0.0, noise=-2.0),
-            Dynamics(wide, 1.5, 1.0, load=2.0, kept=1.5, noise=2.0),
-            gain,
-        )
-
-    def log_prior(self, dynamics: Dynamics) -> float:
-        """Return the logarithm of the prior, but for a constant."""
-        told = zip(dynamics, self.start, self.wide, strict=True)
-        return -0.5 * sum(((v - s) / w) ** 2 for v, s, w in told)
-
-    def gain_of(self, shape: Shape, hold: float) -> tuple[float, float] | None:
-        """Return mean and standard deviation of K."""
-        if not self.gain:
-            return None
-        within = max(-np.expm1(-hold / shape.first), 1e-12)
-        return self.gain / within, SPREAD * abs(self.gain) / within
-
-
-SPREAD = 0.7
-"""Of a gain identified in a loop whose valve may stick, as a share of it."""
+START = Dynamics(lag=-0.5, second=-1.0, dead=-1.5, load=-5.0, kept=0.0, noise=-2.0)
+WIDE = Dynamics(lag=1.7, second=1.5, dead=1.0, load=2.0, kept=1.5, noise=2.0)
+"""Middle and standard deviation of the prior of process and noise, weak as they are known to a
+decade or so: a hold lasts for a dead time and one or two lags, a load moves less than noise."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,14 +44,18 @@ class Explanation:
     Attributes:
         evidence: log of how likely the record is.
         dynamics: process and noise.
-        logs: log of how likely it is with each cell of frictions, prior included, shape (G,).
+        values: log of how likely it is with each set of moves of the stem, shape (U,).
         gains: K of each.
     """
 
     evidence: float
     dynamics: Dynamics
-    logs: FloatArray
+    values: FloatArray
     gains: FloatArray
+
+    def cells(self, frictions: Frictions) -> FloatArray:
+        """Return how likely each cell is, shape (G,)."""
+        return np.asarray(np.exp(self.values[frictions.which] + frictions.logs - self.evidence))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,13 +66,11 @@ class Trial:
         pv: shape (N,).
         seen: samples that were measured, shape (N,).
         steps: of OP.
-        known: before it.
     """
 
     pv: FloatArray
     seen: BoolArray
     steps: Steps
-    known: Known
 
     @functools.cached_property
     def hold(self) -> float:
@@ -121,12 +86,13 @@ class Trial:
         """
         shape = Shape.of(dynamics, self.hold)
         answered = Answered.of(self.pv, self.seen, self.steps, shape)
-        prior = self.known.log_prior(dynamics)
+        told = zip(dynamics, START, WIDE, strict=True)
+        prior = -0.5 * sum(((value - middle) / wide) ** 2 for value, middle, wide in told)
         moves = asked.moves if isinstance(asked, Frictions) else asked
-        values, gains = answered.likelihoods(moves, self.known.gain_of(shape, self.hold))
-        if isinstance(asked, Frictions):
-            values, gains = values[asked.which] + asked.logs, gains[asked.which]
-        return Explanation(log_sum(prior + values), dynamics, prior + values, gains)
+        values, gains = answered.likelihoods(moves)
+        values += prior
+        logs = values + asked.prior if isinstance(asked, Frictions) else values
+        return Explanation(log_sum(logs), dynamics, values, gains)
 
     def explained(self) -> tuple[Explanation, Explanation, Explanation, Frictions]:
         """Return how an ideal valve, a PV that OP does not move, and friction explain the record.
@@ -134,17 +100,16 @@ class Trial:
         Each search also begins where another ended, as each may miss the best process.
         """
         moves, still = np.diff(self.steps.levels)[None], np.zeros((1, len(self.steps.rows)))
-        cold = self.known.start
         frictions = Frictions.all(self.steps)
-        ideal = self._best((cold,), moves)
-        sticky = self._best((cold, ideal.dynamics), frictions)
+        ideal = self._best((START,), moves)
+        sticky = self._best((START, ideal.dynamics), frictions)
         for _ in range(2):
             for _ in range(LEVELS):
-                frictions = frictions.refined(self.steps, sticky.logs)
+                frictions = frictions.refined(self.steps, sticky.cells(frictions))
                 sticky = self.at(sticky.dynamics, frictions)
             sticky = self._best((sticky.dynamics,), frictions)
         ideal = max(ideal, self._best((sticky.dynamics,), moves), key=lambda one: one.evidence)
-        return ideal, self._best((cold,), still), self._averaged(sticky, frictions), frictions
+        return ideal, self._best((START,), still), self._averaged(sticky, frictions), frictions
 
     def _averaged(self, best: Explanation, asked: Frictions) -> Explanation:
         """Return the best explanation, each friction averaged over process and noise.
@@ -153,7 +118,7 @@ class Trial:
         The evidence stays that of the best, as that of what it is compared with.
         """
         middle, most = np.array(best.dynamics), best.evidence
-        wide = np.array(self.known.wide)
+        wide = np.array(WIDE)
         spread = wide.copy()
         for i, step in enumerate(np.diag(CURVED * wide)):
             sides = (self.at(Dynamics(*(middle + way * step)), asked) for way in (-1.0, 1.0))
@@ -161,11 +126,12 @@ class Trial:
             spread[i] = min(wide[i], CURVED * wide[i] / math.sqrt(max(2.0 * fall, 1e-3)))
         points = ndtri(halton_sequence(len(middle), seed=0).random(DRAWS))
         weights = 0.5 * (points**2).sum(axis=1)
-        logs = np.full(len(best.logs), -np.inf)
+        total = np.full(len(best.values), -np.inf)
         for point, weight in zip(points, weights, strict=True):
             one = self.at(Dynamics(*(middle + spread * point)), asked)
-            logs = np.logaddexp(logs, one.logs + weight)
-        return dataclasses.replace(best, logs=logs + (best.evidence - log_sum(logs)))
+            total = np.logaddexp(total, one.values + weight)
+        total += best.evidence - log_sum(total + asked.prior)
+        return dataclasses.replace(best, values=total)
 
     def _best(self, begins: Sequence[Dynamics], asked: Frictions | FloatArray) -> Explanation:
         from scipy.optimize import minimize
@@ -180,9 +146,9 @@ class Trial:
             return -found.evidence
 
         for begin in begins:
-            cold = begin is self.known.start
+            cold = begin is START
             first = np.array(begin)
-            wide = (COLD if cold else WARM) * np.diag(self.known.wide)
+            wide = (COLD if cold else WARM) * np.diag(WIDE)
             options = {
                 "maxfev": EVALUATIONS if cold else EVALUATIONS // 2,
                 "initial_simplex": np.vstack([first, first + wide]),

@@ -45,6 +45,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "plant": ("truth", "survey"),
     "stability": ("seeds", "method", "data", "jobs"),
     "exports": ("seeds", "jobs"),
+    "valve-test": ("seeds", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
@@ -57,9 +58,9 @@ def add(commands: Any) -> None:
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
         "loops that share nothing with it), how often identification is (field), whether its "
-        "answers hold still (stability), whether what gain promises comes about (gain), what "
-        "the list of a survey is worth (plant), and whether exports are read as they were "
-        "written (exports).",
+        "answers hold still (stability), whether what gain promises comes about (gain), how "
+        "tests in manual end (valve-test), what the list of a survey is worth (plant), and "
+        "whether exports are read as they were written (exports).",
     )
     parser.add_argument(
         "name",
@@ -240,6 +241,12 @@ def _exports(options: argparse.Namespace, machine: str) -> int:
     return bench_exports.run(options, machine)
 
 
+def _valve_test(options: argparse.Namespace, machine: str) -> int:
+    from stiction_studies.benches.accuracy import valve_test as bench_valve_test
+
+    return bench_valve_test.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -253,5 +260,6 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "plant": bench_plant.run,
     "stability": bench_stability.run,
     "exports": _exports,
+    "valve-test": _valve_test,
     "world": bench_world.run,
 }

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from manual_tests import answer, path
 
-from stiction_ros.errors import InputError
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
-from stiction_ros.identification.valve_test.search import Known
 
 OP = path()
 
@@ -41,7 +39,7 @@ def test_an_ideal_valve_is_healthy() -> None:
 
 def test_a_level_is_judged_as_such() -> None:
     pv = answer(OP, (2.0, 0.8), seed=3, integrates=True)
-    found = judged(OP, pv, Known.of(1.0, settles=False))
+    found = judged(OP, pv)
     assert found.verdict.value == "sticky"
     assert found.f_s_interval[0] <= 2.0 <= found.f_s_interval[1]
 
@@ -50,9 +48,3 @@ def test_pv_that_op_does_not_move_decides_nothing() -> None:
     found = judged(OP, answer(OP, None, seed=4, gain=0.0))
     assert found.verdict.value == "undecided"
     assert not found.responded
-
-
-def test_a_loop_in_automatic_is_refused() -> None:
-    op = np.random.default_rng(5).standard_normal(200).cumsum()
-    with pytest.raises(InputError, match="no test in manual"):
-        judged(op, op)

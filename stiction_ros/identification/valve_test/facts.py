@@ -1,0 +1,130 @@
+"""What a record of a loop, or of a test, tells for the next round of the test."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.valve_test.frictions import SMALLEST
+from stiction_ros.identification.valve_test.judgement import Judgement, judged
+from stiction_ros.identification.valve_test.plan import CLEAR, WIDENS, Facts
+from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Record
+
+LAGS = 1.8
+"""Lags of a hold: PV then shows five sixths of its answer, the model tells the rest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Limits:
+    """How far a test may go from where it begins; None where that is not said.
+
+    Attributes:
+        op: %.
+        pv: engineering units.
+    """
+
+    op: float | None = None
+    pv: float | None = None
+
+    def of(self, facts: Facts) -> Facts:
+        """Return facts with these limits in place of theirs."""
+        op = facts.op_limit if self.op is None else self.op
+        reach = facts.pv_limit
+        if self.pv is not None:
+            reach = facts.pv - self.pv, facts.pv + self.pv
+        return dataclasses.replace(facts, op_limit=op, pv_limit=reach)
+
+
+def facts_before(record: Record, found: Identification, limits: Limits) -> Facts:
+    """Return what a routine record of a loop tells.
+
+    OP may go by twice the largest f_S that the record does not reject, PV as far as that moves it.
+
+    Args:
+        record: of one valve and one output.
+        found: what identification made of it.
+        limits: of the test.
+
+    Raises:
+        InputError: several valves or outputs.
+    """
+    _of_one_loop(record)
+    valve, step = found.valves[0], record.sample_time
+    answer = StepAnswer.of(found.outputs[0], valve.name, len(record), step)
+    least = (SHORTEST + 1) * step
+    gain: float | None = None
+    if answer.lag is not None:
+        hold = max(answer.dead_time + LAGS * answer.lag, least)
+    else:
+        slope = answer.after(0.25 * len(record) * step) / (0.25 * len(record) * step)
+        needed = 0.5 * CLEAR * answer.noise / max(SMALLEST * slope, 1e-300)
+        hold = min(answer.dead_time + max(needed, least), 0.25 * len(record) * step)
+    hold = step * math.ceil(hold / step - 1e-9)
+    if np.isfinite(answer.values).all() and answer.clearness > 0.0:
+        row = min(round(hold / step), len(answer.values) - 1)
+        gain = float(answer.values[row]) or None
+    reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
+    pv = float(record.pv[-round(hold / step) :, 0].mean())
+    room = max(float(np.abs(record.pv[:, 0] - pv).max()), reach * abs(gain or 0.0))
+    noise = answer.noise / math.sqrt(hold / step)
+    op = float(record.op[-1, 0])
+    facts = Facts(valve.name, op, pv, gain, noise, hold, reach, (pv - room, pv + room))
+    return limits.of(facts)
+
+
+def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts:
+    """Return what a test tells where nothing was known before it.
+
+    OP and PV may go by :data:`WIDENS` squared times as far as they went.
+    """
+    trial = judgement.trial
+    levels, pv = trial.steps.levels, float(trial.pv[: int(trial.steps.rows[0])].mean())
+    room = WIDENS**2 * float(np.abs(trial.pv - pv).max())
+    facts = Facts(
+        valve=record.valves[0],
+        op=float(levels[0]),
+        pv=pv,
+        gain=None,
+        noise=0.0,
+        hold=trial.hold * record.sample_time,
+        op_limit=WIDENS**2 * float(np.abs(levels - levels[0]).max()),
+        pv_limit=(pv - room, pv + room),
+    )
+    return limits.of(facts)
+
+
+def judged_record(record: Record) -> Judgement:
+    """Return the verdict on a record of a test: of what is marked as manual, if anything is.
+
+    Raises:
+        InputError: several valves or outputs, or OP does not move as by hand.
+    """
+    _of_one_loop(record)
+    wanted = (Quality.GOOD, Quality.HELD)
+    if (record.quality == Quality.MANUAL).any():
+        wanted = (Quality.MANUAL, Quality.HELD)
+    rows = max(record.usable_rows(wanted), key=lambda each: each[1] - each[0], default=(0, 0))
+    part = record.part(*rows)
+    if why := Steps.of(part.op[:, 0]).refusal():
+        raise InputError(
+            f"is no test in manual: {why}",
+            where=record.name,
+            fix="record OP moved by hand, or judge the loop by stiction identify",
+        )
+    return judged(part.op[:, 0], part.pv[:, 0])
+
+
+def _of_one_loop(record: Record) -> None:
+    if len(record.valves) != 1 or len(record.outputs) != 1:
+        raise InputError(
+            f"has {len(record.valves)} valves and {len(record.outputs)} outputs",
+            where=record.name,
+            fix="name the one valve and the one output of the test by --op and --pv",
+        )
