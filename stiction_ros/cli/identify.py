@@ -188,6 +188,8 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
     for j, valve in enumerate(found.valves):
         said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
         console.print(f"{valve.name}: {' '.join(filter(None, said))}")
+    if any(valve.verdict == "undecided" for valve in found.valves):
+        console.print("stiction valve-test plan RECORD prints a test in manual that would decide.")
     for note in found.notes:
         console.print(f"note: {note}")
 

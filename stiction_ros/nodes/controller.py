@@ -20,8 +20,8 @@ from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, t
 from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.topics.controller_inputs import ControllerInputs
-from stiction_ros.online.controller.live import LiveController
 from stiction_ros.online.controller.rehearsal import rehearse
+from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.handover.background import AtOnce, Beside
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
@@ -29,11 +29,13 @@ from stiction_ros.online.input.samples import PortRules, Sample
 from stiction_ros.online.node_settings import ControllerNodeSettings
 
 QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
+LEARNS = ("auto", "valve_test")
+"""Modes in which the controller waits for the fits of the estimator."""
 GRAPH_PERIOD = 1.0  # s between two looks at who commands
 
 
 class ControllerNode(ControllerInputs):
-    """Thin shell around :class:`stiction_ros.online.controller.live.LiveController`."""
+    """Thin shell around :class:`stiction_ros.online.controller.testing.ValveTestingController`."""
 
     settings: ControllerNodeSettings
 
@@ -52,7 +54,7 @@ class ControllerNode(ControllerInputs):
         self.model = LoopModel.load(find_config(settings.model))
         lockstep = settings.pace == "lockstep"
         self.background = AtOnce() if lockstep else Beside()
-        self.live = LiveController(settings, self.model, self.background)
+        self.live = ValveTestingController(settings, self.model, self.background)
         if not lockstep:
             rehearse(settings, self.model)
         self._plan_names = (*self.model.outputs, *self.model.valve_names)
@@ -246,7 +248,7 @@ class ControllerNode(ControllerInputs):
 
     def _fit_is_there(self) -> bool:
         """Return whether the fit that takes effect at the present sample has come."""
-        if self.settings.pace != "lockstep" or self.settings.mode != "auto":
+        if self.settings.pace != "lockstep" or self.settings.mode not in LEARNS:
             return True
         end = self.settings.awaited(self.port.next)
         if end is None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.evidence.sensor_hold import held_rows
 from stiction_ros.identification.result.identification import Identification
 from stiction_ros.identification.valve_test.frictions import SMALLEST
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
@@ -58,25 +59,40 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     _of_one_loop(record)
     valve, step = found.valves[0], record.sample_time
     answer = StepAnswer.of(found.outputs[0], valve.name, len(record), step)
-    least = (SHORTEST + 1) * step
-    gain: float | None = None
-    if answer.lag is not None:
-        hold = max(answer.dead_time + LAGS * answer.lag, least)
-    else:
-        slope = answer.after(0.25 * len(record) * step) / (0.25 * len(record) * step)
-        needed = 0.5 * CLEAR * answer.noise / max(SMALLEST * slope, 1e-300)
-        hold = min(answer.dead_time + max(needed, least), 0.25 * len(record) * step)
-    hold = step * math.ceil(hold / step - 1e-9)
-    if np.isfinite(answer.values).all() and answer.clearness > 0.0:
-        row = min(round(hold / step), len(answer.values) - 1)
-        gain = float(answer.values[row]) or None
+    facts = facts_of_answer(answer, valve.name, float(record.op[-1, 0]), 0.0)
+    pv = float(record.pv[-round(facts.hold / step) :, 0].mean())
     reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
-    pv = float(record.pv[-round(hold / step) :, 0].mean())
-    room = max(float(np.abs(record.pv[:, 0] - pv).max()), reach * abs(gain or 0.0))
-    noise = answer.noise / math.sqrt(hold / step)
-    op = float(record.op[-1, 0])
-    facts = Facts(valve.name, op, pv, gain, noise, hold, reach, (pv - room, pv + room))
+    room = max(float(np.abs(record.pv[:, 0] - pv).max()), reach * abs(facts.gain or 0.0))
+    facts = dataclasses.replace(facts, pv=pv, op_limit=reach, pv_limit=(pv - room, pv + room))
     return limits.of(facts)
+
+
+def facts_of_answer(answer: StepAnswer, valve: str, op: float, pv: float) -> Facts:
+    """Return what the answer to a step tells, without limits.
+
+    A move is held for the dead time and :data:`LAGS` lags; where PV does not settle until the
+    smallest pair of moves shows, but for no longer than half of the answer that is known.
+
+    Args:
+        answer: of PV to 1 % of stem.
+        valve: tag.
+        op, pv: where the test begins, % and engineering units.
+    """
+    step, known = answer.sample_time, len(answer.values)
+    least, longest = SHORTEST + 1, max(known // 2, SHORTEST + 1)
+    if answer.lag is not None:
+        samples = (answer.dead_time + LAGS * answer.lag) / step
+    else:
+        slope = abs(float(answer.values[-1])) / known
+        samples = 0.5 * CLEAR * answer.noise / max(SMALLEST * slope, 1e-300)
+        samples = min(answer.dead_time / step + max(samples, least), longest)
+    count = max(math.ceil(samples - 1e-9), least)
+    gain: float | None = None
+    if np.isfinite(answer.values).all() and np.abs(answer.values).max() > 0.0:
+        gain = float(answer.values[min(count, known - 1)]) or None
+    noise = answer.noise / math.sqrt(count)
+    everywhere = (-math.inf, math.inf)
+    return Facts(valve, op, pv, gain, noise, count * step, math.inf, everywhere)
 
 
 def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts:
@@ -112,11 +128,19 @@ def judged_record(record: Record) -> Judgement:
         wanted = (Quality.MANUAL, Quality.HELD)
     rows = max(record.usable_rows(wanted), key=lambda each: each[1] - each[0], default=(0, 0))
     part = record.part(*rows)
-    if why := Steps.of(part.op[:, 0]).refusal():
+    steps = Steps.of(part.op[:, 0])
+    if why := steps.refusal():
         raise InputError(
             f"is no test in manual: {why}",
             where=record.name,
             fix="record OP moved by hand, or judge the loop by stiction identify",
+        )
+    measured = len(part) - int(held_rows(part.pv[:, 0]).sum())
+    if measured <= SHORTEST + len(steps.rows):
+        raise InputError(
+            f"PV shows {measured} values that are measured, too few for its moves of OP",
+            where=record.name,
+            fix="record PV at a shorter sample time, or hold each move for longer",
         )
     return judged(part.op[:, 0], part.pv[:, 0])
 

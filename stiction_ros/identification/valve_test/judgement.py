@@ -77,14 +77,14 @@ class Judgement:
                 f"Healthy, with probability {sure}: the stem follows OP, without friction of "
                 f"{SMALLEST:g} % or more."
             )
-        reach = float(np.ptp(self.trial.steps.levels))
-        if not self.responded:
-            return (
-                f"Undecided: PV does not surely answer OP that went over {reach:.3g} %. The stem "
-                "is held by more friction than that, the gain is too small for the noise, or the "
-                "valve is bypassed or another one."
-            )
-        if self.verdict is VerdictKind.UNDECIDED:
+        if not self.decided:
+            reach = float(np.ptp(self.trial.steps.levels))
+            if not self.responded:
+                return (
+                    f"Undecided: PV does not surely answer OP, which went over {reach:.3g} %. More "
+                    "friction than that holds the stem, noise hides the answer, or PV is not that "
+                    "of this valve."
+                )
             return (
                 f"Undecided: friction is {100.0 * self.probability:.0f} % likely, f_S up to "
                 f"{high:.3g} %."

@@ -26,6 +26,7 @@ from stiction_ros.identification.valve_test.steps import Steps
 
 OWN_ERROR = 0.05
 """Standard deviation of what a law leaves out of a move, %: an eighth of the smallest friction."""
+ROUNDING = 1e-14  # share of PV's energy that computing leaves where nothing else does
 CURVATURE = math.log(50.0) / 200.0
 """Half the relative change of the gain per % of travel of an equal percentage valve of rangeability
 50, the largest that is usual (IEC 60534-2-4)."""
@@ -104,8 +105,9 @@ class Answered:
         gram: of the answers, shape (M, M).
         beside: of the answers with PV, shape (M,).
         energy: of PV.
-        count: samples that count.
+        count: samples that count, less those that the two levels take up.
         constant: what is added to every log likelihood.
+        bend: change of the square of OP, from where it began, at each step, %², shape (M,).
     """
 
     gram: FloatArray
@@ -159,6 +161,7 @@ class Answered:
         own = _forms(moves, self.gram - self.gram @ taken @ self.gram)
         energy = self.energy - float(self.beside @ taken @ self.beside)
         left = energy - with_pv**2 / own * (self.count / (self.count + 1.0))
+        left = np.maximum(left, ROUNDING * self.energy)
         half = 0.5 * self.count
         found = -half * np.log(left) - 0.5 * math.log1p(self.count)
         found += 0.5 * np.linalg.slogdet(inner)[1]

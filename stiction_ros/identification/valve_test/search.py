@@ -29,8 +29,6 @@ CURVED = 0.1
 """Share of the width of the prior by which the evidence is differenced."""
 COLD, WARM = 0.7, 0.3
 """First steps of a search over the width of the prior: from its middle, and from a former end."""
-
-
 START = Dynamics(lag=-0.5, second=-1.0, dead=-1.5, load=-5.0, kept=0.0, noise=-2.0)
 WIDE = Dynamics(lag=1.7, second=1.5, dead=1.0, load=2.0, kept=1.5, noise=2.0)
 """Middle and standard deviation of the prior of process and noise, weak as they are known to a
