@@ -1,4 +1,4 @@
-# make setup   install everything into .venv (needs Python 3.11 or newer, no root)
+# make setup   install everything into .venv (needs Python 3.11 or newer, no root) and compile it
 # make demo    the live demonstration; options in ARGS, such as ARGS="siso --out out/siso"
 # make test    linters, types and tests; pytest's options in ARGS
 # make lint    linters, types and import contracts alone
@@ -9,7 +9,7 @@
 # python3 are tried.
 
 .SUFFIXES:
-.PHONY: setup demo test lint docs clean
+.PHONY: setup demo test lint compiled docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -21,6 +21,8 @@ SOURCES := setup.py setup.cfg pyproject.toml package.xml stiction_ros/__init__.p
     $(wildcard resource/* launchers/* launch/* config/*)
 
 setup: $(DONE)
+	@$(MAKE) --no-print-directory compiled
+	@echo "setup: done, the command is $(BIN)/stiction"
 
 # A first or broken-off installation starts from an empty environment; after that only what
 # has changed is installed. The package and its studies are installed editable, so that the
@@ -40,7 +42,11 @@ $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 	{ echo "setup: installation failed; see the lines above, then run make setup again" >&2; \
 	  exit 1; }
 	@touch $@
-	@echo "setup: done, the command is $(BIN)/stiction"
+
+# The first identification would compile for half a minute; machine code is kept beside the modules.
+compiled: $(DONE)
+	@echo "setup: machine code, half a minute at the first time"
+	@$(BIN)/python -c "from stiction_ros.identification.warm_up import compile_loops; compile_loops()"
 
 .PHONY: missing
 missing:
@@ -65,7 +71,7 @@ endef
 demo: setup
 	$(BIN)/stiction demo $(ARGS)
 
-lint: setup
+lint: $(DONE)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -76,16 +82,12 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # Machine code is made beside the linters, which leave a core for that: all workers would make the
 # same at once. Three of them keep two cores busy, as tests of the nodes wait for each other.
-test: setup
+test: $(DONE)
 	$(MAKE) -j2 lint compiled
 	$(BIN)/python -m pytest -n 3 --dist loadfile -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? -eq 5  # 5: ARGS picks none of them
 
-.PHONY: compiled
-compiled: setup
-	$(BIN)/python -c "from stiction_ros.identification.warm_up import compile_loops; compile_loops()"
-
-docs: setup
+docs: $(DONE)
 	$(BIN)/mkdocs build --strict --clean
 	@echo "docs: out/site/index.html"
 

@@ -6,12 +6,17 @@ they take; all of them are checked here, so that the same mistake is told by the
 
 from __future__ import annotations
 
+import difflib
 import math
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 from stiction_ros.errors import InputError, is_finite
 
+T = TypeVar("T")
+
 LONGEST = 40  # characters of a value that an error repeats
+LISTED = 20  # choices that an error lists
 
 
 def number(
@@ -48,6 +53,39 @@ def number(
         fix = f"use {_range(low, high, above)} {unit}".rstrip()
         raise InputError(f"{value:g} is out of range", where=where, fix=fix)
     return value if whole else float(value)
+
+
+def one_of(value: object, choices: Iterable[T], where: str, what: str = "value") -> T:
+    """Return the choice that ``value`` is: a member of an enumeration also for its text.
+
+    Args:
+        value: of any type.
+        choices: all that are allowed.
+        where: argument or key, for the error.
+        what: it should be.
+
+    Raises:
+        InputError: it is none of them; the closest one is named.
+    """
+    known = list(choices)
+    for choice in known:
+        if isinstance(value, type(choice) | str) and value == choice:
+            return choice
+    words = [str(choice) for choice in known]
+    folded = {word.casefold(): word for word in words}
+    near = difflib.get_close_matches(str(value).casefold(), folded, n=1)
+    asked = f"; did you mean {folded[near[0]]}?" if near else ""
+    more = [f"and {len(words) - LISTED} more"] if len(words) > LISTED else []
+    fix = f"use {' | '.join([*words[:LISTED], *more])}{asked}"
+    raise InputError(f"unknown {what} {shown(value)}", where=where, fix=fix)
+
+
+def of_kind(value: object, kind: type[T], where: str, fix: str = "") -> T:
+    """Return ``value``; raise an InputError where it is not of a ``kind``, named by ``where``."""
+    if not isinstance(value, kind):
+        given, wanted = type(value).__name__, kind.__name__
+        raise InputError(f"{given} is no {wanted}", where=where, fix=fix or f"give {wanted}(…)")
+    return value
 
 
 def shown(value: Any) -> str:

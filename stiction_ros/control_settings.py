@@ -26,7 +26,7 @@ from stiction_ros.paper.controllers.weights import (
     plain_weights,
     unaware_weights,
 )
-from stiction_ros.settings import setting
+from stiction_ros.settings import check_choices, setting
 
 
 class Formulations(enum.StrEnum):
@@ -175,6 +175,9 @@ class ControlSettings:
         choices=tuple(kind.value for kind in ProgrammeCost),
     )
     first_move: float = setting(2.1, "a of (21), in multiples of f_S", low=1.0, high=10.0)
+
+    def __post_init__(self) -> None:
+        check_choices(self)
 
     def design(self, model: LoopModel) -> ControlDesign:
         """Return the controller design for ``model``.

@@ -12,7 +12,7 @@ import typing
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from stiction_ros.checks import number
+from stiction_ros.checks import number, one_of
 from stiction_ros.errors import InputError
 
 T = TypeVar("T")
@@ -76,6 +76,13 @@ def settings_of(cls: type[Any]) -> tuple[Setting, ...]:
     )
 
 
+def check_choices(values: Any) -> None:
+    """Raise an InputError where a text of settings made in Python is none of its choices."""
+    for entry in settings_of(type(values)):
+        if entry.choices:
+            one_of(getattr(values, entry.name), entry.choices, entry.name)
+
+
 def from_mapping(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     """Build ``cls`` from a mapping; absent keys take their defaults.
 
@@ -107,11 +114,7 @@ def _check_one(entry: Setting, value: Any, place: str) -> Any:
     if entry.kind in ("str", "strings"):
         if not isinstance(value, str):
             raise InputError(f"{value!r} is no text", where=place)
-        if entry.choices and value not in entry.choices:
-            raise InputError(
-                f"unknown value {value!r}", where=place, fix=f"use {' | '.join(entry.choices)}"
-            )
-        return value
+        return one_of(value, entry.choices, place) if entry.choices else value
     if entry.kind == "bool":
         if not isinstance(value, bool):
             raise InputError(f"{value!r} is neither true nor false", where=place)

@@ -31,6 +31,11 @@ def plural(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
+def symbol(key: str) -> str:
+    """Return the key of a parameter as it is read: ``f_S`` of ``f_s``, blanks in place of ``_``."""
+    return {"f_s": "f_S", "f_d": "f_D"}.get(key, key.replace("_", " "))
+
+
 def spoken(seconds: float) -> str:
     """Return a time of three digits in the unit that suits it: ``45.5 s``, ``4.78 h``, ``12.3 d``.
 

@@ -1,16 +1,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from stiction_ros import HeStiction
-from stiction_ros.checks import LONGEST, number, shown
-from stiction_ros.control_settings import ControlSettings
+from stiction_ros import (
+    ControlSettings,
+    CsvColumns,
+    HeStiction,
+    IdentificationOptions,
+    LinearOptions,
+    LoopModel,
+    MpcController,
+    find_config,
+    find_gap,
+    simulate,
+)
+from stiction_ros.checks import LONGEST, number, one_of, shown
+from stiction_ros.control.result import ControlMode
 from stiction_ros.errors import InputError
+from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.linear.data import LinearKind
 from stiction_ros.loop.yaml_reading import Section
 from stiction_ros.settings import from_mapping
+
+MODEL = LoopModel.load(find_config("example1_process.loop.yaml"))
+DESIGN = ControlSettings(horizon=30).design(MODEL)
 
 WRONG: dict[str, tuple[Any, dict[str, Any], str]] = {
     "text": ("1e-3", {}, "place: '1e-3' is no number; write 0.001"),
@@ -55,3 +72,48 @@ def test_settings_files_and_behaviours_say_the_same_of_the_same_mistake() -> Non
             make()
         said.append(error.value.what)
     assert set(said) == {"-1 is out of range"}
+
+
+def test_a_choice_is_taken_by_its_word_or_refused_with_the_closest() -> None:
+    assert one_of("hold", ControlMode, "mode") is ControlMode.HOLD
+    assert one_of(ControlMode.HOLD, ("embedding", "hold"), "mode") == "hold"
+    with pytest.raises(InputError) as error:
+        one_of("Embeding", ControlMode, "mode")
+    assert str(error.value) == (
+        "mode: unknown value 'Embeding'; use unaware | embedding | inversion | hold; did you mean "
+        "embedding?"
+    )
+    many = [f"FIC{number}" for number in range(100)]
+    for wrong, told in ((None, "FIC19 | and 80 more$"), (["FIC1"], "value ")):
+        with pytest.raises(InputError, match=told):
+            one_of(wrong, many, "op")
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: MpcController(DESIGN, "embeding"), "mode: .* did you mean embedding?"),
+        (lambda: MpcController(MODEL, "embedding"), "design: LoopModel is no ControlDesign; give"),  # type: ignore[arg-type]
+        (lambda: ControlSettings(observer="kalmann"), "observer: .* did you mean kalman?"),
+        (lambda: ControlSettings(formulation="paper"), "formulation: unknown value 'paper'; use"),
+        (lambda: IdentificationOptions(method="evidenz"), "method: .* did you mean evidence?"),
+        (lambda: IdentificationOptions(kind="flo"), "kind: unknown kind 'flo'; .* mean flow?"),
+        (lambda: find_law("chouhury"), "law: unknown friction law .* mean choudhury?"),
+        (lambda: LinearOptions(kind="arks"), "kind: unknown value 'arks'; use arx"),  # type: ignore[arg-type]
+        (lambda: LinearOptions(criterion="bix"), "criterion: .* did you mean bic?"),  # type: ignore[arg-type]
+        (lambda: CsvColumns(op=3), "op: int is no list; give a column, a list of them, or"),
+        (lambda: simulate("flow.loop.yaml"), "model: str is no LoopModel; give LoopModel.load"),  # type: ignore[arg-type]
+        (lambda: find_gap("flow.loop.yaml", []), "model: str is no LoopModel"),  # type: ignore[arg-type]
+        (lambda: find_gap(MODEL, [3]), "record: int is no record; give a Record"),  # type: ignore[list-item]
+    ],
+)
+def test_a_wrong_word_or_kind_gets_a_sentence(call: Callable[[], object], told: str) -> None:
+    with pytest.raises(InputError, match=told.replace("?", r"\?")):
+        call()
+
+
+def test_a_choice_may_be_said_by_its_text() -> None:
+    assert LinearOptions(kind="arx").kind is LinearKind.ARX  # type: ignore[arg-type]
+    assert MpcController(DESIGN, "unaware").mode is ControlMode.UNAWARE
+    columns = CsvColumns(op="valve", pv=["flow", "level"])
+    assert (columns.op, columns.pv) == ({"V1": "valve"}, {"PV1": "flow", "PV2": "level"})

@@ -86,6 +86,7 @@ def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(
     assert result(package, NUMBA_CACHE_DIR=str(nowhere), HOME=str(nowhere)) == 7.0
 
 
+@pytest.mark.trial
 def test_threads_that_import_at_once_keep_machine_code_where_the_next_process_looks(
     package: Path,
 ) -> None:

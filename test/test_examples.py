@@ -123,6 +123,7 @@ def test_it_runs_and_says_what_it_promises(
         assert re.search(pattern, said, re.MULTILINE), (pattern, said)
 
 
+@pytest.mark.trial
 def test_a_control_engineer_s_own_file_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

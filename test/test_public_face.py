@@ -15,9 +15,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
 import stiction_ros
+from stiction_ros.control.result import StepStatus
 
 NAMES = [name for name in stiction_ros.__all__ if name != "__version__"]
 FUNCTIONS = [name for name in NAMES if inspect.isfunction(getattr(stiction_ros, name))]
@@ -79,6 +81,22 @@ def test_every_example_is_short_and_true(
     said: list[str] = []
     failed, _ = doctest.DocTestRunner().run(example, out=said.append)
     assert not failed, "".join(said)
+
+
+def test_a_value_shows_itself_in_a_line() -> None:
+    from stiction_ros import ControlMode, LoopModel, Record, Scenario, StepResult, find_config
+
+    model = LoopModel.load(find_config("flow.loop.yaml"))
+    record = Record.from_arrays(2.0, np.zeros((900, 1)), np.zeros((900, 1)), name="FIC1")
+    step = StepResult(StepStatus.SOLVED, "", ControlMode.UNAWARE, np.ones(1), None, np.zeros(1), 0)
+    fit = stiction_ros.fit_linear(stiction_ros.simulate(model, samples=300))
+    scenario = Scenario.load(find_config("siso.scenario.yaml"))
+    assert repr(record) == "<Record FIC1: 900 samples of 2 s; OP of V1, PV of PV1>"
+    assert repr(model) == "<LoopModel flow: arx from V1 to PV1, samples of 1 s>"
+    assert repr(step) == "<StepResult solved, OP 1 %, unaware>"
+    for value in (record, model, step, fit, scenario):
+        assert len(repr(value)) < 120
+        assert repr(value).startswith(f"<{type(value).__name__} ")
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -32,7 +32,6 @@ WRONG = (
     ["study", "nowhere"],
     ["study-change", "nowhere"],
     ["study-control", "--cases", "none"],
-    ["study-wear", "nowhere"],
     ["faults", "--only", "none"],
     ["soak"],
     ["example", "3"],
@@ -102,6 +101,7 @@ def test_nodes_load_nothing_that_they_do_not_use(node: str) -> None:
     assert not loaded(code)[1] & HEAVY
 
 
+@pytest.mark.trial
 def test_an_identification_loads_no_slow_part_of_scipy() -> None:
     code = (
         "import sys\n"

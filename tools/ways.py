@@ -37,7 +37,8 @@ REASONS: dict[str, dict[str, str]] = {
         "effects": "which laws there are, their parameters, and grids of frictions at once",
         "signals": "what is computed of one signal is a function each: noise, lines, cycles, runs",
         "base": "what SciPy has in packages that load slowly is called where it is loaded late; "
-        "how many threads there are is nobody's floor",
+        "what an argument may be is checked in one place; how many threads there are is nobody's "
+        "floor",
     },
     GAP: {
         "records": "a record tells of itself: how long it is, which of its samples were measured",
@@ -47,7 +48,8 @@ REASONS: dict[str, dict[str, str]] = {
         "effects": "what a search asks of an effect is said in the file of the effect alone: axes, "
         "sizes, waves, whole grids, YAML",
         "base": "what SciPy has in packages that load slowly is called where it is loaded late; "
-        "how many threads there are is nobody's floor",
+        "what an argument may be is checked in one place; how many threads there are is nobody's "
+        "floor",
     },
 }
 

@@ -19,15 +19,16 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "browse-tags",
-        help="make a tag map by browsing a control system (OPC UA)",
         description="Find everything that has a PV and an OP under one name, FIC101.PV or a "
         "folder FIC101 with a variable PV, and write a tag map that listens to it.",
     )
-    parser.add_argument("url", metavar="URL", help="opc.tcp://HOST:PORT")
-    parser.add_argument("--out", required=True, metavar="F", help="the *.tags.yaml")
+    parser.add_argument("url", metavar="URL", help="address of the server, opc.tcp://HOST:PORT")
+    parser.add_argument("--out", required=True, metavar="F", help="tag map to write, *.tags.yaml")
     parser.add_argument("--force", action="store_true", help="write over a file that is there")
-    parser.add_argument("--root", default="", metavar="NODE", help="where to begin")
-    parser.add_argument("--sample-time", type=float, required=True, metavar="S")
+    parser.add_argument("--root", default="", metavar="NODE", help="node to begin at")
+    parser.add_argument(
+        "--sample-time", type=float, required=True, metavar="S", help="seconds between samples"
+    )
     for key, name in (("pv", "PV"), ("op", "OUT"), ("sp", "SP"), ("mode", "MODE")):
         parser.add_argument(f"--{key}", default=name, help=f"name of the tag (default: {name})")
     add_session(parser)

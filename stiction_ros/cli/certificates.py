@@ -19,17 +19,24 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "certificates",
-        help="certificates of the link to a control system (OPC UA)",
         description="Make our certificate and key, pin the certificate of a server, show one.",
     )
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     make = actions.add_parser("make", help="make a self-signed certificate and its key")
     make.add_argument("--out", required=True, metavar="DIR", help="folder of the two files")
-    make.add_argument("--name", default="client", help="of the files (default: client)")
-    make.add_argument("--uri", default="", help="of the application, as the server will know it")
-    make.add_argument("--host", action="append", default=[], help="name or address; repeatable")
-    make.add_argument("--days", type=int, default=365, help="of validity (default: 365)")
-    make.add_argument("--server", action="store_true", help="for a server (default: a client)")
+    make.add_argument("--name", default="client", help="name of the files (default: client)")
+    make.add_argument(
+        "--uri", default="", help="URI of the application, by which the server knows it"
+    )
+    make.add_argument(
+        "--host", action="append", default=[], help="host name or address; may be repeated"
+    )
+    make.add_argument("--days", type=int, default=365, help="days of validity (default: 365)")
+    make.add_argument(
+        "--server",
+        action="store_true",
+        help="make a certificate of a server (default: of a client)",
+    )
     make.set_defaults(run=_make)
     pin = actions.add_parser(
         "pin",
@@ -37,12 +44,12 @@ def add(commands: Any) -> None:
         description="Without --fingerprint show what the server shows; compare it with what the "
         "control engineer says; then save it by giving the fingerprint.",
     )
-    pin.add_argument("url", help="opc.tcp://HOST:PORT")
-    pin.add_argument("--to", metavar="FILE", help="where it is saved, DER")
+    pin.add_argument("url", help="address of the server, opc.tcp://HOST:PORT")
+    pin.add_argument("--to", metavar="FILE", help="file to save, DER")
     pin.add_argument("--fingerprint", help="SHA-256, pairs of hexadecimal digits")
     pin.set_defaults(run=_pin)
     show = actions.add_parser("show", help="show a certificate")
-    show.add_argument("file")
+    show.add_argument("file", help="the certificate, DER")
     show.set_defaults(run=_show)
 
 

@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "convert",
-        help="convert a record between CSV and bag",
         description="Write a record in another form: OUT ending in .csv becomes a CSV file, "
         "anything else a rosbag2 directory. Rows whose times are slightly irregular are "
         "a sample each; a record with gaps, or of several runs, becomes OUT_1, OUT_2 and so on. "
@@ -34,7 +33,7 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser)
     parser.add_argument(
-        "--iso", action="store_true", help="time stamps in ISO 8601 (UTC) in a CSV file"
+        "--iso", action="store_true", help="write times of a CSV file in ISO 8601 (UTC)"
     )
     parser.set_defaults(run=run)
 

@@ -24,13 +24,15 @@ if TYPE_CHECKING:
 OPCUA = "opcua"
 OPCUA_HELP = "; opcua: the tank behind a control system"
 
+SCORES = {"amplitude": "amplitude", "offset": "offset", "iae_per_hour": "IAE per hour"}
+"""Scores of a phase that are printed, and what they are called."""
+
 
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     opcua, compare = extensions.part("demo opcua"), extensions.part("demo --compare")
     parser = commands.add_parser(
         "demo",
-        help="run a live loop: cycle, identify, swap, record, report",
         description="Start plant, controller, estimator and recorder as processes; let the loop "
         "cycle; identify the friction; swap the controller; record all traffic; write the report.",
     )
@@ -40,7 +42,9 @@ def add(commands: Any) -> None:
         metavar="SCENARIO",
         help="tank, siso, or a file (default: both)" + (OPCUA_HELP if opcua else ""),
     )
-    parser.add_argument("--out", default="out", metavar="DIR", help="results (default: out)")
+    parser.add_argument(
+        "--out", default="out", metavar="DIR", help="folder of the results (default: out)"
+    )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
     parser.add_argument(
         "--speed",
@@ -135,13 +139,13 @@ def _print(summary: dict[str, Any], directory: Path) -> None:
         table.add_column(column)
     phases = summary["phases"]
     for output in phases.get("before", {}):
-        for key in ("amplitude", "offset", "iae_per_hour"):
+        for key in SCORES:
             values = [
                 phases.get(phase, {}).get(output, {}).get(key)
                 for phase in ("before", "after", "stiction_free")
             ]
             cells = ["–" if value is None else f"{value:.4g}" for value in values]
-            table.add_row(output, key, *cells)
+            table.add_row(output, SCORES[key], *cells)
     for valve, label, told in work_rows(summary, ("before", "after", "stiction_free")):
         table.add_row(valve, label, *("–" if value is None else f"{value:.4g}" for value in told))
     console.print(table)

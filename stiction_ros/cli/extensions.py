@@ -19,8 +19,8 @@ from stiction_ros.errors import InputError
 GROUP = "stiction.commands"
 STUDIES = "stiction-studies"
 OF_STUDIES = (
-    *("bench", "example", "faults", "paper", "soak", "study", "study-change", "study-control"),
-    *("study-monitor", "study-wear", "demo opcua", "demo --compare", "experiment plant"),
+    *("bench", "calibrate", "example", "faults", "paper", "soak", "study", "study-change"),
+    *("study-control", "study-monitor", "demo opcua", "demo --compare", "experiment plant"),
 )
 """What ``stiction-studies`` brings, so that the command can say so where it is not installed."""
 

@@ -32,7 +32,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "fit-linear",
-        help="fit a linear model, for a controller that knows no friction",
         description="Fit a linear model from OP to PV and write it as a loop model. Exit code 1 "
         "when there is no stable model.",
     )
@@ -40,9 +39,12 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser)
     parser.add_argument(
-        "--kind", default="state_space", choices=searches.LINEAR_KINDS, help="(state_space)"
+        "--kind",
+        default="state_space",
+        choices=searches.LINEAR_KINDS,
+        help="kind of model (state_space)",
     )
-    parser.add_argument("--order", type=int, metavar="N", help="states (default: by BIC)")
+    parser.add_argument("--order", type=int, metavar="N", help="number of states (default: by BIC)")
     parser.add_argument(
         "--method",
         default="cva",
@@ -52,14 +54,20 @@ def add(commands: Any) -> None:
     parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: 1 to 3)")
     parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
     parser.add_argument("--nc", type=int, metavar="N", help="order n_c of armax (default: n_a)")
-    parser.add_argument("--criterion", default="bic", choices=searches.CRITERIA, help="(bic)")
     parser.add_argument(
-        "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
+        "--criterion", default="bic", choices=searches.CRITERIA, help="criterion of the order (bic)"
+    )
+    parser.add_argument(
+        "--delay",
+        type=delay_range,
+        default=(0, 10),
+        metavar="LO:HI",
+        help="delays to try, samples (0:10)",
     )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument("--out", metavar="F", help="write the loop model, F.loop.yaml")
     parser.add_argument(
-        "--limits", type=limits_range, metavar="LO:HI", help="limits of the valves in it, %%"
+        "--limits", type=limits_range, metavar="LO:HI", help="limits of the valves in the model, %%"
     )
     parser.set_defaults(run=run)
 

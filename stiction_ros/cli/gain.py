@@ -48,7 +48,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "gain",
-        help="what service, embedding or retuning would bring",
         description="Simulate what would help a loop: a serviced valve, a controller that knows "
         "the friction, another tuning, or nothing. A record is identified first and the "
         "controller of the record is the baseline; a model needs a controller of its own.",
@@ -59,9 +58,15 @@ def add(commands: Any) -> None:
     add_columns(parser)
     add_intake(parser)
     add_law(parser)
-    parser.add_argument("--valve", metavar="TAG", help="of several valves (default: widest band)")
-    parser.add_argument("--set-points", metavar="F", help="schedule, for a model")
-    parser.add_argument("--samples", type=int, metavar="N", help="of a run, for a model (2000)")
+    parser.add_argument(
+        "--valve",
+        metavar="TAG",
+        help="the valve, where there are several (default: that with the widest band)",
+    )
+    parser.add_argument("--set-points", metavar="F", help="schedule of set-points, with a model")
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="number of samples of a run, with a model (2000)"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run, law=None)
 
@@ -123,16 +128,10 @@ def _of_record(options: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
 
 def _verdict(record: Record, identified: Identification, gain: Any) -> dict[str, Any]:
     """Return what was found of the valve that was looked at, as it stands in the JSON."""
-    from stiction_ros.records.valve_work import ValveWork
-    from stiction_ros.survey.ranking import confidence
-
     index = record.valves.index(gain.valve)
     valve = identified.valves[index].to_json()
-    cause = identified.outputs[record.outputs.index(gain.output)].cause
-    turns = round(ValveWork.of(identified.stem[:, index]).reversals)
-    keys = ("verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval")
-    sure = confidence(valve, None if cause is None else cause.kind.value, turns)
-    return {key: valve[key] for key in keys} | {"confidence": sure}
+    keys = ("verdict", "probability", "law", "f_s", "f_s_interval", "f_d", "f_d_interval")
+    return {key: valve[key] for key in keys}
 
 
 def show(found: Any, verdict: Mapping[str, Any]) -> None:
@@ -145,7 +144,7 @@ def show(found: Any, verdict: Mapping[str, Any]) -> None:
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()
-    for name in ("", "measure", "now", "then", "5 to 95 % of the drawn loops"):
+    for name in ("option", "measure", "now", "then", "5 to 95 % of the drawn loops"):
         table.add_column(name)
     for option in found.options:
         for row in _rows(found.now, option):
@@ -165,9 +164,10 @@ def _headline(found: Any, verdict: Mapping[str, Any]) -> str:
     (low, high), (least, most) = verdict["f_s_interval"], verdict["f_d_interval"]
     said += (
         f": {verdict['verdict']}, f_S {verdict['f_s']:.3g} % ({low:.3g} to {high:.3g}), "
-        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g}), "
-        f"confidence {verdict['confidence']:.2f}"
+        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g})"
     )
+    if verdict["probability"] is not None:
+        said += f", P(friction) {verdict['probability']:.2f}"
     if verdict["verdict"] == "undecided":
         said += (
             ". The record does not decide whether the valve has friction: half of the drawn loops "

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -27,6 +28,7 @@ from stiction_ros.errors import InputError, storing
 from stiction_ros.loop import LoopModel
 from stiction_ros.records import Record
 from stiction_ros.records.parts import longest_part, only_part
+from stiction_ros.texts import symbol
 
 if TYPE_CHECKING:
     from stiction_ros.discrepancy import Discrepancy
@@ -44,7 +46,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "gap",
-        help="find, name and add the effect that a simulation misses",
         description="Compare a loop model with records of its loop, name the physical effect that "
         "it lacks, add it and measure the gap again. Exit codes: 0 named or none, 3 ambiguous, "
         "4 unknown, 5 untestable.",
@@ -53,28 +54,28 @@ def add(commands: Any) -> None:
         "inputs",
         nargs="+",
         metavar="FILE",
-        help="MODEL RECORD…; with --fit-linear RECORD… alone (CSV files or bags)",
+        help="the loop model, then records (CSV files or bags); records alone with --fit-linear",
     )
     add_columns(parser)
     add_intake(parser)
     parser.add_argument(
         "--fit-linear",
         action="store_true",
-        help="there is no model yet: fit a linear one to the longest record",
+        help="fit a linear model to the longest record, where there is no model yet",
     )
     parser.add_argument(
         "--delay",
         type=delay_range,
         default=(0, 10),
         metavar="LO:HI",
-        help="delays tried by --fit-linear, samples (0:10)",
+        help="delays that --fit-linear tries, samples (0:10)",
     )
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="no bootstrap: stored threshold, intervals by likelihood",
+        help="take stored thresholds and intervals by likelihood, without a bootstrap",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the bootstraps (0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the bootstraps (0)")
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument(
         "--out", metavar="DIR", help="write report.html and model_after.loop.yaml there"
@@ -142,40 +143,48 @@ def _write(found: Discrepancy, directory: Path) -> None:
 
 
 def _print(found: Discrepancy) -> None:
+    from stiction_ros.report.gap.words import called, plain
+
     console = Console()
     names = ", ".join(record.name for record in found.runs.records)
     console.print(f"{names}: {found.verdict}", markup=False)
     if found.effects:
-        table = Table("effect", "figure", "value", "95 %", "ΔBIC", "closes", "or")
+        table = Table(
+            *("effect", "figure", "value", "95 %", "ΔBIC", "closes"),
+            box=SIMPLE_HEAD,
+            pad_edge=False,
+        )
         for effect in found.effects:
-            others = ", ".join(f"{place} {name}" for place, name in effect.alternatives)
             for k, (key, value) in enumerate(effect.parameters.items()):
                 ends = effect.intervals.get(key)
                 table.add_row(
-                    f"{effect.place} {effect.title}" if k == 0 else "",
-                    key,
+                    called(effect.place, effect.effect) if k == 0 else "",
+                    symbol(key),
                     f"{value:.5g} {effect.units.get(key, '')}".removesuffix(" 1").rstrip(),
                     "" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}",
                     f"{effect.delta_bic:.0f}" if k == 0 else "",
                     _share(effect.closed) if k == 0 else "",
-                    others if k == 0 else "",
                 )
         console.print(table)
     elif found.alternatives:
-        console.print("one of: " + ", ".join(f"{p} {e}" for p, e in found.alternatives))
+        console.print("one of: " + ", ".join(called(*name) for name in found.alternatives))
     for effect in found.effects:
-        if effect.sentence:
-            console.print(f"{effect.place} {effect.title}: {effect.sentence}", markup=False)
+        others = " or ".join(called(*name) for name in effect.alternatives)
+        told = [effect.sentence, f"it may also be {others}" if others else ""]
+        if said := "; ".join(filter(None, told)):
+            law = "" if effect.law is None else f" (law {effect.law})"
+            name = called(effect.place, effect.effect)
+            console.print(f"{name}{law}: {plain(said)}", markup=False)
     for change in found.process_changes:
         said = f"process to {change.output}: {change.what} {change.value:.4g} {change.unit}"
         console.print(said.removesuffix(" 1"), markup=False)
     console.print(_gaps(found))
     for sentence in found.where:
-        console.print(f"where: {sentence}", markup=False)
+        console.print(f"where: {plain(sentence)}", markup=False)
     if found.experiment:
         console.print(f"to learn more: {found.experiment}", markup=False)
     if found.untestable:
-        listed = ", ".join(f"{t.place} {t.effect}" for t in found.untestable)
+        listed = ", ".join(called(t.place, t.effect) for t in found.untestable)
         console.print(f"not testable here: {listed}", markup=False)
     if found.not_considered:
         reasons: dict[str, set[str]] = {}
@@ -193,7 +202,7 @@ def _share(closed: float) -> str:
 
 def _gaps(found: Discrepancy) -> Table:
     title = f"gap on held-out samples; closed {100.0 * found.closed:.0f} % of its excess"
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for head in ("output", "free run", "after", "noise", "one step", "after", "noise"):
         table.add_column(head, justify="left" if head == "output" else "right")
     for before, after in zip(found.before, found.after, strict=True):

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -33,6 +34,7 @@ from stiction_ros.cli.shared.searches import (
 )
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
+from stiction_ros.texts import symbol
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification, ValveEstimate
@@ -44,7 +46,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
-        help="identify friction and process from a record",
         description="Identify the friction of every valve and the process behind it from "
         "controller output and measurement, and say which valve sticks. Of a record with gaps "
         "or of several runs the longest good part is taken.",
@@ -56,36 +57,44 @@ def add(commands: Any) -> None:
         "--na",
         type=output_orders,
         metavar="N[,N]",
-        help="order n_a (default: by BIC); methods of the paper also one for each output",
+        help="order n_a of the process (default: by BIC); methods of the paper take one order, "
+        "or one for each output",
     )
     parser.add_argument(
         "--nb",
         type=input_orders,
         metavar="N[,N][/N,N]",
-        help="order n_b (default: n_a); methods of the paper also one for each valve, a row of "
-        "them for each output",
+        help="order n_b of the process (default: n_a); methods of the paper take one order, or "
+        "one for each valve in a row for each output",
     )
     parser.add_argument(
-        "--delay", type=delay_range, default=(0, 10), metavar="LO:HI", help="samples (0:10)"
+        "--delay",
+        type=delay_range,
+        default=(0, 10),
+        metavar="LO:HI",
+        help="delays to try, samples (0:10)",
     )
     add_law(parser)
     parser.add_argument(
         "--kind",
         choices=searches.LOOP_KINDS,
-        help="what the loop controls: the process found is held against it, as a note",
+        help="what the loop controls; a note says whether the process found fits it",
     )
     parser.add_argument(
         "--method",
         default="evidence",
         choices=searches.METHODS,
-        help="search (default: evidence)",
+        help="method of identification (default: evidence)",
     )
     add_search_options(parser)
     parser.add_argument(
         "--model", metavar="F.loop.yaml", help="write the identified loop as a loop model"
     )
+    parser.add_argument(
+        "--why", action="store_true", help="print the figures behind each probability"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
-    parser.add_argument("--out", metavar="DIR", help="write report.html and figures there")
+    parser.add_argument("--out", metavar="DIR", help="write the page report.html there")
     parser.set_defaults(run=run)
 
 
@@ -126,6 +135,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json != "-":
         print(f"{loop.name}: {loop.summary}")
         _print(document, found)
+        if options.why:
+            _print_figures(found)
     else:
         tell(loop)
     if options.out is not None:
@@ -150,26 +161,25 @@ def _write_model(record: Record, found: Identification, target: str) -> None:
 
 def _print(document: Mapping[str, Any], found: Identification) -> None:
     console = Console()
-    table = Table(title=f"{document['record']}: {found.samples} samples", title_justify="left")
+    console.print(f"{document['record']}: {found.samples} samples")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     further = _further(found)
-    for name in ("valve", "verdict", "f_S %", "interval", "f_D %", "interval"):
-        table.add_column(name)
-    for head in further.values():
-        table.add_column(head)
-        table.add_column("interval")
-    table.add_column("moves")
-    table.add_column("band")
+    table.add_column("valve", overflow="fold")
+    heads = ["verdict", "P", "f_S %", "interval", "f_D %", "interval"]
+    for name in (*heads, *(each for head in further.values() for each in (head, "interval"))):
+        table.add_column(name, no_wrap=True)
+    table.add_column("OP lost", no_wrap=True)
     for valve in found.valves:
         table.add_row(
             valve.name,
             str(valve.verdict),
+            "" if valve.probability is None else f"{valve.probability:.2f}",
             f"{valve.static_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.static_interval),
             f"{valve.dynamic_friction:.3g}",
             "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
             *(cell for key in further for cell in _cells(valve, key)),
-            str(valve.moves),
-            f"{100 * valve.band_share:.0f} % of OP" if valve.band_share > 0.0 else "",
+            f"{100 * valve.band_share:.0f} %" if valve.band_share > 0.0 else "",
         )
     console.print(table)
     if found.row_samples > 1:
@@ -194,6 +204,29 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
         console.print(f"note: {note}")
 
 
+def _print_figures(found: Identification) -> None:
+    """Print the figures of each valve, and what each adds to the log odds of friction."""
+    from stiction_ros.identification.judgement.figures import definitions
+    from stiction_ros.identification.judgement.probability import contributions
+
+    console = Console()
+    for valve in found.valves:
+        if valve.figures is None:
+            console.print(f"{valve.name}: this method computes no probability of friction")
+            continue
+        table = Table(
+            title=f"{valve.name}: P(friction) {valve.probability:.3f}", title_justify="left"
+        )
+        for name in ("figure", "value", "unit", "adds", "definition"):
+            table.add_column(name)
+        odds = contributions(valve.figures)
+        for name, told in definitions().items():
+            value = getattr(valve.figures, name)
+            row = name, f"{value:.3g}", told["unit"], f"{odds[name]:+.2f}", told["definition"]
+            table.add_row(*row)
+        console.print(table)
+
+
 def _further(found: Identification) -> dict[str, str]:
     """Return the heads of the columns of the law's further parameters, by their keys."""
     from stiction_ros.identification.friction.grid import find_law
@@ -201,7 +234,8 @@ def _further(found: Identification) -> dict[str, str]:
     heads = {}
     for valve in found.valves:
         for entry in find_law(valve.law).parameters()[2:] if valve.further else ():
-            heads[entry.key] = entry.key if entry.unit == "1" else f"{entry.key} {entry.unit}"
+            name = symbol(entry.key)
+            heads[entry.key] = name if entry.unit == "1" else f"{name} {entry.unit}"
     return heads
 
 
@@ -221,6 +255,6 @@ def _cause(cause: Cause) -> str:
     if cause.kind is CauseKind.NONE or cause.period is None:
         return f"cause {cause.kind}. {cause.sentence}"
     return (
-        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.1f}, "
-        f"amplitude {cause.amplitude:.3g}. {cause.sentence}"
+        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.3g} "
+        f"(above 1 is regular), amplitude {cause.amplitude:.3g}. {cause.sentence}"
     )

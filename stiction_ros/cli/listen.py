@@ -20,15 +20,24 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "listen",
-        help="fill the windows of all loops in the graph, in one process",
         description="Read pv and op_applied of every loop in the ROS graph and write one CSV "
         "record a loop, which identify takes. Nothing is published.",
     )
-    parser.add_argument("--seconds", type=float, required=True, help="how long")
-    parser.add_argument("--sample-time", type=float, default=1.0, metavar="S", help="default: 1")
-    parser.add_argument("--window", type=int, default=5000, metavar="N", help="samples kept")
+    parser.add_argument("--seconds", type=float, required=True, help="how long to listen, s")
+    parser.add_argument(
+        "--sample-time",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="seconds between samples (default: 1)",
+    )
+    parser.add_argument(
+        "--window", type=int, default=5000, metavar="N", help="samples to keep of each loop"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder of the CSV records; default: none")
-    parser.add_argument("--json", metavar="F", help="samples by loop; - for standard output")
+    parser.add_argument(
+        "--json", metavar="F", help="write the number of samples of each loop; - for stdout"
+    )
     parser.set_defaults(run=run)
 
 

@@ -22,26 +22,38 @@ from stiction_ros.errors import InputError
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
 COMMANDS = {
-    "demo": "run a live loop: cycle, identify, swap, record, report",
-    "identify": "identify friction and process from a record",
-    "fit-linear": "fit a linear model, for a controller that knows no friction",
-    "gain": "what service, embedding or retuning would bring",
-    "gap": "find, name and add the effect that a simulation misses",
-    "simulate": "simulate a loop model under its own controller",
-    "experiment": "simulate an identification experiment",
-    "convert": "convert a record between CSV and bag",
-    "replay": "run estimator and controller over a bag as they ran live",
-    "report": "make the report of a bag or a record",
-    "repair": "finish a bag whose recorder was killed, or salvage a damaged one",
-    "valve-test": "test a valve in manual: the moves that would decide, and their verdict",
-    "survey": "every loop of a plant, ranked by what to service first",
-    "certificates": "certificates of the link to a control system (OPC UA)",
-    "browse-tags": "make a tag map by browsing a control system (OPC UA)",
-    "fetch-history": "read history from a control system (OPC UA) into CSV records",
-    "listen": "fill the windows of all loops in the graph, in one process",
-    "completion": "a script by which a shell ends commands and options at Tab",
+    "identify": "is it the valve: friction, cause, process",
+    "gap": "which effect a simulation lacks",
+    "report": "a page of a record or of a recorded run",
+    "gain": "what service or retuning would bring",
+    "valve-test": "a test in manual: its moves, its verdict",
+    "experiment": "simulate moves of OP that show friction",
+    "simulate": "run a loop model under its own controller",
+    "fit-linear": "fit a linear model for a controller",
+    "replay": "decide over a bag as the nodes did live",
+    "demo": "a live loop: cycle, identify, swap, report",
+    "listen": "fill the windows of all loops of the graph",
+    "convert": "turn a CSV file into a bag, or back",
+    "repair": "finish or salvage a damaged bag",
+    "survey": "rank all loops by what to service first",
+    "fetch-history": "read history over OPC UA into CSV files",
+    "browse-tags": "make a tag map by browsing over OPC UA",
+    "certificates": "make and pin certificates of OPC UA",
 }
 """What ``--help`` says of each command; its module bears its name and is loaded when called."""
+
+DESCRIPTION = "Find, measure and control valves that stick."
+
+GROUPS = {
+    "find: what is wrong with this loop": ("identify", "gap", "report"),
+    "decide: what to do about it": ("gain", "valve-test", "experiment", "simulate"),
+    "act: control a valve that sticks": ("fit-linear", "replay"),
+    "live: loops on ROS 2 and their bags": ("demo", "listen", "convert", "repair"),
+    "plant: all loops and their control system": (
+        *("survey", "fetch-history", "browse-tags", "certificates"),
+    ),
+}
+"""Commands by what they are for; all others are for the makers."""
 
 
 def _known(command: str | None) -> Mapping[str, tuple[str, str]]:
@@ -97,6 +109,25 @@ class _Parser(argparse.ArgumentParser):
         return f"unexpected {' '.join(spare)}{fix}"
 
 
+class _Top(_Parser):
+    """The parser of all commands, which lists them in groups."""
+
+    def __init__(self, texts: Mapping[str, str]) -> None:
+        """Take what is said of each command."""
+        super().__init__(prog="stiction")
+        self.texts = texts
+
+    def format_help(self) -> str:
+        """Return usage, the commands in groups, and where their options are."""
+        named = {name for names in GROUPS.values() for name in names}
+        rest = tuple(name for name in self.texts if name not in named)
+        lines = ["usage: stiction COMMAND …", "", DESCRIPTION]
+        for title, names in {**GROUPS, "makers: study and measure this package": rest}.items():
+            lines += ["", title, *(f"  {name:13}  {self.texts[name]}" for name in names)]
+        lines += ["", "stiction COMMAND --help lists the options of a command.", ""]
+        return "\n".join(lines)
+
+
 def _with_meant(
     error: argparse.ArgumentError, action: argparse.Action, word: object
 ) -> argparse.ArgumentError:
@@ -120,17 +151,15 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
         only: the command whose options are known, the others by name alone: no module but its
             own is imported. None for all.
     """
-    top = _Parser(
-        prog="stiction",
-        description="Find, quantify and compensate valve stiction in MPC loops.",
-    )
+    known = _known(only)
+    top = _Top({name: text for name, (_, text) in known.items()})
     top.add_argument("--version", action="version", version=f"stiction_ros {__version__}")
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, (module, text) in _known(only).items():
+    commands = top.add_subparsers(metavar="COMMAND", required=True, parser_class=_Parser)
+    for name, (module, _) in known.items():
         if only is None or name == only:
             importlib.import_module(module).add(commands)
         else:
-            commands.add_parser(name, help=text)
+            commands.add_parser(name)
     return top
 
 

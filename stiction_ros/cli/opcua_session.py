@@ -10,13 +10,18 @@ from stiction_ros.opcua.security import SECURITY, Credentials
 def add_session(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how a session is secured."""
     group = parser.add_argument_group("session")
-    group.add_argument("--security", choices=SECURITY, default=SECURITY[0])
-    group.add_argument("--certificate", default="", metavar="F", help="ours, DER")
-    group.add_argument("--private-key", default="", metavar="F", help="ours, PEM, mode 600")
-    group.add_argument("--server-certificate", default="", metavar="F", help="pinned, DER")
-    group.add_argument("--user", default="", metavar="NAME")
-    group.add_argument("--password-file", default="", metavar="F", help="mode 600")
-    group.add_argument("--password-variable", default="", metavar="NAME", help="of the environment")
+    group.add_argument(
+        "--security", choices=SECURITY, default=SECURITY[0], help="security of the messages"
+    )
+    for name, metavar, text in (
+        ("--certificate", "F", "our certificate, DER"),
+        ("--private-key", "F", "our private key, PEM, mode 600"),
+        ("--server-certificate", "F", "pinned certificate of the server, DER"),
+        ("--user", "NAME", "name of the user"),
+        ("--password-file", "F", "file with the password, mode 600"),
+        ("--password-variable", "NAME", "environment variable with the password"),
+    ):
+        group.add_argument(name, default="", metavar=metavar, help=text)
 
 
 def credentials_of(options: argparse.Namespace) -> Credentials:

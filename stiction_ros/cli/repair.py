@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "repair",
-        help="finish a bag whose recorder was killed, or salvage a damaged one",
         description="Finish the files of a bag that its recorder did not close, save what is "
         "whole of damaged ones (these stay beside the new ones as *.mcap.damaged), and write "
         "metadata.yaml anew. A whole bag is left as it is.",
@@ -33,7 +32,7 @@ def add(commands: Any) -> None:
         "--compression",
         default="zstd",
         choices=COMPRESSIONS,
-        help="of files that are rewritten (default: zstd)",
+        help="compression of files that are rewritten (default: zstd)",
     )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run)

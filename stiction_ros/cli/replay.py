@@ -17,13 +17,14 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "replay",
-        help="run estimator and controller over a bag as they ran live",
         description="Run estimator and controller over a recorded bag without ROS, with the "
         "settings that they told on ~/config, and compare every fit, op and change of mode with "
         "the recorded ones. Exit code 1 when anything differs.",
     )
     parser.add_argument("bag", metavar="BAG", help="rosbag2 directory or .mcap file")
-    parser.add_argument("--namespace", metavar="NS", help="of the loop, when there are several")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="namespace of the loop, where a bag holds several loops"
+    )
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.set_defaults(run=run)
 

@@ -23,7 +23,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "report",
-        help="make the report of a bag or a record",
         description="Make a self-contained HTML report of a bag, or of a CSV record.",
     )
     parser.add_argument("record", metavar="BAG_OR_RECORD", help="bag or CSV file")
@@ -33,7 +32,8 @@ def add(commands: Any) -> None:
         "--out",
         default="report.html",
         metavar="F.html",
-        help="the page, or a folder that gets figures and summary.json too (default: report.html)",
+        help="the page, or a folder for the page; for a run also figures and summary.json "
+        "(default: report.html)",
     )
     parser.set_defaults(run=run)
 

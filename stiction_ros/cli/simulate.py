@@ -25,7 +25,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "simulate",
-        help="simulate a loop model under its own controller",
         description="Run a loop model in closed loop under the controller that it records "
         "(controller: {kind: pi, …}), or in manual by a table of moves, and write OP, PV, SP and "
         "the true stem position.",
@@ -37,9 +36,11 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--moves", metavar="F.csv", help="in manual, by the moves that stiction valve-test writes"
     )
-    parser.add_argument("--samples", type=int, default=SAMPLES, metavar="N", help=f"({SAMPLES})")
     parser.add_argument(
-        "--seed", type=int, default=SEED, metavar="S", help=f"of the noise ({SEED})"
+        "--samples", type=int, default=SAMPLES, metavar="N", help=f"number of samples ({SAMPLES})"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=SEED, metavar="S", help=f"seed of the noise ({SEED})"
     )
     parser.add_argument(
         "--out",

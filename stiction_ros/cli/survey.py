@@ -40,7 +40,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "survey",
-        help="every loop of a plant, ranked by what to service first",
         description="Judge every loop in files and folders of exports and list the valves to "
         "service first, with a page for each loop. A loop that cannot be judged stands in the "
         "list with its reason and stops no other.",
@@ -48,31 +47,46 @@ def add(commands: Any) -> None:
     parser.add_argument("paths", nargs="+", metavar="PATH", help="files and folders of exports")
     add_columns(parser)
     add_intake(parser, many=True)
-    parser.add_argument("--delay", type=delay_range, metavar="LO:HI", help="samples (0:10)")
+    parser.add_argument(
+        "--delay", type=delay_range, metavar="LO:HI", help="delays to try, samples (0:10)"
+    )
     add_law(parser)
-    parser.add_argument("--no-gain", action="store_true", help="simulate nothing")
+    parser.add_argument("--no-gain", action="store_true", help="do not simulate what would help")
     parser.add_argument(
         "--cost",
         metavar="F",
-        help="CSV with or without a head loop,cost: money per hour and unit of |PV−SP|",
+        help="CSV with columns loop,cost: money per hour and unit of |PV−SP|",
     )
     parser.add_argument(
         "--units",
         metavar="F",
-        help="CSV with or without a head loop,unit: unit of PV, for the pages",
+        help="CSV with columns loop,unit: the unit of PV on the pages",
     )
     parser.add_argument(
-        "--previous", action="append", default=[], metavar="F", help="JSON of an earlier survey"
+        "--previous",
+        action="append",
+        default=[],
+        metavar="F",
+        help="JSON of an earlier survey; may be repeated",
     )
     parser.add_argument("--out", metavar="DIR", help=f"write {PAGE}, {CSV}, {XLSX} and pages there")
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (all cores)"
+        "--jobs",
+        type=int,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="number of processes (all cores)",
     )
     parser.add_argument(
-        "--engine", default=LOCAL, metavar="E", help="local, or dask://HOST:PORT (local)"
+        "--engine",
+        default=LOCAL,
+        metavar="E",
+        help="where to judge: local, or dask://HOST:PORT (local)",
     )
-    parser.add_argument("--resume", action="store_true", help="go on with the survey in --out")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the interrupted survey in --out"
+    )
     parser.set_defaults(run=run)
 
 

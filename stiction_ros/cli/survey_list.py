@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 SHOWN = 30
 """Rows of the list that are printed."""
 
-WHOLE = ("rank", "loop", "verdict", "f_S")
-"""Columns that are not broken in a narrow window."""
+ALWAYS, CAUSE = 3, 6
+"""Columns that stand in the narrowest window, and the first one that is broken between words."""
 
-LONGEST = 20
-"""Letters of a word that is not broken there."""
+APART = 2
+"""Blanks between two columns."""
 
 
 def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
@@ -36,7 +36,10 @@ def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
 
     entries = found.entries[:SHOWN]
     console = Console()
-    console.print(_table(entries))
+    console.print(_table(entries, console.width))
+    for entry in entries:
+        if entry.reason:
+            console.print(f"{entry.name}: {entry.reason}", highlight=False, markup=False)
     if len(found.entries) > SHOWN:
         console.print(f"and {len(found.entries) - SHOWN} more")
     for group in found.groups:
@@ -48,7 +51,8 @@ def print_list(found: Survey, earlier: Sequence[Earlier]) -> None:
     console.print(worked(found))
 
 
-def _table(entries: Sequence[Entry]) -> Table:
+def _table(entries: Sequence[Entry], width: int) -> Table:
+    """Return the columns that fit, the most telling first; no word of them is broken."""
     from stiction_ros.survey.listing.headline import kind_of
     from stiction_ros.survey.listing.saved import HEADS, in_words
     from stiction_ros.survey.pages.words import cause_words, op_figure, percent
@@ -58,27 +62,34 @@ def _table(entries: Sequence[Entry]) -> Table:
             str(entry.rank),
             entry.name,
             kind_of(entry),
-            cause_words(entry.cause),
-            percent(entry.band_share) if entry.found else "",
             op_figure(entry.f_s, entry.op_unit) if entry.found else "",
-            percent(entry.confidence),
+            percent(entry.band_share) if entry.found else "",
+            percent(entry.probability),
+            cause_words(entry.cause),
             in_words(entry, "service") if entry.gain else "",
-            entry.reason,
         )
         for entry in entries
     ]
     heads = (
-        *("rank", "loop", "verdict", "cycles by", "band of OP", "f_S", "confidence"),
-        *(HEADS["service"], "reason"),
+        "rank",
+        "loop",
+        "valve",
+        "f_S",
+        "OP lost",
+        "probability",
+        "cycles by",
+        HEADS["service"],
     )
-    kept = [place for place in range(len(heads)) if any(row[place] for row in rows)]
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    for place in kept:
-        whole = heads[place] in WHOLE
-        cells = [row[place] for row in rows]
-        words = cells if whole else [word for cell in cells for word in cell.split()]
-        longest = min(max(map(len, words)), LONGEST)
-        table.add_column(heads[place], no_wrap=whole, min_width=longest, overflow="fold")
+    left, kept = width, list[int]()
+    for place, (head, *cells) in enumerate(zip(heads, *rows, strict=True)):
+        whole = place < CAUSE
+        words = [*head.split(), *(word for cell in cells for word in cell.split())]
+        longest = max(map(len, [*head.split(), *cells] if whole else words))
+        if any(cells) and (place < ALWAYS or left >= longest + APART):
+            table.add_column(head, min_width=longest, no_wrap=whole, overflow="fold")
+            left -= longest + APART
+            kept.append(place)
     for row in rows:
         table.add_row(*(row[place] for place in kept))
     return table

@@ -34,7 +34,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "valve-test",
-        help="test a valve in manual: the moves that would decide, and their verdict",
         description="plan: from a record of the loop as it runs, the moves of OP in manual that "
         "would decide whether the valve sticks, as a procedure to follow by hand. judge: from the "
         "record of these moves, the verdict, or the next moves.",

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.checks import of_kind, one_of
 from stiction_ros.control.beliefs import ValveBeliefs
 from stiction_ros.control.design import ControlDesign, History
 from stiction_ros.control.jump_form import FrictionSpread
@@ -38,7 +39,8 @@ class MpcController:
 
     Args:
         design: process, weights and bounds, by :meth:`ControlSettings.design`.
-        mode: whether it takes no notice of the friction, inverts or embeds it, or holds OP.
+        mode: a :class:`ControlMode` or its text: ``unaware`` takes no notice of the friction,
+            ``inversion`` and ``embedding`` do, ``hold`` keeps OP.
         frictions: of the m valves, None for a healthy one.
         spreads: half-widths of the intervals of their parameters, where known.
 
@@ -61,12 +63,13 @@ class MpcController:
     def __init__(
         self,
         design: ControlDesign,
-        mode: ControlMode,
+        mode: ControlMode | str,
         frictions: Sequence[Behaviour | None] | None = None,
         spreads: Sequence[FrictionSpread | None] | None = None,
     ) -> None:
         """Build for ``frictions``; the modes that know of none take no notice of them."""
-        m = len(design.model.stem0)
+        of_kind(design, ControlDesign, "design", "give ControlSettings(…).design(model)")
+        m, mode = len(design.model.stem0), one_of(mode, ControlMode, "mode")
         self.design, self.mode = design, mode
         aware = mode in (ControlMode.EMBEDDING, ControlMode.INVERSION) and frictions is not None
         known = tuple(frictions or ()) if aware else (None,) * m

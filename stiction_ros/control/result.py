@@ -109,6 +109,11 @@ class StepResult:
     age: int = 0
     optimality_gap: float | None = None
 
+    def __repr__(self) -> str:
+        op = ", ".join(f"{value:.4g}" for value in self.op.tolist())
+        said = f": {self.reason}" if self.reason else ""
+        return f"<StepResult {self.status}, OP {op} %, {self.mode}{said}>"
+
     @property
     def slack(self) -> FloatArray:
         """Violation of the soft output bounds that the plan accepts, shape (p,)."""

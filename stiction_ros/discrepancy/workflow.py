@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
+from stiction_ros.checks import of_kind
 from stiction_ros.discrepancy.answer.results import Discrepancy
 from stiction_ros.discrepancy.decision.scores import Progress
 from stiction_ros.discrepancy.gap_options import GapOptions
@@ -11,6 +13,7 @@ from stiction_ros.discrepancy.steps.begin import begin
 from stiction_ros.discrepancy.steps.closing import closing
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.settle import settle
+from stiction_ros.intake.record_file import record_of
 from stiction_ros.loop import LoopModel
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records import Record
@@ -18,7 +21,7 @@ from stiction_ros.records import Record
 
 def find_discrepancy(
     model: LoopModel,
-    records: Sequence[Record],
+    records: Sequence[Record | str | os.PathLike[str]],
     options: GapOptions | None = None,
     progress: Progress | None = None,
 ) -> Discrepancy:
@@ -29,7 +32,7 @@ def find_discrepancy(
 
     Args:
         model: the loop as it is simulated now.
-        records: of this loop, one or more; OP and PV at least.
+        records: of this loop, one or more, or paths of their files; OP and PV at least.
         options: None for the defaults.
         progress: called with the share done, 0 to 1.
 
@@ -49,11 +52,14 @@ def find_discrepancy(
         >>> schedule = SetPoints.load(find_config("flow.set_points.yaml"), truth.outputs)
         >>> record = simulate(truth, schedule, samples=800)
         >>> found = find_gap(truth.with_ideal_valves(), [record], GapOptions(quick=True))
-        >>> print(found.verdict, *[effect.effect for effect in found.effects])
-        named stiction
+        >>> found
+        <Discrepancy named: stiction at valve:V1>
     """
+    of_kind(model, LoopModel, "model", "give LoopModel.load(path)")
+    given = [records] if isinstance(records, Record | str | os.PathLike) else records
+    measured = [record_of(record) for record in given]
     with one_thread():
-        task, state = begin(model, records, options or GapOptions(), progress)
+        task, state = begin(model, measured, options or GapOptions(), progress)
         state = look_on(task, state)
         if not task.options.free_process:
             state = settle(task, state)

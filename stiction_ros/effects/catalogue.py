@@ -22,10 +22,10 @@ PLACES = {
 }
 _HEAD = """# The catalogue of effects
 
-Made from the classes in `stiction_ros/effects/` by
-`python -m stiction_ros.effects.catalogue > docs/effects.md`.
+Reference of everything that a loop model may hold and `stiction gap` may name. Made from the
+classes by `python -m stiction_ros.effects.catalogue > docs/effects.md`.
 
-An effect acts at a place, `KIND:TAG`, and stands there in the loop model:
+An effect acts at a place, `KIND:TAG`:
 
 | place | in the YAML | the signal it acts on |
 |---|---|---|
@@ -36,16 +36,15 @@ An effect acts at a place, `KIND:TAG`, and stands there in the loop model:
 | `sensor:PV1` | `sensors: [{name: PV1, effects: [...]}]` | PV with its noise |
 | `data` | none; a wrong tuning is mended in `controller:` | the record |
 
-Effects on a process act on its output without noise, whatever its kind, less the operating
-point `pv0`. A disturbance may also name a further input of the process instead of an output,
-`input: F_B`. A load enters through the process as the stem of its valve does, but stands in no
-stem. A sensor takes PV with its noise. Effects of one place stand in signal order.
-`time` counts seconds since the first sample, and `signal` is the unit of the signal. The laws
-of stiction are compared in [friction.md](friction.md). How to add an effect of your own is said in
-`CONTRIBUTING.md`; its page in the [API](api/effects.md) has the names that it needs.
+Effects of one place stand in signal order. An effect on a process acts on the output without noise,
+less the operating point `pv0`. A disturbance may name an input of the process in place of an
+output: `input: F_B`. A load has the parameters of the disturbance of the same name. `time` is in s
+since the first sample. *Confusable with* names what leaves nearly the same traces in OP and PV.
+"""
+_NEXT = """## Next
 
-*Minimum data* is what a record must hold to tell the size. *Confusable with* names what leaves
-nearly the same traces in OP and PV.
+The laws of friction: [friction.md](friction.md). An effect of your own: `CONTRIBUTING.md` and its
+page in the [API](api/effects.md). To find an effect: [discrepancy.md](discrepancy.md).
 """
 
 
@@ -56,18 +55,18 @@ def page() -> str:
         kinds = [kind for kind in behaviours() if place in kind.places]
         kinds.sort(key=lambda kind: (kind.effect != Stiction.effect, kind.law != DEFAULT_LAW))
         parts.append(f"## {title}\n\n" + "\n".join(_entry(kind, place) for kind in kinds))
-    return "\n".join(parts)
+    return "\n".join([*parts, _NEXT])
 
 
 def _entry(kind: type[Behaviour], place: str) -> str:
     name = f"`{kind.effect}`" + (f", law `{kind.law}`" if kind.law else "")
+    if place == "load":
+        return f"### {name}\n\n{_summary(kind)}\n"
     rows = [f"| `{p.key}` | {p.unit} | {_range(p)} | {p.description} |" for p in kind.parameters()]
     head = f"### {name}\n\n{_summary(kind)}\n\n"
     table = "| parameter | unit | range | meaning |\n|---|---|---|---|\n" + "\n".join(rows)
     if kind.law not in (None, DEFAULT_LAW):
-        return f"{head}{table}\n\nOtherwise as law `he`.\n"
-    if place == "load":
-        return f"{head}{table}\n\nOtherwise as a disturbance of an output.\n"
+        return f"{head}{table}\n\nOtherwise as `{kind.effect}` above.\n"
     others = [other for other in kind.confusable if other != f"{place} {kind.effect}"]
     told = {
         "Signature": kind.signature,

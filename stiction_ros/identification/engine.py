@@ -9,11 +9,10 @@ from functools import partial
 
 import numpy as np
 
-from stiction_ros.effects import HeStiction
+from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.exact.further_fit import begun, settled, with_further_estimates
 from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
-from stiction_ros.identification.exact.one_step_best import one_step_best, seen
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.certificate import certificates
@@ -36,7 +35,6 @@ from stiction_ros.identification.result.identification import (
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
 from stiction_ros.identification.switching.patterns import has_cells
@@ -78,17 +76,12 @@ def identify_exact(
     report(0.5)
     data, model = settled(data, model, orders)
     model, delays = settle_delays(data, model, orders)
-    (valves, final), one_step = at_once(
-        lambda: judged_valves(record, data, model, linear, orders, options),
-        lambda: least_one_step(record, data, model, orders, options),
-    )
-    if one_step is not None and (final.friction[:, 0] == 0.0).any():
-        one_step = also_from(one_step, record, data, (model, final), orders)
+    valves, final = judged_valves(record, data, model, linear, orders, options)
     valves = with_further_estimates(data, final, orders, valves, options.confidence)
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
-    findings = Findings(final, valves, table, told, one_step)
-    answer = explained(record, conclude(record, data, findings, 0.0))
+    plain = conclude(record, data, Findings(final, valves, table, told), 0.0)
+    answer = explained(record, plain, close_loop(record, plain))
     return dataclasses.replace(answer, seconds=time.perf_counter() - begun)
 
 
@@ -132,29 +125,6 @@ def judged_valves(
         found.append((estimate, static, dynamic, verdict, figures, intervals.profile))
     valves = tuple(_valve(record, model, j, *entry, options) for j, entry in enumerate(found))
     return valves, model
-
-
-def least_one_step(
-    record: Record, data: Data, model: Model, orders: Orders, options: IdentificationOptions
-) -> SearchLog | None:
-    """Return the least one-step SE, where it is asked for and the law has it."""
-    if not options.one_step_best or data.law is not HeStiction:
-        return None
-    return one_step_best(record, data, model, orders)
-
-
-def also_from(
-    found: SearchLog, record: Record, data: Data, models: tuple[Model, Model], orders: Orders
-) -> SearchLog:
-    """Return the lesser of the SE found from the first model and that from the second.
-
-    The second has no friction where the first is doubted. Where neither has any, the same
-    would be found again.
-    """
-    if np.array_equal(seen(data, models[0]), seen(data, models[1])):
-        return found
-    again = one_step_best(record, data, models[1], orders)
-    return min(found, again, key=lambda log: log.squared_error)
 
 
 def choose(

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from stiction_ros.checks import one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
@@ -59,7 +60,6 @@ class IdentificationOptions:
         min_moves: fewest stem moves from which anything may be concluded.
         negligible_friction: f_S up to this is healthy, %.
         negligible_share: f_S up to this share of the OP span is healthy.
-        one_step_best: also find the friction and delays of least one-step SE (exact, He's law).
         check_columns: refuse a record in which OP and PV are clearly swapped.
 
     Raises:
@@ -85,7 +85,6 @@ class IdentificationOptions:
     min_moves: int = 6
     negligible_friction: float = 0.3
     negligible_share: float = 0.03
-    one_step_best: bool = True
     check_columns: bool = True
 
     @property
@@ -94,16 +93,9 @@ class IdentificationOptions:
         return "he" if self.law == AUTO else self.law
 
     def __post_init__(self) -> None:
-        if self.method not in METHOD_NAMES:
-            raise InputError(
-                f"unknown value {self.method!r}",
-                where="method",
-                fix=f"use {' | '.join(METHOD_NAMES)}",
-            )
-        if self.kind is not None and self.kind not in LOOP_KINDS:
-            raise InputError(
-                f"unknown kind {self.kind!r}", where="kind", fix=f"use {' | '.join(LOOP_KINDS)}"
-            )
+        one_of(self.method, METHOD_NAMES, "method")
+        if self.kind is not None:
+            one_of(self.kind, LOOP_KINDS, "kind", "kind")
         low, high = self.delay
         if not 0 <= low <= high:
             raise InputError(

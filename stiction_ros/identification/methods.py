@@ -8,14 +8,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from functools import partial
 
+from stiction_ros.checks import of_kind
 from stiction_ros.errors import InputError
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.problem.input_checks import refuse_swapped, swapped_columns
 from stiction_ros.identification.result.identification import Identification
 from stiction_ros.identification.side_by_side import at_once
+from stiction_ros.intake.record_file import record_of
 from stiction_ros.one_thread import one_thread
 from stiction_ros.records.record import Record
 
@@ -43,19 +46,19 @@ METHODS: Mapping[str, Method] = {"exact": _exact, "evidence": _by_evidence}
 
 
 def identify(
-    record: Record,
+    record: Record | str | os.PathLike[str],
     options: IdentificationOptions | None = None,
     progress: Progress | None = None,
 ) -> Identification:
     """Identify friction and linear dynamics of every valve and output of a record.
 
     Args:
-        record: what was measured.
+        record: what was measured, or the path of a file or bag of one loop.
         options: ``options.method`` names the search; None for the defaults.
         progress: called with the share done, 0 to 1.
 
     Raises:
-        InputError: a record that no model can be fitted to, or an option that the method
+        InputError: no record, one that no model can be fitted to, or an option that the method
             does not have, or OP and PV that are clearly swapped.
 
     Returns:
@@ -74,8 +77,10 @@ def identify(
         >>> print(valve.verdict, round(valve.static_friction), round(valve.dynamic_friction, 1))
         sticky 4 1.6
     """
+    measured = record_of(record)
+    chosen = IdentificationOptions() if options is None else options
     with one_thread():
-        return _identify(record, options or IdentificationOptions(), progress)
+        return _identify(measured, of_kind(chosen, IdentificationOptions, "options"), progress)
 
 
 def _identify(

@@ -7,6 +7,7 @@ import enum
 from collections.abc import Mapping
 from pathlib import Path
 
+from stiction_ros.checks import of_kind
 from stiction_ros.intake.sheets.stamps import DateOrder
 from stiction_ros.intake.words import WORDS, by_word
 
@@ -26,6 +27,9 @@ class OpUnit(enum.StrEnum):
     OTHER = "other"
     """Anything else; OP is taken as it is."""
 
+
+LETTERS = {"op": "V", "pv": "PV", "sp": "PV", "stem": "V"}
+"""Signal to what the tags of its valves or outputs begin with, where none are given."""
 
 TO_PERCENT = {
     OpUnit(unit): (100.0 / (high - low), -100.0 * low / (high - low))
@@ -61,8 +65,9 @@ class CsvColumns:
     is written there, ``TAG.OP``, ``TAG.PV`` … included.
 
     Attributes:
-        op: valve to column of its OP, default ``{"V1": "OP"}``.
-        pv: output to column, default ``{"PV1": "PV"}``.
+        op: valve to column of its OP, default ``{"V1": "OP"}``; a column alone is that of V1, a
+            list of them those of V1, V2, ….
+        pv: output to column, default ``{"PV1": "PV"}``; the same for PV1, PV2, ….
         sp: output to column of its set-point, default ``SP`` when it is there.
         stem: valve to column of its measured stem, default ``STEM`` when it is there.
         time: column of the time, default ``t``, then ``time`` or ``timestamp`` and the like.
@@ -79,6 +84,15 @@ class CsvColumns:
     sp: Mapping[str, str] | None = None
     stem: Mapping[str, str] | None = None
     time: str | None = None
+
+    def __post_init__(self) -> None:
+        for key, letter in LETTERS.items():
+            given: object = getattr(self, key)
+            if not isinstance(given, Mapping | None):
+                alone = [given] if isinstance(given, str) else given
+                fix = f"give a column, a list of them, or {{'{letter}1': 'COLUMN'}}"
+                columns = enumerate(of_kind(alone, list, key, fix))
+                object.__setattr__(self, key, {f"{letter}{k + 1}": name for k, name in columns})
 
 
 @dataclasses.dataclass(frozen=True)

@@ -96,7 +96,7 @@ def _not_automatic(
             return still
     likely = max(unknown, key=lambda word: moved.get(word, 0.0))
     raise InputError(
-        f"{name} shows {', '.join(sorted(words))}, of which it is not known which is automatic",
+        f"{name} shows {', '.join(sorted(words))}; it is not known which of them is automatic",
         fix=f"say which with --auto, such as --auto {shlex.quote(likely)}",
     )
 

@@ -78,7 +78,7 @@ def in_percent(
     for column in () if given else ops:
         if column.unit.casefold() in SEVERAL:
             raise InputError(
-                f"{column.name} is in {column.unit}, of which several ranges are usual",
+                f"{column.name} is in {column.unit}; several ranges are usual for this unit",
                 fix="say which with --op-unit 0-10v, --op-unit 1-5v or --op-unit 2-10v, or take "
                 f"OP as it is with --op-unit other {OR_ROW}",
             )

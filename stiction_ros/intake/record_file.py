@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+from stiction_ros.errors import InputError
 from stiction_ros.intake.intake import is_bag, one_loop
 from stiction_ros.intake.intake_options import CsvColumns, IntakeOptions
 from stiction_ros.records.parts import longest_part
 from stiction_ros.records.record import Record
 
 __all__ = ["CsvColumns", "is_bag", "read"]
+
+NO_RECORD = (
+    "give a Record: Record.from_arrays(time, op, pv), Record.from_dataframe(frame, op, pv), or "
+    "the path of a file"
+)
+"""What helps where something else than a record was given."""
+
+
+def record_of(given: Record | str | os.PathLike[str]) -> Record:
+    """Return a record, read from a file where its path is given.
+
+    Args:
+        given: by a user, of any type.
+
+    Raises:
+        InputError: it is neither a record nor a path, or the file cannot be read.
+    """
+    if isinstance(given, Record):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return read(os.fspath(given))
+    raise InputError(f"{type(given).__name__} is no record", where="record", fix=NO_RECORD)
 
 
 def read(

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from stiction_ros.checks import of_kind
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop.model import LoopModel, PiTuning
@@ -35,7 +36,7 @@ class ClosedLoopRun:
     """
 
     record: Record
-    pv_clean: FloatArray
+    pv_clean: FloatArray = dataclasses.field(repr=False)
 
 
 def simulate_closed_loop(
@@ -196,6 +197,7 @@ def simulate(
         >>> bool((record.op[:, 0] != record.stem[:, 0]).any())
         True
     """
+    of_kind(model, LoopModel, "model", "give LoopModel.load(path)")
     controller = own_controller(model)
     if set_points is None:
         set_points = SetPoints(model.outputs, np.zeros(1), model.pv0[None, :])

@@ -13,7 +13,7 @@ import yaml
 
 from stiction_ros.effects import Behaviour, FloatArray
 from stiction_ros.effects import from_mapping as effect_from_mapping
-from stiction_ros.errors import InputError
+from stiction_ros.errors import InputError, foreign
 from stiction_ros.loop.places import append_effect
 from stiction_ros.loop.yaml_effects import at_place, read_effects
 from stiction_ros.loop.yaml_process import Instrument, read_instruments, read_process
@@ -95,7 +95,14 @@ class LoopModel:
     controller: PiTuning | None
     provenance: tuple[Mapping[str, Any], ...]
     instruments: tuple[Instrument, ...]
-    document: Mapping[str, Any] = dataclasses.field(repr=False)
+    document: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        process = f"{self.process.kind} from {', '.join(self.valve_names)}"
+        return (
+            f"<LoopModel {self.name}: {process} to {', '.join(self.outputs)}, "
+            f"samples of {self.sample_time:g} s>"
+        )
 
     @classmethod
     def load(cls, path: Path | str) -> LoopModel:
@@ -174,6 +181,53 @@ class LoopModel:
             read_instruments(section, process.outputs),
             copy.deepcopy(dict(document)),
         )
+
+    @classmethod
+    def from_system(
+        cls,
+        system: Any,
+        sample_time: float,
+        dead_time: float = 0.0,
+        name: str = "loop",
+        **sections: Any,
+    ) -> LoopModel:
+        """Return the loop of a linear process behind ideal valves V1, V2, … of 0 to 100 %.
+
+        Args:
+            system: from stems, %, to PV: a state space or the transfer function of one valve of
+                scipy.signal or python-control, ``(num, den)`` with the highest power of s first,
+                or ``(A, B, C, D)``; time in s. One that is not discrete by its ``dt`` is sampled
+                with its stems held between samples.
+            sample_time: s.
+            dead_time: of all inputs, s; of a state space whole samples.
+            name: tag of the loop.
+            sections: of the YAML mapping, such as ``controller`` or ``operating_point``, which
+                else is 50 % and a PV of 0.
+
+        Raises:
+            InputError: no linear system, one that answers at once, or no sample time.
+
+        Examples:
+            >>> from stiction_ros import HeStiction, LoopModel, simulate
+            >>> tuning = {"kind": "pi", "gain": 1.0, "integral_time": 8.0}
+            >>> loop = LoopModel.from_system(([0.8], [8.0, 1.0]), 1.0, controller=tuning)
+            >>> sticky = loop.with_valve_effects({"V1": [HeStiction(4.0, 1.5)]})
+            >>> len(simulate(sticky, samples=300))
+            300
+        """
+        from stiction_ros.loop.systems import process_of
+
+        with foreign("system"):
+            process = process_of(system, sample_time, dead_time)
+        valves = list(process.get("delay", ("V1",)))
+        document = {
+            "loop": name,
+            "sample_time": sample_time,
+            "valves": [{"name": tag, "limits": [0.0, 100.0], "effects": []} for tag in valves],
+            "process": process,
+            "operating_point": {"op": dict.fromkeys(valves, 50.0)},
+        }
+        return cls.from_mapping(document | sections, name)
 
     @property
     def valve_names(self) -> tuple[str, ...]:

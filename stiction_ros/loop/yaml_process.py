@@ -23,8 +23,9 @@ from stiction_ros.processes import (
     StirredTank,
     TankParameters,
 )
+from stiction_ros.processes.sampled import equation, held
 
-_KINDS = ("arx", "state_space", "stirred_tank")
+_KINDS = ("arx", "state_space", "transfer_function", "stirred_tank")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +47,10 @@ def read_process(
 ) -> Process:
     """Build the process; ``point`` is the loop's operating point, read for linear kinds."""
     kind = section.choice("kind", _KINDS)
-    if kind == "arx":
+    if kind == "transfer_function":
+        section = _as_arx(section, valves, sample_time)
+        section.choice("kind", _KINDS)
+    if kind in ("arx", "transfer_function"):
         process = _read_arx(section, point, valves)
     elif kind == "state_space":
         process = _read_state_space(section, point, valves)
@@ -101,11 +105,43 @@ def _read_state_space(section: Section, point: Section, valves: tuple[str, ...])
     a, b, c = section.matrix("a"), section.matrix("b"), section.matrix("c")
     e = section.matrix("e") if "e" in section else np.zeros((len(a), 0))
     op0, pv0 = _read_point(point, valves, names)
+    late = section.section("delay", {})
+    delays = [late.integer(valve, 0) for valve in valves]
+    late.finish()
     try:
+        for j, delay in enumerate(delays):
+            for _ in range(delay):  # the stem of a sample before is one more state
+                a = np.block([[a, b[:, j : j + 1]], [np.zeros((1, len(a) + 1))]])
+                b = np.pad(b, ((0, 1), (0, 0)))
+                b[:, j] = np.eye(len(b))[-1]
+                c, e = np.pad(c, ((0, 0), (0, 1))), np.pad(e, ((0, 1), (0, 0)))
         model = LinearModel(a, b, c, e, np.zeros(len(a)), op0, pv0)
         return StateSpaceProcess(model, valves, names, noise, measured)
     except InputError as error:
         raise error.within(section.where) from None
+
+
+def _as_arx(section: Section, valves: tuple[str, ...], sample_time: float) -> Section:
+    """Return the section of continuous transfer functions as one of ARX equations."""
+    outputs = []
+    for entry in section.sections("outputs"):
+        num, den, late = entry.section("num"), entry.section("den"), entry.section("dead_time", {})
+        channels = {}
+        for valve in valves:
+            if valve not in num:
+                continue
+            dead_time = late.number(valve, 0.0, low=0.0)
+            try:
+                channels[valve] = held(
+                    num.numbers(valve), den.numbers(valve), dead_time, sample_time
+                )
+            except InputError as error:
+                raise error.within(f"{entry.where}.{valve}") from None
+        for each in (num, den, late):
+            each.finish()
+        kept = {k: v for k, v in entry.values.items() if k not in ("num", "den", "dead_time")}
+        outputs.append(kept | equation(channels))
+    return Section({**section.values, "outputs": outputs}, section.where)
 
 
 def _read_tank(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from stiction_ros.checks import number, shown
+from stiction_ros.checks import number, one_of, shown
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 
@@ -119,12 +119,7 @@ class Section:
 
     def choice(self, key: str, choices: tuple[str, ...], default: Any = _REQUIRED) -> str:
         """Return one of ``choices``."""
-        value = self.text(key, default)
-        if value not in choices:
-            raise InputError(
-                f"unknown value {value!r}", where=self.at(key), fix=f"use {' | '.join(choices)}"
-            )
-        return value
+        return one_of(self.text(key, default), choices, self.at(key))
 
     def number(
         self,

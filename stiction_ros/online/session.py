@@ -119,6 +119,9 @@ class Scenario:
     monitor_model: LoopModel | None = None
     valve_changes: tuple[ValveChange, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Scenario {self.name}: {self.samples} samples of {self.plant!r}, seed {self.seed}>"
+
     @classmethod
     def load(cls, path: Path | str) -> Scenario:
         """Read a ROS parameter file (``node: {ros__parameters: {…}}``).
@@ -210,6 +213,10 @@ class LiveRun:
     fits: tuple[FitUpdate, ...]
     looks: tuple[GapLook, ...] = ()
     findings: tuple[GapFinding, ...] = ()
+
+    def __repr__(self) -> str:
+        modes = ", ".join(f"{change.mode} from {change.sample}" for change in self.changes)
+        return f"<LiveRun of {len(self.run.record)} samples: {modes}; {len(self.fits)} fits>"
 
     @property
     def swap(self) -> ModeChange | None:

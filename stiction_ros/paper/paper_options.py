@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+from stiction_ros.checks import one_of
 from stiction_ros.errors import InputError
 from stiction_ros.identification import IdentificationOptions
 
@@ -51,12 +52,7 @@ class PaperOptions:
 
     def __post_init__(self) -> None:
         for key, known in (("method", METHOD_NAMES), ("grid_law", GRID_LAWS)):
-            if getattr(self, key) not in known:
-                raise InputError(
-                    f"unknown value {getattr(self, key)!r}",
-                    where=key,
-                    fix=f"use {' | '.join(known)}",
-                )
+            one_of(getattr(self, key), known, key)
         if not 1 <= self.starts <= 1000:
             raise InputError(f"{self.starts} lies outside 1 to 1000", where="starts")
         if not (math.isfinite(self.grid_step) and self.grid_step > 0.0):

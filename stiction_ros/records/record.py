@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -82,9 +82,8 @@ class Record:
                 continue
             values = np.array(values, dtype=float)
             if values.shape != (count, len(tags)):
-                raise InputError(
-                    f"{key} has shape {values.shape}, not {(count, len(tags))}", where=self.name
-                )
+                said = f"{key} has shape {values.shape}, not {(count, len(tags))}"
+                raise InputError(said, where=self.name, fix="Record.from_arrays takes vectors, too")
             if not np.isfinite(values).all():
                 wrong = ~np.isfinite(values).all(axis=1)
                 wrong &= True if bad is None else ~bad
@@ -93,6 +92,96 @@ class Record:
                     raise InputError(f"{key} is not finite at sample {row}", where=self.name)
             values.flags.writeable = False
             object.__setattr__(self, key, values)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: Any,
+        op: Any,
+        pv: Any,
+        sp: Any = None,
+        *,
+        stem: Any = None,
+        valves: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        op_unit: str | None = None,
+        name: str = "record",
+    ) -> Record:
+        """Return the record of arrays, checked and mended as a file is; of gaps the longest part.
+
+        Args:
+            time: of each sample, shape (N,), in s or as dates; or one number, the sample time in s.
+            op: controller outputs, shape (N,) or (N, m), %.
+            pv: process variables, shape (N,) or (N, p), engineering units.
+            sp: set-points, shape of ``pv``, or None.
+            stem: measured stem positions, shape of ``op``, %, or None.
+            valves: tags of the m valves, V1, V2, … by default.
+            outputs: tags of the p process variables, PV1, PV2, … by default.
+            op_unit: of OP where it is not in %, such as ``share``, ``ma`` or ``0-10v``.
+            name: for messages and reports.
+
+        Raises:
+            InputError: shapes that do not fit together, times that cannot be made regular, no
+                good samples, or an OP that may be in another unit than %.
+
+        Examples:
+            >>> import numpy as np
+            >>> from stiction_ros import Record
+            >>> op, pv = np.array([50.0, 51.0, 53.0, 52.0]), np.array([7.0, 7.0, 7.1, 7.3])
+            >>> record = Record.from_arrays([0.0, 0.5, 1.0, 1.5], op, pv)
+            >>> record.sample_time, record.op.shape
+            (0.5, (4, 1))
+        """
+        from stiction_ros.intake.arrays import record_from_arrays  # stands above, and loads slowly
+
+        signals = {"op": op, "pv": pv, "sp": sp, "stem": stem}
+        return record_from_arrays(time, signals, {"V": valves, "PV": outputs}, name, op_unit)
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: Any,
+        op: str | list[str] | Mapping[str, str],
+        pv: str | list[str] | Mapping[str, str],
+        sp: str | list[str] | Mapping[str, str] | None = None,
+        time: Any = None,
+        *,
+        stem: str | list[str] | Mapping[str, str] | None = None,
+        name: str = "record",
+        **reading: Any,
+    ) -> Record:
+        """Return the record of some columns of a table, read as those of a file are.
+
+        A column with the mode of the controller, or with qualities, counts as in a file.
+
+        Args:
+            frame: a DataFrame of pandas or Polars, or a mapping of columns.
+            op: column of OP; a list of them for the valves V1, V2, …; or valve to column.
+            pv: the same of PV, for the outputs PV1, PV2, …; or output to column.
+            sp: the same of the set-points of the same outputs, or None.
+            time: column of the times, or the times themselves, shape (N,), in s or as dates; None
+                takes an index of dates, durations or decimal seconds, or a column such as ``time``.
+            stem: as ``op``, of measured stem positions, %, or None.
+            name: for messages and reports.
+            reading: what the table does not tell: ``sample_time`` in s where it holds no times;
+                ``op_unit`` as :meth:`from_arrays`; ``time_unit`` of times that are numbers, such
+                as ``ms``; ``dates``, ``dmy`` or ``mdy``, of dates that are texts; ``automatic``,
+                what the mode shows in automatic.
+
+        Raises:
+            InputError: no such column, times that cannot be made regular, no good samples.
+
+        Examples:
+            >>> from stiction_ros import Record
+            >>> frame = {"t": [0, 1, 2], "valve": [50.0, 51.0, 53.0], "flow": [7.0, 7.0, 7.1]}
+            >>> record = Record.from_dataframe(frame, op="valve", pv={"FI1": "flow"}, time="t")
+            >>> record.outputs, len(record)
+            (('FI1',), 3)
+        """
+        from stiction_ros.intake.arrays import record_from_frame  # stands above, and loads slowly
+
+        columns = {"op": op, "pv": pv, "sp": sp, "stem": stem}
+        return record_from_frame(frame, columns, time, name, reading)
 
     def _check_mask(self, count: int) -> None:
         if self.mask is None:
@@ -106,6 +195,13 @@ class Record:
         mask = given.astype(np.uint8)
         mask.flags.writeable = False
         object.__setattr__(self, "mask", mask if mask.any() else None)
+
+    def __repr__(self) -> str:
+        signals = [f"OP of {', '.join(self.valves)}", f"PV of {', '.join(self.outputs)}"]
+        signals += [key for key in ("sp", "stem") if getattr(self, key) is not None]
+        cut = f" in {len(self.gaps) + 1} segments" if self.gaps else ""
+        size = f"{len(self)} samples of {self.sample_time:g} s{cut}"
+        return f"<Record {self.name}: {size}; {', '.join(signals)}>"
 
     def __len__(self) -> int:
         return len(self.op)

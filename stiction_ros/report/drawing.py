@@ -84,6 +84,9 @@ class Drawing:
         pixels.quantize(128, dither=Image.Dither.NONE).save(target, "png", optimize=True)
         return target.getvalue()
 
+    def _repr_png_(self) -> bytes:
+        return self.png
+
     def save(self, folder: Path) -> Path:
         """Write the figure into a folder, by its name, and return the file."""
         path = folder / f"{self.name}.png"

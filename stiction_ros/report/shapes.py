@@ -85,7 +85,7 @@ def draw_responses(
         truth: simulated loop, None when unknown.
         units: engineering unit of each PV where known.
     """
-    length = _settling(outputs, truth)
+    length = settling(outputs, truth)
     time = TimeAxis.spanning(length * record.sample_time)
     at = time(np.arange(length) * record.sample_time)
     rows = len(outputs)
@@ -169,7 +169,7 @@ def draw_curves(record: Record, estimate: FloatArray, true: FloatArray | None = 
     return Drawing("valve_curves", "Valve curves", caption, figure)
 
 
-def _settling(outputs: Sequence[Mapping[str, Any]], truth: LoopModel | None) -> int:
+def settling(outputs: Sequence[Mapping[str, Any]], truth: LoopModel | None) -> int:
     """Return after how many samples the slowest of the shown models has settled."""
     if truth is not None:
         linear = truth.process.linear(truth.sample_time)

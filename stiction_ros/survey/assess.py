@@ -25,7 +25,6 @@ from stiction_ros.survey.beats import beats
 from stiction_ros.survey.entry import Cycling, Entry, Status
 from stiction_ros.survey.pages.loop_page import loop_page
 from stiction_ros.survey.pages.words import cause_words
-from stiction_ros.survey.ranking import confidence
 from stiction_ros.survey.survey_options import SurveyOptions
 
 FEWEST = 100
@@ -161,7 +160,7 @@ def _judged(entry: Entry, record: Record, found: Identification) -> tuple[Entry,
         band_share=valve["band_share"],
         travel_per_hour=work.travel / hours,
         reversals_per_hour=work.reversals / hours,
-        confidence=confidence(valve, kind, round(work.reversals)),
+        probability=valve["probability"],
         evidence=valve["evidence"],
         notes=notes,
         beats=_beats(record, outputs.index(output), cycling),

@@ -50,7 +50,7 @@ class Entry:
         band_share: f_S + f_D over the width of OP's movement.
         travel_per_hour, reversals_per_hour: of the stem, as recorded.
         gain: measures now and by option, as ``stiction gain`` gives them.
-        confidence: in the verdict, 0 to 1, see :mod:`.ranking`.
+        probability: of friction in the valve, 0 to 1; None where a method does not tell.
         evidence: figures behind the verdict by name, as in ``identify --json``.
         cost_per_hour: what the cycle costs, where a cost was given.
         rank: place in the list, from 1.
@@ -80,7 +80,7 @@ class Entry:
     travel_per_hour: float | None = None
     reversals_per_hour: float | None = None
     gain: Mapping[str, Any] | None = None
-    confidence: float | None = None
+    probability: float | None = None
     evidence: Mapping[str, float] = dataclasses.field(default_factory=dict)
     cost_per_hour: float | None = None
     rank: int | None = None

@@ -86,4 +86,4 @@ def _period(entry: Entry) -> float:
 def _nearness(entry: Entry) -> tuple[int, float, float, str]:
     regular = 0.0 if entry.oscillation is None else entry.oscillation.regularity
     place = NEARNESS.get(entry.cause or "none", len(NEARNESS))
-    return place, -(entry.confidence or 0.0), -regular, entry.name
+    return place, -(entry.probability or 0.0), -regular, entry.name

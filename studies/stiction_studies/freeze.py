@@ -200,11 +200,16 @@ def _identification(found: Mapping[str, Any]) -> Answer:
 
 
 def _valves(valves: Any) -> list[Answer]:
-    return [
-        {key: valve[key] for key in VALVE_FIGURES if key in valve}
-        | {"delta_bic": (valve.get("evidence") or {}).get("delta_bic")}
-        for valve in valves
-    ]
+    frozen = []
+    for valve in valves:
+        evidence = valve.get("evidence") or {}
+        told = {key: valve[key] for key in VALVE_FIGURES if key in valve}
+        if valve.get("probability") is None:
+            told["delta_bic"] = evidence.get("delta_bic")
+        else:
+            told |= {"probability": valve["probability"], "gain": evidence["gain"]}
+        frozen.append(told)
+    return frozen
 
 
 def _gap(model: Any, record: Any) -> Answer:

@@ -18,7 +18,9 @@ T = TypeVar("T")
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
     """Add the option that says how many processes work."""
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="processes")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count(), metavar="N", help="number of processes"
+    )
 
 
 def seed_range(text: str) -> tuple[int, int]:

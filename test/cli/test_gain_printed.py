@@ -15,7 +15,7 @@ VERDICT = {
     "f_s_interval": [0.0, 2.5],
     "f_d": 0.5,
     "f_d_interval": [0.0, 1.0],
-    "confidence": 0.12,
+    "probability": 0.12,
 }
 
 
@@ -33,7 +33,7 @@ def test_a_terminal_of_80_columns_is_enough(
     )
     show(Gain("V1", "PV1", now, options), VERDICT)
     out = capsys.readouterr().out
-    assert out.startswith("V1 and PV1: undecided, f_S 1.25 % (0 to 2.5), f_D 0.5 % (0 to 1), conf")
+    assert out.startswith("V1 and PV1: undecided, f_S 1.25 % (0 to 2.5), f_D 0.5 % (0 to 1), P(fr")
     assert "does not decide" in " ".join(out.splitlines())
     assert "0.139 │ 0.121 │ 0.101 to 0.139" in " ".join(out.split())
     assert "1000 to 1200" in out

@@ -49,6 +49,7 @@ def test_a_named_effect_is_written_with_its_model(
     assert "The simulation lacks other gain in the process to PV1" in page
 
 
+@pytest.mark.trial
 def test_an_ambiguous_effect_has_a_code_of_its_own(files: Path) -> None:
     assert ran(files, "step.csv") == 3
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from stiction_ros.cli import extensions
-from stiction_ros.cli.main import COMMANDS, main, parser
+from stiction_ros.cli.main import COMMANDS, GROUPS, main, parser
 from stiction_ros.config_files import find_config
 from stiction_ros.effects import HeStiction
 
@@ -70,16 +71,30 @@ def test_what_is_misspelt_is_told_with_what_may_be_meant(
     assert "demo," not in err
 
 
-def test_help_says_of_every_command_what_the_command_says(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    told = []
-    for only in (None, ""):
-        with pytest.raises(SystemExit) as end:
-            parser(only).parse_args(["--help"])
-        assert end.value.code == 0
-        told.append(capsys.readouterr().out)
-    assert told[0] == told[1]
+def test_help_lists_each_command_once_in_short_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        parser("").parse_args(["--help"])
+    assert end.value.code == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 60
+    assert sorted(line.split()[0] for line in lines if line.startswith("  ")) == sorted(ALL)
+    groups = [line.partition(":")[0] for line in lines if ": " in line and line[0] != " "]
+    assert groups == ["usage", "find", "decide", "act", "live", "plant", "makers"]
+    grouped = [name for names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(COMMANDS)
+
+
+def test_every_option_says_what_it_is() -> None:
+    below = [parser()]
+    while below:
+        one = below.pop()
+        for action in one._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                below += action.choices.values()
+            else:
+                said = (action.help or "").split(" (")[0]
+                assert len(said) > 2, (one.prog, action.dest)
+                assert not said.startswith(("of ", "(", "default")), (one.prog, action.dest)
 
 
 def test_identify_lists_the_friction_laws(capsys: pytest.CaptureFixture[str]) -> None:

@@ -28,6 +28,7 @@ def found(place: str, effect: Behaviour) -> Discrepancy:
     return find_discrepancy(model, [record(model.with_effect(place, effect), seed=2)], QUICK)
 
 
+@pytest.mark.trial
 def test_a_step_of_the_load_is_told_from_one_of_the_output() -> None:
     answer = found("load:V1", StepDisturbance(430.0, 3.0))
     (effect,) = answer.effects

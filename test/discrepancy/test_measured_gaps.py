@@ -20,7 +20,7 @@ DATA = pathlib.Path(__file__).resolve().parents[3] / "shared" / "data"
 FRICTION = {"stiction", "backlash"}
 WORDS = {"time", "MODE"}
 
-pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+pytestmark = [pytest.mark.trial, pytest.mark.filterwarnings("error::RuntimeWarning")]
 
 
 def columns(path: pathlib.Path) -> dict[str, FloatArray]:

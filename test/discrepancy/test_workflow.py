@@ -77,12 +77,14 @@ def test_backlash_is_told_from_all_but_stiction() -> None:
     assert names <= {("valve:V1", "backlash"), ("valve:V1", "stiction")}
 
 
+@pytest.mark.trial
 def test_lags_are_left_in_doubt_with_their_family() -> None:
     answer = found("process:PV1", ExtraPole(8.0))
     names = {(e.place, e.effect) for e in answer.effects} | set(answer.alternatives)
     assert names == {("valve:V1", "lag"), ("process:PV1", "pole"), ("sensor:PV1", "lag")}
 
 
+@pytest.mark.trial
 def test_a_measured_stem_speaks_against_a_slow_valve() -> None:
     recorded = record(loop().with_effect("process:PV1", ExtraPole(8.0)), stem=True)
     answer = find_discrepancy(loop(), [recorded], QUICK)

@@ -6,10 +6,7 @@ import pytest
 
 from stiction_studies import freeze
 
-QUICK = (
-    *("field_50000", "bag_signals_only", "example1_measurement_exact"),
-    *("example1_measurement_grid", "blind_single_50004"),
-)
+QUICK = ("field_50000", "bag_signals_only", "example1_measurement_exact")
 
 
 def test_every_case_has_its_file_and_every_file_its_case() -> None:

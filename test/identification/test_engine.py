@@ -95,6 +95,7 @@ def test_json_has_the_keys_of_the_contract() -> None:
     assert found["valves"][0].keys() == {
         *("name", "verdict", "law", "f_s", "f_s_interval", "f_d", "f_d_interval", "jump"),
         *("band_interval", "band_share", "stability", "evidence", "experiment", "responds"),
+        "probability",
     }
     stability = found["valves"][0]["stability"]
     assert stability["agreed"] == [look["look"] for look in stability["tried"]]
@@ -127,7 +128,7 @@ def test_short_record_is_refused() -> None:
 
 
 def test_unknown_law_is_refused() -> None:
-    with pytest.raises(InputError, match="known laws: choudhury, he, kano"):
+    with pytest.raises(InputError, match=r"law: unknown friction law .*; use choudhury \| he"):
         identify(loops.example1(0, samples=400), IdentificationOptions(law="nobody"))
 
 
@@ -170,7 +171,7 @@ def test_friction_that_could_sit_in_either_of_two_valves_is_named() -> None:
     twins = Record("twins", 1.0, ("V1", "V2"), ("PV1",), np.repeat(record.op, 2, axis=1), record.pv)
     noise = 1e-6 * np.random.default_rng(0).standard_normal(twins.op.shape)
     twins = dataclasses.replace(twins, op=twins.op + noise)
-    options = dataclasses.replace(THIRD_ORDER, delay=(5, 5), one_step_best=False)
+    options = dataclasses.replace(THIRD_ORDER, delay=(5, 5))
     notes = identify(twins, options).notes
     assert any("friction in V" in note and "as well as in V" in note for note in notes)
 

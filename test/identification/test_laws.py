@@ -17,9 +17,7 @@ LAWS = [pytest.param("semi_physical", marks=pytest.mark.trial), *MOVING]
 
 
 def options(law: str) -> IdentificationOptions:
-    return IdentificationOptions(
-        "exact", output_order=3, input_order=3, law=law, one_step_best=False
-    )
+    return IdentificationOptions("exact", output_order=3, input_order=3, law=law)
 
 
 class Results(dict[str, tuple[Identification, FloatArray]]):

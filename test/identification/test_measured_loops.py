@@ -23,12 +23,14 @@ def load(name: str) -> Record:
     return Record(name, step, ("V1",), ("PV1",), columns["OP"][:, None], columns["PV"][:, None])
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("name", ["CHEM1", "CHEM10", "CHEM24", "PAP2"])
 def test_sticky_loop(name: str) -> None:
     """Contributors say *sticky* of a jump and of a deadband alike."""
     assert identify(load(name)).valves[0].verdict.has_friction
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("name", ["CHEM13", "PAP9"])
 def test_loop_that_oscillates_for_another_reason(name: str) -> None:
     assert not identify(load(name)).valves[0].verdict.has_friction

@@ -4,6 +4,9 @@ import dataclasses
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +16,8 @@ from stiction_ros.errors import InputError
 from stiction_ros.identification import METHODS, IdentificationOptions, identify, methods
 from stiction_ros.identification.evidence import engine
 from stiction_ros.identification.identification_options import METHOD_NAMES
+from stiction_ros.identification.linear.fit import fit_linear
+from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.record import Record
 
 SMALL = IdentificationOptions(output_order=1, input_order=1, delay=(5, 5), friction_limit=6.0)
@@ -31,6 +36,33 @@ def test_each_method_signs_its_result(method: str) -> None:
     assert document["model"]["method"] == method
     assert ("search" in document["model"]) is (found.search is not None)
     assert json.loads(json.dumps(document, allow_nan=False))["valves"][0]["name"] == "V1"
+
+
+def test_a_path_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record = loops.example1(0, samples=300)
+    write_csv(record, tmp_path / "loop.csv")
+    monkeypatch.setattr(methods, "_identify", lambda record, *_: record)
+    for path in (tmp_path / "loop.csv", str(tmp_path / "loop.csv")):
+        found: object = identify(path)
+        assert isinstance(found, Record)
+        assert np.array_equal(found.op, record.op)
+
+
+@pytest.mark.parametrize("call", [identify, fit_linear])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ([np.zeros(9), np.zeros(9)], r"ndarray is no record; give a Record: Record.from_arrays\("),
+        ([[1.0, 2.0]], "list is no record"),
+        (["no.csv"], "no.csv: no such file"),
+        ([loops.example1(0, samples=30), {"law": "he"}], "options: dict is no "),
+    ],
+)
+def test_what_is_no_record_gets_a_sentence(
+    call: Callable[..., object], given: list[Any], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        call(*given)
 
 
 @pytest.mark.trial
@@ -76,6 +108,7 @@ def test_a_node_that_fits_nothing_compiles_nothing() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.trial
 def test_casadi_is_left_alone_by_all_but_the_nonlinear_programme() -> None:
     code = (
         "import sys, stiction_ros.cli.main, stiction_ros.online.estimator.live; "

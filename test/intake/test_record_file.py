@@ -176,6 +176,7 @@ def test_errors_of_files_and_options(tmp_path: Path) -> None:
         read(tmp_path, "t,OP,PV\n0,1,2\n1,1,2\n", sp={"Q": "PV"})
 
 
+@pytest.mark.trial
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured loops of ../shared/data are missing")
 def test_measured_loops() -> None:
     files = [p for folder in ("isdb", "plant") for p in sorted((DATA / folder).glob("*.csv"))]

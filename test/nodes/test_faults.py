@@ -161,6 +161,7 @@ def level(graph: Graph, node: str) -> bytes:
     return OK
 
 
+@pytest.mark.trial
 def test_a_loop_in_real_time_notices_who_is_gone_and_goes_on(graph: Graph) -> None:
     built = start(graph, Pace.REALTIME, NODES)
     graph.spin_until(lambda: len(graph.seen["op"]) >= 10, "the loop to run")

@@ -50,7 +50,7 @@ def run() -> Iterator[Graph]:
         node.finish()
     graph.spin_some()
     graph.arrived = {topic: len(messages) for topic, messages in graph.seen.items()}
-    for topic in ("pv", "sp"):
+    for topic in ("pv", "sp", "op"):
         graph.seen[topic][:] = without_repeats(graph.seen[topic])
     yield graph
     graph.close()
@@ -71,7 +71,10 @@ def twin() -> LiveRun:
 
 
 def without_repeats(messages: list[Any]) -> list[Any]:
-    """Leave out what the plant shows again: after a second without OP, on a busy machine."""
+    """Leave out repeats: on a busy machine the plant shows PV again after a second without OP.
+
+    The controller answers a repeated PV with the same OP.
+    """
     pairs = itertools.pairwise(messages)
     return messages[:1] + [then for now, then in pairs if then != now]
 

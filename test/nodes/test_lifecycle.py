@@ -49,7 +49,12 @@ def state(node: Any) -> str:
 
 
 # The bridge needs a control system at the other end: test/opcua has its transitions.
-every_kind = pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "opcua"])
+NODES = [kind for kind in KINDS if kind != "opcua"]
+every_kind = pytest.mark.parametrize("kind", NODES)
+# The estimator's worker loads machine code at each start.
+every_kind_of_quick_start = pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=pytest.mark.trial if k == "estimator" else ()) for k in NODES]
+)
 
 
 @every_kind
@@ -60,7 +65,7 @@ def test_a_node_starts_by_itself(kind: str, graph: Graph, tmp_path: Path) -> Non
     assert (state(node), node.failure) == ("active", "")
 
 
-@every_kind
+@every_kind_of_quick_start
 def test_all_transitions_twice_over(kind: str, graph: Graph, tmp_path: Path) -> None:
     node = graph.add(kind, values(kind, tmp_path))
     for _ in range(2):
@@ -96,7 +101,7 @@ def test_a_node_deactivated_before_its_peers_came_stays_still(
     assert (state(node), node.running) == ("unconfigured", False)
 
 
-@every_kind
+@every_kind_of_quick_start
 def test_a_node_waits_for_its_peers(kind: str, graph: Graph, tmp_path: Path) -> None:
     node = graph.add(kind, values(kind, tmp_path) | {"wait_for": ["listener"]})
     node.start()
@@ -225,6 +230,7 @@ def test_an_accepted_value_retunes_the_controller(graph: Graph, tmp_path: Path) 
     assert node.settings.horizon == node.live.settings.horizon == 33
 
 
+@pytest.mark.trial
 def test_an_accepted_value_retunes_the_estimator(graph: Graph, tmp_path: Path) -> None:
     node = graph.add("estimator", values("estimator", tmp_path))
     node.start()

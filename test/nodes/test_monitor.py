@@ -138,6 +138,7 @@ def alone() -> Iterator[Graph]:
     graph.close()
 
 
+@pytest.mark.trial
 def test_it_can_be_turned_on_while_the_node_runs(alone: Graph, tmp_path: Path) -> None:
     alone.listen("recorder")
     loop().save(tmp_path / "known.loop.yaml")

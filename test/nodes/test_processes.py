@@ -117,6 +117,7 @@ def test_the_replay_gives_the_run_again_bit_for_bit(bag):
     assert found.notes == ()
 
 
+@pytest.mark.trial
 def test_a_second_run_gives_identical_pv_and_op(bag, tmp_path):
     first = read_run(bag).record
     second = read_run(run_processes(tmp_path)).record
@@ -165,7 +166,13 @@ def test_log_time_is_simulated_time(bag):
     assert max(abs(value) for value in late) <= 1.0  # one sample
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGINT,
+        *(pytest.param(n, marks=pytest.mark.trial) for n in (signal.SIGTERM, signal.SIGKILL)),
+    ],
+)
 def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
     out = tmp_path / "demo"
     # Tests that run in the background inherit a SIGINT that is ignored.
@@ -192,6 +199,7 @@ def test_an_ended_demo_leaves_no_process_behind(tmp_path, number):
     wait_until(lambda: not running(str(out)))
 
 
+@pytest.mark.trial
 def test_a_partner_that_was_killed_ends_a_run_in_lockstep_with_a_sentence(tmp_path):
     nodes = {name: dict(v) for name, v in Scenario.load(scenario(tmp_path)).nodes.items()}
     nodes["recorder"]["directory"] = str(tmp_path / "bag")

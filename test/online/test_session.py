@@ -55,6 +55,7 @@ def test_two_runs_with_one_seed_are_equal_bit_for_bit(siso: Scenario) -> None:
     assert [fit.end for fit in one.fits] == [399, 499, 599]
 
 
+@pytest.mark.trial
 def test_a_valve_of_another_law_than_the_embedded_one_is_never_called_healthy(
     siso: Scenario,
 ) -> None:
@@ -135,6 +136,7 @@ def test_ideal_valves_stay_ideal_whatever_changes(tmp_path: Path) -> None:
     assert np.array_equal(record.stem, record.op)
 
 
+@pytest.mark.trial
 def test_a_serviced_valve_is_noticed_and_the_window_begins_anew(siso: Scenario) -> None:
     scenario = quick(siso)
     changes = (ValveChange(540.0, "V1", ()),)

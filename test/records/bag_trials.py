@@ -1,7 +1,7 @@
 """How many random trials a test makes: few in every run, all when asked.
 
 ``STICTION_ALL_TRIALS=1 pytest test/records/bag/test_bag_damage.py
-test/nodes/test_recorder_kill.py`` makes the numbers that docs/bags.md reports.
+test/nodes/test_recorder_kill.py`` makes the numbers that studies/reports/ holds.
 """
 
 from __future__ import annotations

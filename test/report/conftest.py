@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,8 @@ import pytest
 from stiction_ros.loop import LoopModel
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.log import Estimate, Fit, ModeChange, RunLog, Text
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "survey"))
 
 SECOND = 10**9
 SAMPLES, ROUND, SWAP = 1200, 400, 500

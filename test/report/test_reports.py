@@ -10,9 +10,10 @@ import pytest
 from stiction_ros.identification import FitStatus, Identification, OutputModel, ValveEstimate
 from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.loop import LoopModel
+from stiction_ros.pages.frame import words
 from stiction_ros.records.run.log import RunLog
 from stiction_ros.report.drawing import TimeAxis
-from stiction_ros.report.page import duration, interval, number, words
+from stiction_ros.report.page import duration, interval, number
 from stiction_ros.report.record.report import report_record
 from stiction_ros.report.run.identified import valve_cards, verdict_line
 from stiction_ros.report.run.page import headline
@@ -105,7 +106,8 @@ def test_the_report_of_a_record(log: RunLog, tmp_path: Path, status: FitStatus) 
     assert "Valve V1 sticks" in page
     assert "5.00 % (4.90 … 5.10)" in page
     assert ("no model fits" in page) is not good
-    assert len(list((tmp_path / "out").glob("*.png"))) == (6 if good else 3)
+    assert page.count("<figure") == (8 if good else 5)
+    assert "<img" not in page
 
 
 def test_step_responses_agree_with_the_loop_model(model: LoopModel) -> None:

@@ -10,6 +10,8 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 _BEFORE = """<script>
@@ -26,25 +28,51 @@ addEventListener("load", () => {
   const all = [...document.body.querySelectorAll("*")].filter(seen);
   const wide = all.filter(element => !scrolled(element) &&
     element.getBoundingClientRect().right > innerWidth + 1).map(element => element.outerHTML);
-  const texts = [...document.querySelectorAll("h1, h2, .card, figcaption, td.name, th button")];
+  const texts = [...document.querySelectorAll("h1, h2, .card, figcaption, .name, th button")];
   const channel = value => { value /= 255;
     return value <= 0.04045 ? value / 12.92 : Math.pow((value + 0.055) / 1.055, 2.4); };
   const light = colour => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number);
     return 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b); };
   const paper = light(getComputedStyle(document.body).backgroundColor);
-  const contrast = element => { const style = getComputedStyle(element);
-    const own = light(element.ownerSVGElement && element.tagName !== "text" ? style.stroke
-      : element.ownerSVGElement ? style.fill : style.color);
-    return (Math.max(own, paper) + 0.05) / (Math.min(own, paper) + 0.05); };
-  const told = [...document.querySelectorAll("h1, p, td, th, text, polyline")].filter(seen);
-  const pale = told.filter(element => contrast(element) < 3).map(element => element.outerHTML);
+  const behind = element => { for (let at = element; at; at = at.parentElement) {
+    const colour = getComputedStyle(at).backgroundColor;
+    if (!colour.endsWith(", 0)")) return light(colour); }
+    return paper; };
+  const contrast = (element, colour) => { const own = light(colour), back = behind(element);
+    return (Math.max(own, back) + 0.05) / (Math.min(own, back) + 0.05); };
+  const speaks = element => [...element.childNodes].some(one => one.nodeType === 3 &&
+    one.textContent.trim());
+  const faint = element => { const style = getComputedStyle(element);
+    if (element.tagName === "polyline") return contrast(element, style.stroke) < 3;
+    return speaks(element) && contrast(element,
+      element.tagName === "text" ? style.fill : style.color) < 4.5; };
+  const enabled = all.filter(element => !element.disabled);
+  const pale = enabled.filter(faint).map(element => element.outerHTML);
+  const named = element => element.getAttribute("aria-label") || element.getAttribute("alt") ||
+    element.textContent.trim();
+  const heads = [...document.querySelectorAll("h1, h2, h3")].map(one => +one.tagName[1]);
+  const ids = [...document.querySelectorAll("[id]")].map(one => one.id);
+  const broken = [
+    ...[...document.querySelectorAll("button, input, select, a, img, [role=img], [role=group]")]
+      .filter(one => !named(one)).map(one => "no name: " + one.outerHTML),
+    ...[...document.querySelectorAll("th")].filter(one => !one.scope || !one.textContent.trim())
+      .map(one => "no head: " + one.outerHTML),
+    ...[...document.querySelectorAll("table")].filter(one => !one.querySelector("th"))
+      .map(() => "a table without heads"),
+    ...all.filter(one => one.scrollWidth > one.clientWidth + 1 && one.tabIndex < 0 &&
+      getComputedStyle(one).overflowX === "auto").map(one => "no keyboard: " + one.className),
+    ...heads.filter((level, k) => k ? level > heads[k - 1] + 1 || level === 1 : level !== 1)
+      .map(level => "heading out of order: h" + level),
+    ...ids.filter((id, k) => ids.indexOf(id) !== k).map(id => "twice: " + id),
+    ...(document.documentElement.lang && document.title ? [] : ["no language or no title"]),
+    ...(document.querySelectorAll("main").length === 1 ? [] : ["no main part"])];
   let acted = {};
   try { acted = (() => { ACT })() || {}; } catch (error) { said.push(String(error)); }
   parent.postMessage(JSON.stringify({
     width: innerWidth, scroll: document.documentElement.scrollWidth,
     dark: matchMedia("(prefers-color-scheme: dark)").matches, wide: wide.slice(0, 3),
     empty: texts.filter(element => seen(element) && !element.innerText.trim()).length,
-    pale: pale.slice(0, 3), paper, said, acted,
+    pale: pale.slice(0, 3), broken: broken.slice(0, 3), paper, said, acted,
     fetched: performance.getEntriesByType("resource").map(one => one.name),
     text: document.body.innerText }), "*");
 });
@@ -100,3 +128,20 @@ def probe(page: Path, width: int, *, dark: bool, act: str = "") -> dict[str, Any
     assert found is not None, done.stderr[-2000:]
     seen: dict[str, Any] = json.loads(html.unescape(found[1]))
     return seen
+
+
+needs_browser = pytest.mark.skipif(chromium() is None, reason="no Chromium is installed")
+
+
+def check(seen: dict[str, Any], width: int, dark: bool) -> None:
+    """Assert that a page can be read at a width, in light or dark, by eye, keyboard and ear."""
+    assert seen["width"] == width
+    assert seen["dark"] is dark
+    assert (seen["paper"] < 0.2) is dark
+    assert seen["scroll"] <= width, seen["wide"]
+    assert seen["wide"] == [], seen["wide"]
+    assert seen["said"] == [], seen["said"]
+    assert seen["empty"] == 0
+    assert seen["pale"] == [], seen["pale"]
+    assert seen["broken"] == [], seen["broken"]
+    assert seen["fetched"] == [], seen["fetched"]

@@ -40,7 +40,8 @@ def entry(name: str, verdict: str = "sticky", cause: str = "valve", **rest: Any)
         "band_share": 0.5,
         "travel_per_hour": 200.0,
         "reversals_per_hour": 60.0,
-        "confidence": 0.9,
+        "probability": 0.9,
+        "evidence": {"loop_gone": 0.5},
     }
     return Entry(
         name, (f"{name}.csv",), Status.OK, verdict=verdict, cause=cause, **{**values, **rest}

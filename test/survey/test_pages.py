@@ -4,24 +4,19 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from browser import chromium, probe
+from browser import check, needs_browser, probe
 from made import GAIN, entry, identification, record
 
 from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.groups import Group
-from stiction_ros.survey.listing.columns import HINTS
 from stiction_ros.survey.listing.page import list_page
 from stiction_ros.survey.listing.saved import in_words
 from stiction_ros.survey.pages.loop_page import loop_page
-from stiction_ros.survey.pages.plot import MOST, Curve, over_time
 from stiction_ros.survey.pages.trend import Earlier, trend_of, with_trend
 from stiction_ros.survey.pages.unit import with_unit
 from stiction_ros.survey.pages.words import in_op_unit, period
 from stiction_ros.survey.survey import Survey
-
-needs_browser = pytest.mark.skipif(chromium() is None, reason="no Chromium is installed")
 
 EARLIER = (
     Earlier("2023-11-02 03:04+00:00", {"FIC-101.A": 1.0, "OLD1": None}),
@@ -33,10 +28,10 @@ COLUMNS = {"now": GAIN["now"], **{option["what"]: option for option in GAIN["opt
 
 def _survey() -> Survey:
     rows = [
-        entry("FIC-101.A", gain=COLUMNS, rank=1, group=1, cost_per_hour=12.5, confidence=0.6),
+        entry("FIC-101.A", gain=COLUMNS, rank=1, group=1, cost_per_hour=12.5, probability=0.6),
         entry("A_VERY_LONG_TAG_OF_A_REFINERY:2411PDIC10321_0606_0007", rank=2, group=1),
-        entry("LIC7", "undecided", "disturbance", confidence=0.3, rank=3),
-        entry("<b>TIC</b>", "healthy", "none", oscillation=None, confidence=0.95, rank=4),
+        entry("LIC7", "undecided", "disturbance", probability=0.3, rank=3),
+        entry("<b>TIC</b>", "healthy", "none", oscillation=None, probability=0.95, rank=4),
         Entry("XIC", ("x.csv",), Status.FAILED, "its stamps are <wrong>; say --dates day", rank=5),
     ]
     rows[0] = dataclasses.replace(rows[0], report="loops/FIC-101.A.html")
@@ -61,24 +56,12 @@ def loop_file(tmp_path: Path) -> Path:
     return page
 
 
-def _check(seen: dict[str, Any], width: int, dark: bool) -> None:
-    assert seen["width"] == width
-    assert seen["dark"] is dark
-    assert (seen["paper"] < 0.2) is dark
-    assert seen["scroll"] <= width, seen["wide"]
-    assert seen["wide"] == []
-    assert seen["said"] == []
-    assert seen["empty"] == 0
-    assert seen["pale"] == []
-    assert seen["fetched"] == []
-
-
 @needs_browser
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [1400, 390])
 def test_the_list_is_readable(list_file: Path, width: int, dark: bool) -> None:
     seen = probe(list_file, width, dark=dark)
-    _check(seen, width, dark)
+    check(seen, width, dark)
     for words in ("2 valves to look at", "<b>TIC</b>", "its stamps are <wrong>", "likely source"):
         assert words in seen["text"]
 
@@ -104,7 +87,7 @@ def test_a_list_with_all_columns_and_the_longest_words_is_readable(
     earlier = (Earlier("2023-11-02 03:04+00:00", {row.name: 0.0735123 for row in rows}),)
     page = tmp_path / "survey.html"
     page.write_text(list_page(Survey("local", 2, 12.0, rows, ()), earlier), encoding="utf-8")
-    _check(probe(page, width, dark=False), width, dark=False)
+    check(probe(page, width, dark=False), width, dark=False)
 
 
 @needs_browser
@@ -112,7 +95,7 @@ def test_a_list_with_all_columns_and_the_longest_words_is_readable(
 @pytest.mark.parametrize("width", [1400, 390])
 def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool) -> None:
     seen = probe(loop_file, width, dark=dark)
-    _check(seen, width, dark)
+    check(seen, width, dark)
     for words in ("The valve sticks", "3 values were held", "m³/h", "service the valve"):
         assert words in seen["text"]
 
@@ -121,10 +104,10 @@ def test_the_page_of_a_loop_is_readable(loop_file: Path, width: int, dark: bool)
 def test_the_list_sorts_filters_and_searches(list_file: Path) -> None:
     act = """
       const names = () => [...document.querySelectorAll("table.list tbody tr")]
-        .filter(row => !row.hidden).map(row => row.querySelector("td.name").innerText);
+        .filter(row => !row.hidden).map(row => row.querySelector(".name").innerText);
       const head = [...document.querySelectorAll("th button")]
-        .find(one => one.innerText.startsWith("confidence"));
-      head.click(); const up = names(); head.click(); const down = names();
+        .find(one => one.innerText.startsWith("probability"));
+      head.click(); const down = names(); head.click(); const up = names();
       const put = (id, value) => { const input = document.getElementById(id);
         input.value = value; input.dispatchEvent(new Event("input")); };
       put("kind", "healthy"); const healthy = names(); put("kind", "");
@@ -141,28 +124,36 @@ def test_the_list_sorts_filters_and_searches(list_file: Path) -> None:
 
 
 @needs_browser
-def test_a_figure_is_zoomed_by_dragging_and_comes_back(loop_file: Path) -> None:
+def test_figures_of_one_time_are_zoomed_together_and_come_back(loop_file: Path) -> None:
     act = """
-      const figure = document.querySelector("figure.plot[data-low]");
-      const svg = figure.querySelector("svg"), area = svg.querySelector("svg");
-      const box = svg.getBoundingClientRect(), y = box.top + box.height / 2;
-      const at = (kind, share) => svg.dispatchEvent(new PointerEvent(kind,
-        { clientX: box.left + share * box.width, clientY: y, bubbles: true }));
-      const before = area.getAttribute("viewBox");
+      const figures = [...document.querySelectorAll("figure.plot[data-low]")]
+        .filter(one => +one.dataset.low === 0);
+      const boxes = () => figures.map(one => one.querySelector("svg svg").getAttribute("viewBox"));
+      const svg = figures[0].querySelector("svg"), box = svg.getBoundingClientRect();
+      const at = (kind, share) => svg.dispatchEvent(new PointerEvent(kind, { bubbles: true,
+        clientX: box.left + share * box.width, clientY: box.top + box.height / 2 }));
+      const before = boxes();
       at("pointerdown", 0.4); at("pointerup", 0.6);
-      const zoomed = area.getAttribute("viewBox").split(" ").map(Number);
+      const zoomed = boxes();
       const ticks = [...svg.querySelectorAll("g.x text")].map(tick => +tick.textContent);
-      const shown = !figure.querySelector("button").hidden;
-      figure.querySelector("button").click();
-      return { wide: +before.split(" ")[2], zoomed, ticks, shown,
-        back: area.getAttribute("viewBox").split(" ").map(Number)[2] };
+      const bar = figures[0].previousElementSibling;
+      const press = name => [...bar.children].find(one => one.textContent === name).click();
+      const shown = !bar.lastChild.disabled;
+      press("all"); const back = boxes();
+      press("closer"); const closer = boxes()[1]; press("later"); const later = boxes()[1];
+      return { before, zoomed, ticks, shown, back, closer, later };
     """
     acted = probe(loop_file, 1400, dark=False, act=act)["acted"]
-    assert acted["zoomed"][2] == pytest.approx(0.2 * 960 / 880 * acted["wide"], rel=0.02)
-    assert acted["back"] == pytest.approx(acted["wide"])
+    wide = float(acted["before"][0].split()[2])
+    assert float(acted["zoomed"][0].split()[2]) == pytest.approx(0.2 * 960 / 856 * wide, rel=0.02)
+    assert acted["zoomed"][1] == acted["zoomed"][0]  # OP goes with PV
+    assert acted["back"] == acted["before"]
     assert acted["shown"]
     assert len(acted["ticks"]) >= 2
     assert all(6.0 < tick < 14.0 for tick in acted["ticks"])
+    x, width = (float(acted["closer"].split()[k]) for k in (0, 2))
+    assert (x / wide, width / wide) == pytest.approx((0.25, 0.5))
+    assert float(acted["later"].split()[0]) == pytest.approx(0.5 * wide)
 
 
 def test_pages_hold_all_they_show(list_file: Path, loop_file: Path) -> None:
@@ -176,18 +167,6 @@ def test_tags_and_reasons_are_no_html(list_file: Path) -> None:
     source = list_file.read_text(encoding="utf-8")
     assert "<b>TIC" not in source
     assert "&lt;b&gt;TIC" in source
-
-
-def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
-    values = np.zeros(50_000)
-    values[31_234] = 7.0
-    values[100:200] = np.nan
-    figure = over_time("t", np.arange(50_000.0), "s", [Curve("PV", "pv", values)], "PV")
-    lines = [part.split('"')[0] for part in figure.split('points="')[1:]]
-    assert len(lines) == 2
-    points = [tuple(map(float, pair.split(","))) for line in lines for pair in line.split()]
-    assert len(points) <= 1.2 * MOST
-    assert min(y for _, y in points) < 0.1 * max(y for _, y in points)
 
 
 def test_a_trend_is_put_into_the_page_once(loop_file: Path) -> None:
@@ -245,7 +224,7 @@ def test_the_list_says_what_is_saved_or_why_nothing_is(tmp_path: Path) -> None:
 def test_every_heading_says_what_it_means(list_file: Path) -> None:
     source = list_file.read_text(encoding="utf-8")
     assert '<button type="button">' not in source.partition("</thead>")[0]
-    assert len(HINTS) == source.count('<button type="button" title="')
+    assert source.count("<dt>") == source.count('<button type="button" title="')
 
 
 def test_causes_have_one_wording(list_file: Path) -> None:
@@ -269,7 +248,7 @@ def test_an_op_in_its_own_unit_is_no_percent() -> None:
     page = loop_page(row, of, identification(of), None)
     assert "has gone back by 3 units" in page
     assert "takes 50 % of OP" in page
-    assert "OP, OP&#x27;s own unit" in page
+    assert "OP of V1, OP&#x27;s own unit" in page
     assert (
         in_op_unit("by 2 %, which is 5 % of OP's range", "%")
         == "by 2 %, which is 5 % of OP's range"

@@ -23,7 +23,7 @@ KEYS = {
     *("name", "files", "status", "reason", "samples", "sample_time", "auto_share"),
     *("saturated_share", "oscillation", "verdict", "cause", "f_s", "f_s_interval", "f_d"),
     *("f_d_interval", "band_share", "travel_per_hour", "reversals_per_hour", "gain", "rank"),
-    *("confidence", "group", "report"),
+    *("probability", "group", "report"),
 }
 
 
@@ -169,7 +169,7 @@ def test_the_tables_hold_the_list(tmp_path: Path) -> None:
     assert tuple(read[0]) == HEAD
     assert read[1][HEAD.index("loop")] == 'FIC "1", ü'
     assert float(read[1][HEAD.index("|PV−SP| now")]) == 2.0
-    assert float(read[1][HEAD.index("|PV−SP| serviced %")]) == -75.0
+    assert float(read[1][HEAD.index("|PV−SP| after service %")]) == -75.0
     assert read[1][HEAD.index("cycles by")] == "its valve"
     sheet = openpyxl.load_workbook(tmp_path / "l.xlsx")["loops"]
     values = list(sheet.values)

@@ -32,9 +32,11 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         group.add_argument(
             f"--{option}", action="append", type=_pair, default=[], metavar="TAG=COL", help=text
         )
-    group.add_argument("--time", metavar="COL", help="seconds or dates")
+    group.add_argument("--time", metavar="COL", help="column of the times: seconds or dates")
     parser.add_argument(
-        "--namespace", metavar="NS", help="of the loop's topics, for a bag that holds several loops"
+        "--namespace",
+        metavar="NS",
+        help="namespace of the topics of the loop, where a bag holds several loops",
     )
 
 
@@ -49,47 +51,52 @@ def add_intake(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     group.add_argument(
         "--tags",
         metavar="F",
-        help="table loop,pv,sp,op,mode with the tags of each loop, with file for one file alone",
+        help="table with a head loop,pv,sp,op,mode: the tags of each loop; a column file "
+        "names the file of a loop",
     )
     if not many:
-        group.add_argument("--loop", metavar="NAME", help="of several loops in a file")
+        group.add_argument("--loop", metavar="NAME", help="the loop, where a file holds several")
     group.add_argument(
         "--op-unit",
         type=OpUnit,
         choices=tuple(OpUnit),
         metavar="UNIT",
-        help=f"what OP is counted in: {', '.join(OpUnit)} (default: as the export says, or %%)",
+        help=f"unit of OP: {', '.join(OpUnit)} (default: the unit in the export, else %%)",
     )
     group.add_argument(
         "--time-unit",
         type=TimeUnit,
         choices=tuple(TimeUnit),
         metavar="UNIT",
-        help=f"what times that are numbers are counted in: {', '.join(TimeUnit)}",
+        help=f"unit of times that are numbers: {', '.join(TimeUnit)}",
     )
     group.add_argument(
-        "--dates", type=DateOrder, choices=tuple(DateOrder), help="day or month first in dates"
+        "--dates",
+        type=DateOrder,
+        choices=tuple(DateOrder),
+        help="whether the day or the month is first in dates",
     )
     group.add_argument(
         "--sample-time",
         type=float,
         metavar="S",
-        help="s, for signals kept when they changed and for rows without a time",
+        help="seconds between samples, for signals that are stored on change and for rows "
+        "without a time",
     )
     group.add_argument(
         "--long",
         type=_three,
         metavar="TAG,TIME,VALUE",
-        help="columns of a table with one value a row, where they are not found",
+        help="columns of a table with one value in each row, where they are not found",
     )
     group.add_argument(
-        "--auto", action="append", metavar="WORD", help="what MODE shows in automatic"
+        "--auto", action="append", metavar="WORD", help="word that MODE shows in automatic"
     )
+    group.add_argument("--strict", action="store_true", help="refuse a file that needs repairs")
     group.add_argument(
-        "--strict", action="store_true", help="refuse what would have to be repaired"
-    )
-    group.add_argument(
-        "--dry-run", action="store_true", help="show what would be read from where, and stop"
+        "--dry-run",
+        action="store_true",
+        help="show what would be read and from which columns, then stop",
     )
 
 

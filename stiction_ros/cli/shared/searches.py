@@ -43,7 +43,7 @@ def add_law(parser: Any) -> None:
         default="auto",
         metavar="LAW",
         help=f"friction law: {' | '.join(laws())}, or auto: for each valve he, or another that "
-        "explains PV clearly better; he with other methods than the default (default: auto)",
+        "explains PV clearly better (default: auto; with other methods than evidence: he)",
     )
 
 
@@ -53,14 +53,14 @@ def add_search_options(parser: Any) -> None:
         "--friction-limit",
         type=friction_limit,
         metavar="F[,F]",
-        help="largest friction tried in %%, one for all valves or one for each (default: what OP "
-        "spans; methods of the paper: what its sustained oscillation spans)",
+        help="largest friction to try, %%: one for all valves or one for each (default: the range "
+        "of OP; methods of the paper: the range of its cycle)",
     )
     parser.add_argument(
         "--starts",
         type=int,
         metavar="M",
-        help="first guesses of methods nlp and nlp_printed for every delay (default: 7)",
+        help="starts for each delay, for methods nlp and nlp_printed (default: 7)",
     )
     parser.add_argument(
         "--grid-step", type=float, metavar="S", help="step of method grid in %% (default: 0.5)"

@@ -96,6 +96,10 @@ class Discrepancy:
     seconds: float
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        named = ", ".join(f"{found.effect} at {found.place}" for found in self.effects)
+        return f"<Discrepancy {self.verdict}{f': {named}' if named else ''}>"
+
     @property
     def not_considered(self) -> tuple[NotConsidered, ...]:
         """Every behaviour that was no candidate and is not named, with the reason.

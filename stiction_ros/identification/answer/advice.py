@@ -23,7 +23,7 @@ def advised(
         options: of the method; ``kind`` is what is known of the loop beforehand.
     """
     valves = tuple(
-        dataclasses.replace(valve, experiment=experiment_for(record, found, j, options))
+        dataclasses.replace(valve, experiment=experiment_for(record, found, j))
         if valve.verdict is VerdictKind.UNDECIDED
         else valve
         for j, valve in enumerate(found.valves)

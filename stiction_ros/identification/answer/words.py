@@ -31,14 +31,13 @@ def why(found: Identification, valve: int) -> str:
     name, kind = estimate.name, estimate.verdict
     band = estimate.static_friction + estimate.dynamic_friction
     if kind is VerdictKind.UNDECIDED:
-        return estimate.experiment.partition(". ")[0].rstrip(".") + "."
+        reason = estimate.experiment.partition(". ")[0].rstrip(".") + "."
+        cause = cause_of(found, valve)
+        if cause is None or cause.kind is not CauseKind.NONE or estimate.is_likely:
+            return reason
+        return f"The loop does not oscillate: nothing to repair is visible. {reason}"
     if kind is VerdictKind.HEALTHY:
         high = estimate.static_interval[1]
-        if estimate.evidence.get("by_loop"):
-            return (
-                f"Simulated without friction, the loop of {name} moves as recorded; what friction "
-                f"this record does not rule out, f_S up to {high:.2g} %, moves it hardly more."
-            )
         return f"The stem of {name} follows OP: f_S above {high:.2g} % is ruled out by this record."
     rests = f"When OP turns, the stem of {name} rests until OP has gone back by {band:.2g} %"
     if kind is VerdictKind.BACKLASH:

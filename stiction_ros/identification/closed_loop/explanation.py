@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 
 from stiction_ros.identification.closed_loop.closed_loop import (
     ClosedLoop,
     LoopStatus,
     OutputLoop,
     ValveLoop,
-    close_loop,
 )
 from stiction_ros.identification.closed_loop.damping import Ringing
 from stiction_ros.identification.result.cause import Cause, CauseKind
@@ -21,10 +19,6 @@ from stiction_ros.signals.oscillation import REGULAR
 ENDLESS = 1e6
 """Stands in the figures for a movement that grows without end."""
 
-BELIEVED = 10.0
-"""BIC by which a friction that is not found must beat the friction-free model to be a cause: very
-strong evidence."""
-
 MATERIAL = 0.15
 """Share of OP's movement that must go away with the friction for the valve to be the cause."""
 
@@ -34,15 +28,8 @@ LEFT_OVER = 0.25
 MANY_TIMES = 3.0
 """Movement over the recorded one from which on a repeated loop is another one."""
 
-SURE = 40.0
-"""Evidence beyond the margin from which on a friction is not doubted for what a model of the loop
-says, unless that grows without end: the linear process and the controller are less certain."""
-
 LINE = 6.0
 """BIC gain from which on a line from outside is believed: strong evidence by Kass and Raftery."""
-
-WIDEST = 0.4
-"""Of the range of OP: a wider band is not believed beside a wave from outside."""
 
 RIVAL = 0.3
 """BIC gain of a line alone over that of the friction from which on the friction may be fitted to a
@@ -51,10 +38,6 @@ wave from outside. Of valves that make their loop cycle it is below 0: no clock 
 PLAIN_LINE = 60.0
 """BIC gain from which on a line shows an oscillation that is too short or too faint to be regular
 by its autocorrelation."""
-
-ECHO = 25.0
-"""From which on what the friction-free fit leaves of PV repeats itself a turn later; where it is
-white the most of a thousand lags exceeds 20 in one record of 250."""
 
 PLAIN_SHARE = 0.5
 """Share of the variance from which on a line is an oscillation though it has too few cycles for a
@@ -89,14 +72,21 @@ SAME_PERIOD = 1.3
 """Factor within which the loop rings at the period of the oscillation."""
 
 
-def explained(record: Record, found: Identification) -> Identification:
-    """Return the identification with causes, and with what the closed loop says of each valve."""
-    closed = close_loop(record, found)
+def explained(record: Record, found: Identification, closed: ClosedLoop) -> Identification:
+    """Return the identification with causes, and with what the closed loop says of each valve.
+
+    Args:
+        record: what was measured.
+        found: with the verdict on each valve.
+        closed: its loops.
+    """
     valves = tuple(
         dataclasses.replace(
             valve,
             band_share=loop.band_share,
-            evidence={**valve.evidence, **figures(loop, closed)},
+            evidence=valve.evidence
+            if valve.figures is not None
+            else {**valve.evidence, **figures(loop, closed)},
         )
         for valve, loop in zip(found.valves, closed.valves, strict=True)
     )
@@ -137,39 +127,6 @@ def figures(loop: ValveLoop, closed: ClosedLoop) -> dict[str, float]:
     return {name: max(-ENDLESS, min(value, ENDLESS)) for name, value in told.items()}
 
 
-def beside_wave(told: Mapping[str, float]) -> bool:
-    """Tell whether waves from outside were tried beside the friction of these figures."""
-    return any(name.startswith("wave_") for name in told)
-
-
-def is_echoed(told: Mapping[str, float]) -> bool:
-    """Tell whether friction may be fitted to a wave from outside that keeps no exact time.
-
-    A valve that sticks makes its loop cycle, and without its friction the cycle is left over, which
-    repeats itself as well; but then the friction gains far more than that.
-
-    Args:
-        told: figures behind the verdict on a valve; without ``echo`` there is no such wave.
-    """
-    echo = told.get("echo", 0.0)
-    rival = echo > RIVAL * told.get("delta_bic", 0.0)
-    return echo > ECHO and rival and told.get("outside_line", 0.0) < PLAIN_LINE
-
-
-def is_wave_itself(told: Mapping[str, float], band_share: float) -> bool:
-    """Tell whether a stem cannot be told from a wave from outside.
-
-    With a band as wide it goes to and fro once in each turn of the wave, and is one of this
-    period itself.
-
-    Args:
-        told: figures of the valve, those of its closed loop included.
-        band_share: f_S + f_D over the range of OP.
-    """
-    line = told.get("outside_line", 0.0) > LINE
-    return line and beside_wave(told) and band_share > WIDEST
-
-
 def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> Cause:
     """Return why output ``i`` oscillates."""
     output = closed.outputs[i]
@@ -193,8 +150,7 @@ def cause(record: Record, found: Identification, closed: ClosedLoop, i: int) -> 
 
 def _is_cause(valve: ValveEstimate, loop: ValveLoop) -> bool:
     """Tell whether the friction of a valve makes its loop move."""
-    believed = valve.verdict.has_friction or valve.evidence.get("delta_bic", 0.0) > BELIEVED
-    return believed and (_gone(loop) > MATERIAL or _open_and_sure(valve, loop))
+    return valve.is_likely and (_gone(loop) > MATERIAL or _open_and_sure(valve, loop))
 
 
 def _gone(loop: ValveLoop) -> float:
@@ -233,7 +189,7 @@ def _open_and_sure(valve: ValveEstimate, loop: ValveLoop) -> bool:
     What goes away without the friction is then nobody's to say, and acquits no valve.
     """
     known = loop.controller is not None and loop.controller.r_squared > OPEN
-    return not known and valve.evidence.get("delta_bic", 0.0) >= SURE
+    return not known and valve.verdict.has_friction
 
 
 def _kind(

@@ -8,13 +8,9 @@ import numpy as np
 
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.evidence.candidate import (
-    Candidate,
-    Judge,
-    candidates_apart,
-)
+from stiction_ros.identification.evidence.candidate import Judge
 from stiction_ros.identification.evidence.fit_problem import LIMIT, Problem
-from stiction_ros.identification.evidence.search import APART, Found
+from stiction_ros.identification.evidence.search import Found
 from stiction_ros.identification.friction.grid import coarse_grid, finer_grid
 
 Interval = tuple[float, float]
@@ -24,7 +20,6 @@ MISFIT = 0.1
 """Share of the evidence for friction itself on which no friction is rejected: no valve obeys a
 law to the letter, and what the law misses weighs as much as what it explains grows."""
 HARMLESS = 0.08  # of the range of OP: a valve is healthy when all larger bands are rejected
-OTHERS = 6  # frictions that are not rejected, looked at one by one
 STEPS = (0.3, 0.1, 0.03, 0.01, 0.003)  # of f_S + f_D: grids round the best
 OUTWARDS = 0.01 * np.arange(1.0, 13.0)
 """Shares of f_S + f_D past the ends of what is accepted: as far as to the next node of a grid."""
@@ -95,20 +90,6 @@ def accepted(problem: Problem, found: Found, valve: int, confidence: float) -> A
         material_gain=found.without[valve].loss - material,
         profile=_profile(rows[:, 0], lost),
     )
-
-
-def not_rejected(found: Found, valve: int, confidence: float) -> list[Candidate]:
-    """Return what the search met and the record does not reject, frictions apart, best first.
-
-    Args:
-        found: by the search.
-        valve: index.
-        confidence: level.
-    """
-    slack = _slack(found.without[valve].loss - found.best.loss, confidence)
-    near = [one for one in found.met if one.loss <= found.best.loss + slack]
-    rubbing = [one for one in near if one.friction[valve, 0] > 0.0]
-    return candidates_apart(rubbing, valve, OTHERS, APART)
 
 
 def _slack(gain: float, confidence: float) -> float:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
 from stiction_ros.identification.engine import order_row
-from stiction_ros.identification.evidence.accepted import not_rejected
-from stiction_ros.identification.evidence.candidate import Candidate
-from stiction_ros.identification.evidence.echoes import echo
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.further import with_further
 from stiction_ros.identification.evidence.laws import with_own_laws
+from stiction_ros.identification.evidence.measured_figures import figures_of
 from stiction_ros.identification.evidence.output_fit import OutputFit
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
@@ -27,23 +27,15 @@ from stiction_ros.identification.evidence.rates import (
     liveliest,
     looks,
 )
-from stiction_ros.identification.evidence.response import responds
+from stiction_ros.identification.evidence.response import loss_without_response, responds
 from stiction_ros.identification.evidence.sensor_hold import hold_notes
 from stiction_ros.identification.evidence.unseen import Unseen
-from stiction_ros.identification.evidence.verdict import (
-    acquits,
-    confirms,
-    doubted,
-    stem_is_wave,
-    verdict_of,
-)
 from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.identification_options import IdentificationOptions
 from stiction_ros.identification.inference.conclusion import Findings, conclude
-from stiction_ros.identification.inference.verdict import (
-    half_gains,
-    is_deadband,
-)
+from stiction_ros.identification.inference.verdict import half_gains, is_deadband
+from stiction_ros.identification.judgement.figures import Figures
+from stiction_ros.identification.judgement.probability import friction_probability, verdict_of
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -91,7 +83,7 @@ def identify_by_evidence(
     part = liveliest(record)
     seen, told = with_own_laws(looks(part, options), options)
     report(0.7)
-    found = answered(record, data, part, seen, options)
+    found = concluded(record, data, part, seen, options)
     report(1.0)
     notes = [
         f"friction of {v}: {said}" for v, said in zip(record.valves, told, strict=True) if said
@@ -100,206 +92,118 @@ def identify_by_evidence(
     return dataclasses.replace(found, seconds=time.perf_counter() - begun)
 
 
-def answered(
+def concluded(
     record: Record, data: Data, part: Record, seen: tuple[Look, ...], options: IdentificationOptions
 ) -> Identification:
-    """Return what is concluded of what the rates show.
+    """Return process, probabilities, verdicts and causes by what the rates show.
 
     Args:
         record, data: the whole, and made ready.
-        part: of it that was looked at.
+        part: of it that was searched.
         seen: each rate of that.
         options: of the search.
     """
-    valves = tuple(
-        _judged(part, seen, j, options, agreement(seen, j)) for j in range(len(part.valves))
+    agreed = tuple(agreement(seen, j) for j in range(len(part.valves)))
+    best = tuple(_estimate(part, one, j, options) for j, one in enumerate(agreed))
+    found = _identification(record, data, part, options, best)
+    closed = close_loop(record, found)
+    silent = [[loss_without_response(look, j) for look in seen] for j in range(len(agreed))]
+    told = [figures_of(seen, silent[j], one, j, closed) for j, one in enumerate(agreed)]
+    best = tuple(
+        dataclasses.replace(one, responds=responds(seen, silent[j], j, options.confidence))
+        for j, one in enumerate(best)
     )
-    heard = _Heard(record, data, part, data if part is record else prepare(part, options), options)
-    looped = heard.confirmed(seen, heard.without_waves(seen, valves))
-    looped = heard.acquitted(seen, looped)
     judged = tuple(
-        dataclasses.replace(doubted(valve), responds=responds(seen, j, options.confidence))
-        for j, valve in enumerate(looped.valves)
+        _judged(estimate, figures, partial(_stability, seen, one, j, record.sample_time))
+        for j, (estimate, figures, one) in enumerate(zip(best, told, agreed, strict=True))
     )
-    surest = max(judged, key=lambda valve: valve.evidence["delta_bic"])
-    return dataclasses.replace(
-        looped,
-        valves=judged,
-        row_samples=round(surest.evidence["rate"]),
-    )
+    if any(valve.verdict is VerdictKind.HEALTHY for valve in judged):
+        found = _identification(record, data, part, options, judged)
+        closed = close_loop(record, found)
+    found = explained(record, dataclasses.replace(found, valves=judged), closed)
+    surest = max(agreed, key=lambda one: one.gain)
+    return dataclasses.replace(found, row_samples=surest.look.problem.rate)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Heard:
-    """A record, and the part of it that is searched, which may be all of it.
-
-    Attributes:
-        record, data: the whole, and made ready.
-        part, small: the part, and made ready.
-        options: of the search.
-    """
-
-    record: Record
-    data: Data
-    part: Record
-    small: Data
-    options: IdentificationOptions
-
-    def looped(self, valves: tuple[ValveEstimate, ...]) -> Identification:
-        """Return the process for the stems of these valves, and their loops closed again."""
-        model, table = _process(self.small, self.options, valves, self.part)
-        if self.part is not self.record:
-            valves, model = _over_all(self.record, self.data, valves, model)
-        findings = Findings(model, valves, table, (), None)
-        concluded = conclude(self.record, self.data, findings, 0.0)
-        return explained(self.record, dataclasses.replace(concluded, method="evidence"))
-
-    def without_waves(
-        self, seen: tuple[Look, ...], valves: tuple[ValveEstimate, ...]
-    ) -> Identification:
-        """Return :meth:`looped`, by frictions behind which no wave is left where there are such.
-
-        A wave that enters behind a valve is there whatever its friction is: one that another
-        friction takes away, which the record does not reject, was left by the first.
-        """
-        best = self.looped(valves)
-        for j, valve in enumerate(best.valves):
-            if not (valve.verdict.has_friction and stem_is_wave(valve)):
-                continue
-            look = agreement(seen, j).look
-            for other in not_rejected(look.found, j, self.options.confidence)[1:]:
-                tried = list(valves)
-                tried[j] = _at(valves[j], other, look, self.part)
-                found = self.looped(tuple(tried))
-                if not stem_is_wave(found.valves[j]):
-                    valves, best = tuple(tried), found
-                    break
-        return best
-
-    def confirmed(self, seen: tuple[Look, ...], found: Identification) -> Identification:
-        """Return ``found``, with frictions that one rate shows alone and their loop confirms.
-
-        A record that is slower than its controller shows nothing in means of samples. Then the
-        loop is the second witness: closed again it moves as recorded, less without the friction,
-        and nothing else explains that it moves. Beside a wave from outside it is none, as that
-        moves with any stem.
-        """
-        if any(look.wave_gain is not None for look in seen):
-            return found
-        best = found
-        for j, valve in enumerate(found.valves):
-            if valve.verdict is not VerdictKind.UNDECIDED:
-                continue
-            shown = [one for look in seen if (one := Agreement.alone(look, j)).gain > 0.0]
-            for one in sorted(shown, key=lambda agreed: -agreed.gain):
-                if not (one.look.carries_news and one.held):
-                    continue
-                tried = list(best.valves)
-                tried[j] = _judged(self.part, seen, j, self.options, one)
-                if not tried[j].verdict.has_friction:
-                    continue
-                again = self.looped(_by_loop(tried, j))
-                if confirms(again, j):
-                    best = again
-                    break
-        return best
-
-    def acquitted(self, seen: tuple[Look, ...], found: Identification) -> Identification:
-        """Return ``found``, undecided valves healthy whose loop moves as recorded without friction.
-
-        What else explains the movement has to do so beside valves that follow OP, too.
-        """
-        best = found
-        for j, valve in enumerate(found.valves):
-            if valve.verdict is not VerdictKind.UNDECIDED or not acquits(best, seen, j):
-                continue
-            tried, agreed = list(best.valves), agreement(seen, j)
-            tried[j] = _judged(self.part, seen, j, self.options, agreed, VerdictKind.HEALTHY)
-            again = self.looped(_by_loop(tried, j))
-            if acquits(again, seen, j):
-                best = again
-        return best
-
-
-def _by_loop(valves: Sequence[ValveEstimate], valve: int) -> tuple[ValveEstimate, ...]:
-    """Return estimates, of which that of one valve says that its loop is a witness."""
-    told = list(valves)
-    told[valve] = dataclasses.replace(
-        told[valve], evidence={**told[valve].evidence, "by_loop": 1.0}
-    )
-    return tuple(told)
-
-
-def _at(valve: ValveEstimate, other: Candidate, look: Look, record: Record) -> ValveEstimate:
-    """Return an estimate with the friction of another candidate, which its intervals hold."""
-    j = record.valves.index(valve.name)
-    span = float(look.problem.span[j])
-    static, dynamic = (span * float(value) for value in other.friction[j])
-    return dataclasses.replace(
-        valve,
-        static_friction=static,
-        dynamic_friction=dynamic,
-        stem_start=float(record.op[0, j]) + span * float(other.starts[j]),
-        jump=0.0 if valve.jump == 0.0 else static - dynamic,
-    )
-
-
-def _judged(
+def _identification(
     record: Record,
-    seen: tuple[Look, ...],
-    valve: int,
+    data: Data,
+    part: Record,
     options: IdentificationOptions,
-    agreed: Agreement,
-    verdict: VerdictKind | None = None,
+    valves: tuple[ValveEstimate, ...],
+) -> Identification:
+    """Return the process for the stems of these valves, over the whole record."""
+    small = data if part is record else prepare(part, options)
+    model, table = _process(small, options, valves, part)
+    if part is not record:
+        valves, model = _over_all(record, data, valves, model)
+    findings = Findings(model, valves, table, ())
+    return dataclasses.replace(conclude(record, data, findings, 0.0), method="evidence")
+
+
+def _estimate(
+    record: Record, agreed: Agreement, valve: int, options: IdentificationOptions
 ) -> ValveEstimate:
-    """Return the estimate of one valve at the rate of ``agreed``; its verdict may be known."""
+    """Return the friction of one valve that explains the record best, not yet judged."""
     problem, found = agreed.look.problem, agreed.look.found
     span = float(problem.span[valve])
-    held = agreed.look.accepted[valve].times(span)
-    figures = evidence_of(agreed, valve)
-    for look in seen:
-        figures[f"gain_{look.problem.rate}"] = look.accepted[valve].gain
-        if look.wave_gain is not None:
-            figures[f"wave_{look.problem.rate}"] = look.wave_gain
-        figures[f"band_high_{look.problem.rate}"] = span * look.accepted[valve].band[1]
-    figures["echo"] = max(echo(look.problem, look.found.without[valve]) for look in seen)
-    verdict = verdict or verdict_of(figures, agreed, seen, valve, options)
-    healthy = verdict is VerdictKind.HEALTHY
-    unseen = Unseen(0.0, 0.0) if healthy else Unseen.of(span * problem.op[valve])
-    ends = [unseen.static(held.static), unseen.dynamic(held.dynamic), unseen.band(held.band)]
-    if not verdict.has_friction:
-        ends = [(0.0, high) for _, high in ends]
-    chosen = found.without[valve] if healthy else found.best
+    held, chosen = agreed.look.accepted[valve].times(span), found.best
+    unseen = Unseen.of(span * problem.op[valve])
     static, dynamic = (span * float(value) for value in chosen.friction[valve])
     deadband = is_deadband(held.deadband_loss, held.static, held.dynamic)
     estimate = ValveEstimate(
         name=record.valves[valve],
-        verdict=verdict,
+        verdict=VerdictKind.UNDECIDED,
         law=str(problem.laws[valve].law),
         static_friction=static,
-        static_interval=ends[0],
+        static_interval=unseen.static(held.static),
         dynamic_friction=dynamic,
-        dynamic_interval=ends[1],
-        band_interval=ends[2],
+        dynamic_interval=unseen.dynamic(held.dynamic),
+        band_interval=unseen.band(held.band),
         jump=0.0 if deadband else static - dynamic,
         stem_start=float(record.op[0, valve]) + span * float(chosen.starts[valve]),
         moves=int(np.count_nonzero(np.diff(chosen.stems[valve]))),
-        evidence=figures,
+        evidence={},
         profile=held.profile,
-        stability=_stability(seen, agreed, valve, figures, (healthy, record.sample_time)),
     )
     return with_further(estimate, problem, found, valve, options.confidence)
 
 
+def _judged(
+    estimate: ValveEstimate, figures: Figures, stability: Callable[[bool], Stability]
+) -> ValveEstimate:
+    """Return the estimate with its probability and verdict, and how that holds.
+
+    Where friction is not sure the intervals begin at 0; a healthy valve has none.
+    """
+    probability = friction_probability(figures)
+    verdict = verdict_of(probability, figures, estimate.jump == 0.0)
+    judged = dataclasses.replace(
+        estimate,
+        verdict=verdict,
+        probability=probability,
+        figures=figures,
+        evidence=figures.to_json(),
+        stability=stability(verdict is VerdictKind.HEALTHY),
+    )
+    if verdict.has_friction:
+        return judged
+    band = judged.sum_interval
+    judged = dataclasses.replace(
+        judged,
+        static_interval=(0.0, judged.static_interval[1]),
+        dynamic_interval=(0.0, judged.dynamic_interval[1]),
+        band_interval=(0.0, band[1]),
+    )
+    if verdict is VerdictKind.UNDECIDED:
+        return judged
+    return dataclasses.replace(judged, static_friction=0.0, dynamic_friction=0.0, jump=0.0, moves=0)
+
+
 def _stability(
-    seen: tuple[Look, ...],
-    agreed: Agreement,
-    valve: int,
-    figures: dict[str, float],
-    told: tuple[bool, float],
+    seen: tuple[Look, ...], agreed: Agreement, valve: int, sample_time: float, healthy: bool
 ) -> Stability:
-    """Return what every rate and both halves say; ``told`` is (healthy, s between samples)."""
-    healthy, sample_time = told
+    """Return what every rate and both halves say; ``sample_time`` in s."""
     band = agreed.look.accepted[valve].band
     views = []
     for look in seen:
@@ -310,28 +214,8 @@ def _stability(
         name = f"rows of {look.problem.rate * sample_time:g} s"
         shown = held.times(float(look.problem.span[valve]))
         views.append(View(name, held.gain, agrees, shown.band))
-    gains = figures["half_1"], figures["half_2"]
+    gains = _half_gains(agreed.look, valve)
     return Stability((*views, *halves(gains, PRICE if healthy else None)))
-
-
-def evidence_of(agreed: Agreement, valve: int) -> dict[str, float]:
-    """Return the named figures behind the verdict on one valve."""
-    problem, found = agreed.look.problem, agreed.look.found
-    best, without = found.best, found.without[valve]
-    equals = [agreed.look] if agreed.tied is None else [agreed.look, agreed.tied]
-    halves = np.min([_half_gains(look, valve) for look in equals], axis=0)
-    return {
-        "delta_bic": agreed.gain,
-        "free_run_ratio": _free_run(problem, without) / _free_run(problem, best),
-        "half_1": float(halves[0]),
-        "half_2": float(halves[1]),
-        "share": float(best.friction[valve, 0]),
-        "moves": float(np.count_nonzero(np.diff(best.stems[valve]))),
-        "rate": float(problem.rate),
-        "alike": float(agreed.alike),
-        "held": float(agreed.held),
-        "deadband_loss": agreed.look.accepted[valve].deadband_loss,
-    }
 
 
 def _half_gains(look: Look, valve: int) -> tuple[float, float]:
@@ -345,10 +229,6 @@ def _half_gains(look: Look, valve: int) -> tuple[float, float]:
 
 def _innovations(problem: Problem, fit: OutputFit) -> FloatArray:
     return innovations(fit.noise, fit.rest)[problem.first :]
-
-
-def _free_run(problem: Problem, candidate: Candidate) -> float:
-    return float(sum(np.sum(fit.rest[problem.first :] ** 2) for fit in candidate.fits))
 
 
 def _over_all(

@@ -65,7 +65,6 @@ BESIDE = 10.0
 INEXACT = 0.03
 """Share of a wave's own gain that it must gain besides: no wave is one to the letter, and what it
 misses moves in time with it, as a friction may."""
-TIED = 2.0  # of −2 log likelihood: two gains that differ by less are the same
 UNDIED = 0.1  # of the largest tap: a response whose last tap is larger goes on beyond it
 
 
@@ -122,10 +121,6 @@ class Look:
             if tuning is not None and tuning.valve == valve
         )
 
-    def speaks(self, valve: int) -> bool:
-        """Return whether the process beside the best friction is one that the controller holds."""
-        return self.is_held(valve, self.found.best)
-
     def sees_process(self, valve: int) -> bool:
         """Return whether what this rate takes for the process is the one that is controlled.
 
@@ -153,20 +148,16 @@ class Agreement:
             likelihood.
         alike: whether the bands that they accept overlap, but for :data:`ALIKE`, and both rates
             have a say.
-        tied: the other one, where which of both has more evidence only tells where a fit has ended.
-        held: whether both speak of processes that the controller holds.
     """
 
     look: Look
     gain: float
     alike: bool
-    tied: Look | None = None
-    held: bool = True
 
     @classmethod
     def alone(cls, look: Look, valve: int) -> Agreement:
         """Return what one rate says, its word taken for as much as that of two."""
-        return cls(look, look.beyond_price(valve), look.covers(valve), held=look.speaks(valve))
+        return cls(look, look.beyond_price(valve), look.covers(valve))
 
 
 def price_beside(wave_gain: float | None) -> float:
@@ -272,16 +263,14 @@ def agreement(seen: tuple[Look, ...], valve: int) -> Agreement:
     """Return the neighbouring rates that agree best on a valve's friction."""
     if len(seen) == 1:
         return Agreement.alone(seen[0], valve)
-    say, speak, pairs = _with_a_say(seen, valve), [look.speaks(valve) for look in seen], []
+    say, pairs = _with_a_say(seen, valve), []
     for k, two in enumerate(itertools.pairwise(seen)):
         bands = [look.accepted[valve].band for look in two]
         low, high = max(band[0] for band in bands), min(band[1] for band in bands)
         gains = [look.beyond_price(valve) for look in two]
         alike = low <= ALIKE * high and say[k] and say[k + 1]
         more = gains.index(max(gains))
-        tied = two[1 - more] if max(gains) - min(gains) < TIED else None
-        held = speak[k] and speak[k + 1]
-        pairs.append(Agreement(two[more], min(gains), alike, tied, held))
+        pairs.append(Agreement(two[more], min(gains), alike))
     return max(pairs, key=lambda pair: (pair.alike, pair.gain))
 
 

@@ -23,11 +23,13 @@ from stiction_ros.signals.autoregression import LOAD
 ROUNDED = 2.0
 """Steps of rounding by which a rounded value may change after it has repeated: one when it crosses
 a border of rounding slowly, two when noise carries it over the next."""
-MOST_HELD = 0.95  # of the rows: a sensor that holds more leaves nothing to restore from
 
 
 def held_rows(pv: FloatArray) -> BoolArray:
     """Return which rows repeat the last value before a jump that rounding cannot make, (N,).
+
+    The step of rounding is the least difference of any two values: where values are not rounded it
+    is next to nothing, and all repeats are held, as by a sensor that reports by exception.
 
     Args:
         pv: one output, shape (N,).
@@ -36,7 +38,7 @@ def held_rows(pv: FloatArray) -> BoolArray:
     still = moves <= 1e-9 * max(float(np.ptp(pv)), 1e-300)
     if still.all():
         return np.ones(len(pv), dtype=bool)
-    step = float(moves[~still].min())
+    step = float(np.diff(np.unique(pv)).min())
     ends = np.append(np.flatnonzero(~still), len(moves))  # moves that end a run of repeats
     jumps = np.append(moves[ends[:-1]] > ROUNDED * step * (1.0 + 1e-6), False)
     run = np.searchsorted(ends, np.arange(len(moves)))
@@ -86,7 +88,7 @@ def restored(record: Record, options: IdentificationOptions) -> Record:
         options: of the fit.
     """
     held = np.array([held_rows(column) for column in record.pv.T])
-    held[held.mean(axis=1) > MOST_HELD] = False
+    held[held.all(axis=1)] = False
     if refresh(record)[0] > 1 or not held.any():
         return record
     pv, rows = record.pv.copy(), np.arange(len(record))

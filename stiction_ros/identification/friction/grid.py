@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.checks import one_of
 from stiction_ros.effects import Behaviour, FloatArray, FrictionLaw, Stiction, behaviours
 from stiction_ros.errors import InputError
 
@@ -34,14 +35,12 @@ def find_law(name: str) -> type[FrictionLaw]:
         InputError: no such law, or one that is not identified.
     """
     known = laws()
-    if name not in known:
-        fix = f"known laws: {', '.join(known)}"
-        for kind in _stictions():
-            if kind.law == name:
-                reason = f"law {name!r} is not identified: {_refusal(kind)}"
-                raise InputError(reason, where="law", fix=fix)
-        raise InputError(f"unknown friction law {name!r}", where="law", fix=fix)
-    return known[name]
+    for kind in _stictions():
+        if kind.law == name and name not in known:
+            fix = f"known laws: {', '.join(known)}"
+            reason = f"law {name!r} is not identified: {_refusal(kind)}"
+            raise InputError(reason, where="law", fix=fix)
+    return known[one_of(name, known, "law", "friction law")]
 
 
 def triangle(limit: float, steps: int, first: int = 1) -> FloatArray:

@@ -16,7 +16,6 @@ from stiction_ros.identification.result.identification import (
     OutputModel,
     ValveEstimate,
 )
-from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.records.record import Record
 
 
@@ -29,14 +28,12 @@ class Findings:
         valves: the estimates.
         orders: all orders that were compared.
         remarks: sentences for people on ambiguities and on what is exact.
-        one_step: the least SE and what it belongs to, or None.
     """
 
     model: Model
     valves: tuple[ValveEstimate, ...]
     orders: tuple[OrderRow, ...]
     remarks: tuple[str, ...]
-    one_step: SearchLog | None
 
 
 def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Identification:
@@ -45,7 +42,7 @@ def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Ide
     stem = model.stems.T + record.op.mean(axis=0)
     stem.flags.writeable = False
     outputs = tuple(output_model(record, i, fit, data) for i, fit in enumerate(model.fits))
-    notes = [*record.notes, *found.remarks, *_one_step_notes(record, model, found.one_step)]
+    notes = [*record.notes, *found.remarks]
     for j, tag in enumerate(record.valves):
         if record.op[:, j].min() < 0.0 or record.op[:, j].max() > 100.0:
             notes.append(f"op of {tag} lies outside 0 to 100 %; friction is in the op's own units")
@@ -67,7 +64,6 @@ def conclude(record: Record, data: Data, found: Findings, seconds: float) -> Ide
         outputs=outputs,
         stem=stem,
         notes=tuple(notes),
-        search=found.one_step,
         orders=found.orders,
     )
 
@@ -91,17 +87,3 @@ def output_model(record: Record, i: int, fit: OutputFit, data: Data) -> OutputMo
         fit_one_step=nrmse_fit(tail, tail - fit.innovations),
         fit_free_run=free,
     )
-
-
-def _one_step_notes(record: Record, model: Model, best: SearchLog | None) -> list[str]:
-    if best is None or best.delays == model.delays:
-        return []
-    told = []
-    for output, chosen, other in zip(record.outputs, model.delays, best.delays, strict=True):
-        for valve, now, then in zip(record.valves, chosen, other, strict=True):
-            if now != then:
-                told.append(
-                    f"delay of {valve} to {output}: {now} by the free run under the noise model, "
-                    f"{then} by least one-step SE"
-                )
-    return told

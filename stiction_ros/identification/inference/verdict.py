@@ -9,14 +9,6 @@ Evidence, all under the noise model:
 - ``half_1``, ``half_2``: −2 log likelihood gained by friction in either half of the record.
 - ``share``: f_S over the OP span; ``moves``: number of stem moves.
 - ``deadband_loss``: −2 log likelihood lost by J = 0.
-- ``wave_1`` … ``wave_8``: −2 log likelihood that waves from outside add at a rate, where they were
-  tried beside the friction.
-- ``gain_1`` … ``gain_8``, ``band_high_1`` …: −2 log likelihood that friction adds at a rate, and
-  the largest band f_S + f_D that this does not reject, %.
-- ``alike``, ``held``: 1 where two rates agree on the band, and where both speak of processes that
-  the controller would hold.
-- ``echo``: how strongly what is left without friction repeats itself a turn later.
-- ``by_loop``: 1 where the loop closed again is a witness to the verdict beside the rates.
 - ``patterns``, ``patterns_closed``: switching patterns enumerated round the best, and whether
   all at the edge were rejected.
 - ``stem_error``: mean squared error of the stem, %², where the record holds the true one (the
@@ -41,23 +33,6 @@ one parameter that it has less."""
 SMALL_JUMP = 0.25
 """Jump, as a share of f_S + f_D, up to which friction is a deadband: a stem that is moved by the
 controller's own kicks tells f_S + f_D alone, and any jump may go with it."""
-
-SCARCE = 2.0
-"""Times the least number of moves below which a stem moves so seldom that many frictions give the
-same few moves, one of which may meet a load by chance."""
-OF_FEW = 10.0
-"""−2 log likelihood that such a friction must gain more: halves of records in which nothing sticks
-showed frictions of six to eight moves that gained up to 4 beyond the price."""
-
-
-def price_of_few(moves: float, least: int) -> float:
-    """Return what a friction by which a stem moves seldom must gain more.
-
-    Args:
-        moves: of the stem over the record.
-        least: fewest that a friction is judged by.
-    """
-    return OF_FEW if moves < SCARCE * least else 0.0
 
 
 def evidence(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import time
 from collections.abc import Callable
 
 import numpy as np
 
+from stiction_ros.checks import of_kind, one_of
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification.linear.data import (
@@ -33,6 +35,7 @@ from stiction_ros.identification.linear.subspace import (
     fit_state_space,
 )
 from stiction_ros.identification.linear.subspace_projection import SubspaceMethod
+from stiction_ros.intake.record_file import record_of
 from stiction_ros.records.record import Record
 from stiction_ros.signals.velocity_form import explained
 
@@ -76,6 +79,12 @@ class LinearOptions:
     method: SubspaceMethod = SubspaceMethod.CVA
 
     def __post_init__(self) -> None:
+        for key, kind in (
+            ("kind", LinearKind),
+            ("criterion", OrderCriterion),
+            ("method", SubspaceMethod),
+        ):
+            object.__setattr__(self, key, one_of(getattr(self, key), kind, key))
         space = self.kind is LinearKind.STATE_SPACE
         polynomial = (self.output_order, self.input_order, self.noise_order)
         if space and any(value is not None for value in polynomial):
@@ -98,7 +107,7 @@ class LinearOptions:
 
 
 def fit_linear(
-    record: Record,
+    record: Record | str | os.PathLike[str],
     options: LinearOptions | None = None,
     stem: FloatArray | None = None,
     progress: Progress | None = None,
@@ -106,7 +115,7 @@ def fit_linear(
     """Fit a linear model of a record, without friction unless ``stem`` brings it.
 
     Args:
-        record: what was measured.
+        record: what was measured, or the path of a file or bag of one loop.
         options: None for the defaults.
         stem: stem positions, shape (N, m), %, such as those of an identified friction; None
             takes OP.
@@ -128,7 +137,8 @@ def fit_linear(
         ([[0.8]], [[2]])
     """
     begun = time.perf_counter()
-    options = options or LinearOptions()
+    record = record_of(record)
+    options = LinearOptions() if options is None else of_kind(options, LinearOptions, "options")
     report = progress or (lambda share: None)
     data = prepare_linear(record, stem)
     if options.kind is LinearKind.STATE_SPACE:

@@ -73,6 +73,14 @@ class LinearIdentification:
     seconds: float = 0.0
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        fit = ", ".join(
+            f"{name} {free:.0f} %"
+            for name, free in zip(self.outputs, self.fit_free_run.tolist(), strict=True)
+        )
+        said = f"free-run fit {fit}" if self.process is not None else self.reason
+        return f"<LinearIdentification {self.kind} {self.status}: {said}; {self.samples} samples>"
+
     @property
     def linear_model(self) -> LinearModel:
         """The process as matrices.

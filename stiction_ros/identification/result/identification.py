@@ -13,31 +13,13 @@ from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import Behaviour, FloatArray
 from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.friction.grid import find_law
+from stiction_ros.identification.judgement.figures import Figures
+from stiction_ros.identification.judgement.verdict_kind import VerdictKind
 from stiction_ros.identification.result.cause import Cause
 from stiction_ros.identification.result.search_log import SearchLog
 from stiction_ros.identification.result.stability import Stability
 
-
-class VerdictKind(enum.StrEnum):
-    """What the record says about one valve.
-
-    Examples:
-        >>> from stiction_ros import VerdictKind
-        >>> VerdictKind("sticky") is VerdictKind.STICKY
-        True
-        >>> [kind.value for kind in VerdictKind if kind.has_friction]
-        ['sticky', 'backlash']
-    """
-
-    STICKY = "sticky"
-    BACKLASH = "backlash"
-    HEALTHY = "healthy"
-    UNDECIDED = "undecided"
-
-    @property
-    def has_friction(self) -> bool:
-        """Whether friction is shown: with a jump (sticky), or without one (backlash)."""
-        return self in (VerdictKind.STICKY, VerdictKind.BACKLASH)
+__all__ = ["FitStatus", "Identification", "OrderRow", "OutputModel", "ValveEstimate", "VerdictKind"]
 
 
 class FitStatus(enum.StrEnum):
@@ -99,7 +81,18 @@ class ValveEstimate:
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     further_intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     band_interval: tuple[float, float] | None = None
+    probability: float | None = None
+    figures: Figures | None = None
     responds: bool = True
+
+    def __repr__(self) -> str:
+        frictions = f"f_S {self.static_friction:.3g} %, f_D {self.dynamic_friction:.3g} %"
+        return f"<ValveEstimate {self.name}: {self.verdict}, {frictions}, law {self.law}>"
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether friction is found, or more likely than not."""
+        return self.verdict.has_friction or (self.probability or 0.0) > 0.5
 
     @property
     def sum_interval(self) -> tuple[float, float]:
@@ -139,6 +132,7 @@ class ValveEstimate:
         return {
             "name": self.name,
             "verdict": self.verdict.value,
+            "probability": self.probability,
             "band_share": self.band_share,
             "responds": self.responds,
             "stability": None if self.stability is None else self.stability.to_json(),
@@ -231,7 +225,6 @@ class Identification:
         stem: estimated stem positions, shape (N, m), %, read-only.
         notes: remarks for people.
         search: what the search tried and its squared error; None where a method keeps none.
-            The default search puts the friction and delays of least one-step SE here.
         orders: all orders that were compared.
         row_samples: samples that are one row where the friction was judged.
 
@@ -242,6 +235,10 @@ class Identification:
         >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
         >>> found.status.value, found.samples, found.stem.shape
         ('ok', 400, (400, 1))
+        >>> found
+        <Identification ok: V1 sticky; 400 samples>
+        >>> print(found.summary().splitlines()[0])
+        400 samples of 1 s, 400 s of operation
     """
 
     status: FitStatus
@@ -257,6 +254,26 @@ class Identification:
     search: SearchLog | None = None
     orders: tuple[OrderRow, ...] = ()
     row_samples: int = 1
+
+    def __repr__(self) -> str:
+        valves = ", ".join(f"{valve.name} {valve.verdict}" for valve in self.valves)
+        return f"<Identification {self.status}: {valves or self.reason}; {self.samples} samples>"
+
+    def summary(self) -> str:
+        """Return verdicts, frictions, what to do next and the process as text of 80 columns."""
+        from stiction_ros.identification.answer.summary import summary  # stands above
+
+        return summary(self)
+
+    def _repr_html_(self) -> str:
+        from stiction_ros.identification.answer.summary import as_html  # stands above
+
+        return as_html(self)
+
+    def __rich__(self) -> Any:
+        from stiction_ros.identification.answer.summary import as_table  # stands above
+
+        return as_table(self)
 
     def to_json(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""

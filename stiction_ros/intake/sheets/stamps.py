@@ -322,7 +322,7 @@ def _zone(text: str) -> int | str:
         return zoneinfo.ZoneInfo(name).key
     except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
         raise InputError(
-            f"zone {name} of the stamps is unknown, or the name of several",
+            f"zone {name} of the stamps is unknown, or several zones have this name",
             fix="write its offset, such as +02:00, or a name such as Europe/Berlin",
         ) from None
 

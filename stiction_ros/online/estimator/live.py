@@ -52,7 +52,6 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
             input_order=self.input_order or None,
             delay=(self.delay_low, self.delay_high),
             method=METHOD,
-            one_step_best=False,
             check_columns=False,
         )
 

@@ -29,7 +29,8 @@ def read_offer(text: str, own: LoopModel) -> LoopModel:
             raise InputError(
                 f"its sample time is not {own.sample_time:g} s", where=f"{WHERE}: sample_time"
             )
-        if any(not delay <= LONGEST_DELAY for delay in _delays(document.get("process"))):
+        delays = _delays(document.get("process"), own.sample_time)
+        if any(not delay <= LONGEST_DELAY for delay in delays):
             raise InputError(
                 f"a delay of more than {LONGEST_DELAY} samples", where=f"{WHERE}: process"
             )
@@ -42,14 +43,15 @@ def read_offer(text: str, own: LoopModel) -> LoopModel:
         raise InputError(f"{reason[:LONGEST_REASON]}…") from None
 
 
-def _delays(value: Any) -> Iterator[float]:
-    """Yield all numbers below ``delay``, wherever they stand."""
+def _delays(value: Any, sample_time: float) -> Iterator[float]:
+    """Yield all numbers below ``delay`` and ``dead_time``, wherever they stand, in samples."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
-            if key == "delay":
+            if key in ("delay", "dead_time"):
                 found = inner.values() if isinstance(inner, Mapping) else (inner,)
-                yield from (number for number in found if isinstance(number, int | float))
-            yield from _delays(inner)
+                unit = sample_time if key == "dead_time" else 1.0
+                yield from (number / unit for number in found if isinstance(number, int | float))
+            yield from _delays(inner, sample_time)
     elif isinstance(value, list):
         for inner in value:
-            yield from _delays(inner)
+            yield from _delays(inner, sample_time)

@@ -50,7 +50,7 @@ def write_bag(record: Record, directory: str | Path) -> dict[str, int]:
     stamps = [first + round(time * SECOND) for time in record.time.tolist()]
     if min(stamps) < 0 or max(stamps) >= _LATEST:
         raise InputError(
-            f"begins at {record.start:.9g} s, which no ROS stamp can say",
+            f"begins at {record.start:.9g} s, which no ROS stamp can hold",
             where=record.name,
             fix="use times from 0 to 2 147 483 647 s",
         )

@@ -65,7 +65,7 @@ def refuse_foreign(directory: Path) -> None:
             raise InputError(
                 "its files are packed",
                 where=str(directory),
-                fix="unpack them with `zstd -d` and repair each of what comes of it",
+                fix="unpack them with `zstd -d`, then repair each unpacked file",
             )
 
 

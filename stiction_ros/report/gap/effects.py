@@ -1,30 +1,20 @@
-"""What each effect does to PV, and what would decide between rivals, in pictures."""
+"""What each effect does to PV, and what would decide between rivals, in figures."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
 from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict
 from stiction_ros.discrepancy.answer.preview import Preview
 from stiction_ros.discrepancy.gap.measure import levelled
-from stiction_ros.report.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    VERMILION,
-    Drawing,
-    TimeAxis,
-    legend,
-    panels,
-)
+from stiction_ros.pages.frame import text
+from stiction_ros.pages.plot import KINDS, Curve, over_time
 from stiction_ros.report.gap.words import called, figures_with_units, place_of, word_of
 from stiction_ros.report.page import card, number
 
 WINDOW = 400  # samples that are drawn, where an effect moves PV most
-STYLES = ("-", "--", ":", "-.", (0, (1, 3)))
-COLOURS = (BLUE, VERMILION, GREEN, ORANGE, INK)
 
 
 def effect_card(effect: FoundEffect) -> str:
@@ -42,18 +32,10 @@ def effect_card(effect: FoundEffect) -> str:
     return card(kind, place_of(effect.place), word_of(effect.effect) + law, "\n".join(lines))
 
 
-def effect_drawings(found: Discrepancy) -> list[Drawing]:
-    """Return a picture of what each effect does to the output that it moves most."""
-    drawings = []
-    for k, effect in enumerate(found.effects):
-        if effect.moves is None or not float(np.ptp(effect.moves)) > 0.0:
-            continue
-        drawings.append(_effect(found, effect, k))
-    return drawings
-
-
-def _effect(found: Discrepancy, effect: FoundEffect, k: int) -> Drawing:
-    assert effect.moves is not None
+def effect_figure(found: Discrepancy, effect: FoundEffect) -> str:
+    """Return what an effect does to the output that it moves most; nothing where it moves none."""
+    if effect.moves is None or not float(np.ptp(effect.moves)) > 0.0:
+        return ""
     base = levelled(found.base_after)
     scored = np.column_stack([blocks.scored for blocks in base.blocks])
     moves = np.where(scored, effect.moves, np.nan)
@@ -61,22 +43,18 @@ def _effect(found: Discrepancy, effect: FoundEffect, k: int) -> Drawing:
     rows, name = _liveliest(moves[:, i]), found.model_before.outputs[i]
     pv = base.run.runs.pv[rows, i]
     with_it = np.where(scored[rows, i], pv - base.noise[i].residual[rows], np.nan)
-    seconds = np.arange(rows.start, rows.stop) * found.runs.sample_time
-    axis_of_time = TimeAxis.spanning(float(seconds[-1]))
-    figure, axes = panels(1, 3.4)
-    axis, at = axes[0, 0], axis_of_time(seconds)
-    axis.plot(at, pv, color=GREY, linewidth=4.0, alpha=0.5, label=f"{name} measured")
-    axis.plot(at, with_it - moves[rows, i], color=ORANGE, label="free run without it")
-    axis.plot(at, with_it, color=BLUE, label="free run with it")
-    axis.set_ylabel(name)
-    axis.set_xlabel(axis_of_time.label)
-    legend(axis)
-    title = called(effect.place, effect.effect)
-    caption = (
-        f"The {rows.stop - rows.start} samples in which it moves {name} most. Both free runs are "
-        "driven by the recorded OP alone."
+    return over_time(
+        f"What it does: {called(effect.place, effect.effect)}, in the {rows.stop - rows.start} "
+        f"samples in which it moves {name} most. Both free runs are driven by the recorded OP "
+        "alone.",
+        np.arange(float(rows.start), rows.stop) * found.runs.sample_time,
+        [
+            Curve(f"{name}, measured", "whole", pv),
+            Curve("free run without it", "op", with_it - moves[rows, i]),
+            Curve("free run with it", "pv", with_it),
+        ],
+        text(name),
     )
-    return Drawing(f"effect_{k + 1}", f"What it does: {title}", caption, figure)
 
 
 def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
@@ -88,39 +66,30 @@ def _liveliest(moves: np.ndarray[tuple[int], np.dtype[np.float64]]) -> slice:
     return slice(first, first + count)
 
 
-def preview_drawing(preview: Preview) -> Drawing:
+def preview_figures(preview: Preview) -> str:
     """Return what each rival would show in the experiment that decides."""
-    figure, axes = panels(4, 7.6, sharex=True)
-    seconds = np.arange(len(preview.op)) * preview.sample_time
-    axis_of_time = TimeAxis.spanning(float(seconds[-1]))
-    at = axis_of_time(seconds)
-    axes[0, 0].plot(at, preview.op, color=INK)
-    axes[0, 0].set_ylabel(f"OP of {preview.valve} (%)")
-    labels = ("stem (%)", f"{preview.output} shown", f"{preview.output} itself")
-    for k, rival in enumerate(preview.rivals):
-        for row, values in enumerate((rival.stem, rival.pv, rival.true), start=1):
-            axes[row, 0].plot(
-                at,
-                values,
-                color=COLOURS[k % len(COLOURS)],
-                linestyle=STYLES[k % len(STYLES)],
-                label=called(rival.place, rival.effect),
-            )
-    for row, label in enumerate(labels, start=1):
-        axes[row, 0].set_ylabel(label)
-    legend(axes[1, 0])
-    axes[-1, 0].set_xlabel(axis_of_time.label)
-    told = [
-        label
-        for label, signal in zip(labels, ("stem", "pv", "true"), strict=True)
-        if _apart([getattr(rival, signal) for rival in preview.rivals])
-    ]
-    where = " and ".join(told) if told else "none of these signals"
-    caption = (
-        "OP moved by hand with the controller off: up, back, and one step, without noise. "
-        f"The rivals differ in {where}; PV itself is what a second sensor would show."
+    time = np.arange(float(len(preview.op))) * preview.sample_time
+    rivals = [(called(rival.place, rival.effect), rival) for rival in preview.rivals]
+    signals = {
+        "stem": "stem (%)",
+        "pv": f"{preview.output} as the sensor shows it",
+        "true": f"{preview.output} itself, as a second sensor would show it",
+    }
+    op = over_time(
+        "What would decide: OP moved by hand with the controller off: up, back, and one step, "
+        "without noise.",
+        *(time, [Curve(f"OP of {preview.valve}", "op", preview.op, steps=True)], "%"),
     )
-    return Drawing("preview", "What would decide: each rival in one experiment", caption, figure)
+    figures = []
+    for signal, label in signals.items():
+        drawn = [
+            Curve(name, kind, getattr(rival, signal))
+            for (name, rival), kind in zip(rivals, itertools.cycle(KINDS), strict=False)
+        ]
+        differ = _apart([curve.values for curve in drawn])
+        said = f"{label}: {'the rivals differ' if differ else 'the rivals are alike'}."
+        figures.append(over_time(said[0].upper() + said[1:], time, drawn, text(label)))
+    return op + "".join(figures)
 
 
 def _apart(signals: list[np.ndarray[tuple[int], np.dtype[np.float64]]]) -> bool:

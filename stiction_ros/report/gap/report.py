@@ -12,29 +12,22 @@ from stiction_ros.discrepancy import Discrepancy, FoundEffect, GapVerdict, Look
 from stiction_ros.discrepancy.answer.preview import preview
 from stiction_ros.discrepancy.gap.measure import levelled
 from stiction_ros.effects import FloatArray
-from stiction_ros.report.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    VERMILION,
-    Drawing,
-    TimeAxis,
-    legend,
-    panels,
-    style,
-)
+from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import SCRIPT, Curve, against, over_time
 from stiction_ros.report.gap.effects import (
     change_lines,
     effect_card,
-    effect_drawings,
-    preview_drawing,
+    effect_figure,
+    preview_figures,
 )
 from stiction_ros.report.gap.words import CONTROLLER, called, candidate_of, named_figures, plain
-from stiction_ros.report.page import Cell, embedded, folded, number, page, table, text
+from stiction_ros.report.page import Cell, folded, number, table
+from stiction_ros.signals.holds import stretches
 
-SHOWN = 12  # candidates in the picture
+CANDIDATES = (
+    "Every candidate with its own best figures, one at a time, the current model as it is. Rivals "
+    "outside the catalogue only show that something else is amiss."
+)
 SHOWS = 1.1  # times the declared noise from which what the sensor adds to it is told
 
 _HEADLINES = {
@@ -47,51 +40,41 @@ _HEADLINES = {
 
 
 def report_gap(found: Discrepancy, out: str | Path) -> Path:
-    """Write ``report.html`` and its figures into the folder ``out`` and return the page."""
+    """Write ``report.html`` into the folder ``out`` and return the page."""
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    with style():
-        drawings = [_before_and_after(found), *effect_drawings(found)]
-        decides = preview(found)
-        if decides is not None:
-            drawings.append(preview_drawing(decides))
-        for k, look in enumerate(found.looks):
-            drawings += [*_tracks(found, look, k), _rivals(look, k)]
-    for drawing in drawings:
-        drawing.save(folder)
     target = folder / "report.html"
-    target.write_text(gap_page(found, drawings), encoding="utf-8")
+    target.write_text(gap_page(found), encoding="utf-8")
     return target
 
 
-def gap_page(found: Discrepancy, drawings: Sequence[Drawing]) -> str:
+def gap_page(found: Discrepancy) -> str:
     """Return the report as HTML."""
-    pictures = {drawing.name: embedded(drawing) for drawing in drawings}
     names = ", ".join(record.name for record in found.runs.records)
     headline = _headline(found)
     parts = [
         f"<h1>{text(headline)}</h1>",
-        f'<p class="kicker">{text(names)}: {len(found.runs)} samples of '
+        f'<p class="soft">{text(names)}: {len(found.runs)} samples of '
         f"{found.runs.sample_time:g} s; verdict {text(found.verdict)}</p>",
         '<div class="cards">' + "".join(effect_card(effect) for effect in found.effects) + "</div>",
-        *(pictures.get(f"effect_{k + 1}", "") for k in range(len(found.effects))),
-        *_decides(found, pictures),
+        *(effect_figure(found, effect) for effect in found.effects),
+        *_decides(found),
         "<h2>The data</h2>" + _gate(found),
         "<h2>The gap</h2>" + _gaps(found),
-        pictures["gap"],
+        _before_and_after(found),
         "<h2>The noise</h2>" + _noise(found),
     ]
     changes = change_lines(found)
     if changes:
         parts.append("<h2>What of the process was changed</h2>" + _listed(changes))
     for k, look in enumerate(found.looks):
-        parts += _look(found, look, k, pictures)
+        parts += _look(found, look, k)
     parts += ["<h2>What these records could not show</h2>" + _untestable(found)]
     listed = [f"{entry.name}: {entry.reason}" for entry in found.not_considered]
     if listed:
         parts.append("<h2>What was not considered</h2>" + _listed(listed))
     parts += [folded("The loop model with what was found", found.model_after.to_yaml())]
-    return page(f"{names}: {headline}", parts)
+    return framed(f"{names}: {headline}", parts, SCRIPT)
 
 
 def _headline(found: Discrepancy) -> str:
@@ -108,11 +91,13 @@ def _called(effect: FoundEffect) -> str:
     return f"{named} (or {' or '.join(called(*name) for name in effect.alternatives)})"
 
 
-def _decides(found: Discrepancy, pictures: dict[str, str]) -> list[str]:
+def _decides(found: Discrepancy) -> list[str]:
     if not found.experiment:
         return []
     said = found.experiment[0].upper() + found.experiment[1:]
-    return [f"<h2>What would decide</h2><p>{text(said)}.</p>", pictures.get("preview", "")]
+    shown = preview(found)
+    figures = "" if shown is None else preview_figures(shown)
+    return [f"<h2>What would decide</h2><p>{text(said)}.</p>", figures]
 
 
 def _noise(found: Discrepancy) -> str:
@@ -173,7 +158,7 @@ def _gaps(found: Discrepancy) -> str:
     return table(head, rows) + closed + "on samples that no figure was fitted to.</p>"
 
 
-def _look(found: Discrepancy, look: Look, k: int, pictures: dict[str, str]) -> list[str]:
+def _look(found: Discrepancy, look: Look, k: int) -> list[str]:
     listed = "".join(f"<li>{text(plain(said))}</li>" for said in look.where.sentences)
     rows: list[list[Cell]] = []
     for fit in look.scores.fits:
@@ -183,19 +168,21 @@ def _look(found: Discrepancy, look: Look, k: int, pictures: dict[str, str]) -> l
                 candidate_of(fit) + outside,
                 named_figures(found, fit),
                 number(fit.delta_bic),
-                number(fit.held_gain),
+                number(round(fit.held_gain, 3) + 0.0),
             ]
         )
     head = ("candidate", "figures", "BIC gained", "held-out gain")
     said = plain(f"{look.decision.verdict}: {look.decision.reason}")
-    after = "it stays in the model" if look.kept else (look.reason or "nothing is added")
+    after = "it stays in the model" if look.kept else look.reason
+    if not after or after == look.decision.reason:
+        after = "nothing is added"
     return [
         f"<h2>Look {k + 1}: where the gap is</h2>",
         f"<ul>{listed}</ul>" if listed else "<p>At no particular time or place.</p>",
-        pictures.get(f"track_{k + 1}", ""),
+        _tracks(found, look),
         f"<h2>Look {k + 1}: the candidates</h2>",
         f"<p>{text(said)}; {text(plain(after))}.</p>",
-        pictures.get(f"candidates_{k + 1}", ""),
+        f"<p class='soft'>{CANDIDATES}</p>",
         table(head, rows, texts=2),
     ]
 
@@ -207,66 +194,59 @@ def _untestable(found: Discrepancy) -> str:
     return table(("effect", "what would help", "BIC expected"), rows, texts=2)
 
 
-def _before_and_after(found: Discrepancy) -> Drawing:
-    """Draw PV, the free runs of both models, and both gaps."""
-    names = found.model_before.outputs
-    figure, axes = panels(2 * len(names), 0.8 + 3.6 * len(names), sharex=True)
-    at, axis_of_time = _time(found)
+def _before_and_after(found: Discrepancy) -> str:
+    """Return PV with the free runs of both models, and both gaps, of each output."""
+    time = np.arange(float(len(found.runs))) * found.runs.sample_time
     shown = levelled(found.base_before), levelled(found.base_after)
-    for i, name in enumerate(names):
+    figures = []
+    for i, name in enumerate(found.model_before.outputs):
         scored = found.base_before.blocks[i].scored
         old, new = (np.where(scored, base.noise[i].residual, np.nan) for base in shown)
         pv = found.base_after.run.runs.pv[:, i]
-        top, low = axes[2 * i, 0], axes[2 * i + 1, 0]
-        top.plot(at, pv, color=GREY, linewidth=0.8, label=f"{name} measured")
-        top.plot(at, found.base_before.run.runs.pv[:, i] - old, color=ORANGE, label="before")
-        top.plot(at, pv - new, color=BLUE, label="after")
-        top.set_ylabel(name)
-        legend(top)
-        low.plot(at, old, color=ORANGE, label="gap before")
-        low.plot(at, new, color=BLUE, label="gap after")
-        held = found.base_after.blocks[i].held
-        low.fill_between(
-            at,
-            0,
-            1,
-            where=held.tolist(),
-            transform=low.get_xaxis_transform(),
-            color=INK,
-            alpha=0.07,
-            linewidth=0,
-            label="held out",
-        )
-        low.set_ylabel("gap")
-        legend(low)
-    axes[-1, 0].set_xlabel(axis_of_time.label)
-    axes[-1, 0].set_xlim(at[0], at[-1])
-    caption = (
-        "The free run is driven by the recorded OP alone. State and level at the start are "
-        "fitted on the blocks without shade; the figures above are those of the shaded blocks."
-    )
-    return Drawing("gap", "Gap before and after", caption, figure)
+        begins, ends = stretches(found.base_after.blocks[i].held)
+        held = [(time[a], time[b - 1]) for a, b in zip(begins, ends, strict=True)]
+        runs = [
+            Curve(f"{name}, measured", "whole", pv),
+            Curve("free run before", "op", found.base_before.run.runs.pv[:, i] - old),
+            Curve("free run after", "pv", pv - new),
+        ]
+        gaps = [Curve("gap before", "op", old), Curve("gap after", "pv", new)]
+        figures += [
+            over_time(
+                "The free runs are driven by the recorded OP alone. State and level at the start "
+                "are fitted on the stretches without shade.",
+                *(time, runs, text(name)),
+                shade=held,
+            ),
+            over_time(
+                "The gap: PV less the free run. The figures above are those of the shaded "
+                "stretches.",
+                *(time, gaps, text(name)),
+                shade=held,
+            ),
+        ]
+    return "".join(figures)
 
 
-def _tracks(found: Discrepancy, look: Look, k: int) -> list[Drawing]:
-    """Draw the disturbance that would close the gap at the most telling place."""
+def _tracks(found: Discrepancy, look: Look) -> str:
+    """Return the disturbance that would close the gap at the most telling place."""
     if not look.where.tracks or look.where.tracks[0].gain <= 0.0:
-        return []
+        return ""
     track = look.where.tracks[0]
-    figure, axes = panels(1, 3.4, 2, width_ratios=(2.0, 1.0))
-    at, axis_of_time = _time(found)
-    axes[0, 0].plot(at, track.wave, color=VERMILION)
-    axes[0, 0].set_xlabel(axis_of_time.label)
-    axes[0, 0].set_ylabel(plain(f"missing at {track.place}"))
+    place, curve = plain(track.place), Curve("disturbance", "free", track.wave)
     driver, label = _driver(found, look, track.place)
-    axes[0, 1].plot(driver, track.wave, color=VERMILION, linewidth=0.7)
-    axes[0, 1].set_xlabel(label)
-    caption = (
-        f"The slow disturbance at {plain(track.place)} that would close the gap, against time and "
-        f"against {label}. A loop in the right panel is play or friction, a bend is a "
-        "characteristic or a limit, a step or ramp in the left one is a disturbance."
+    time = np.arange(float(len(found.runs))) * found.runs.sample_time
+    return over_time(
+        f"The slow disturbance at {place} that would close the gap. A step or a ramp in it is a "
+        "disturbance.",
+        *(time, [curve], f"missing at {text(place)}"),
+    ) + against(
+        f"The same against {label}. A loop is play or friction, a bend is a characteristic or a "
+        "limit.",
+        [(driver, curve)],
+        (text(label), f"missing at {text(place)}"),
+        equal=False,
     )
-    return [Drawing(f"track_{k + 1}", plain(f"What is missing at {track.place}"), caption, figure)]
 
 
 def _driver(found: Discrepancy, look: Look, place: str) -> tuple[FloatArray, str]:
@@ -276,26 +256,3 @@ def _driver(found: Discrepancy, look: Look, place: str) -> tuple[FloatArray, str
         return found.runs.op[:, names.index(tag)], f"OP of {tag} (%)"
     i = found.model_before.outputs.index(tag)
     return look.scores.base.run.forced[:, i], f"free run of {tag}"
-
-
-def _rivals(look: Look, k: int) -> Drawing:
-    """Draw the scores of the best candidates."""
-    fits = look.scores.fits[:SHOWN][::-1]
-    figure, axes = panels(1, 0.9 + 0.28 * len(fits))
-    axis = axes[0, 0]
-    colours = [GREY if not fit.candidate.inside else GREEN for fit in fits]
-    axis.barh(np.arange(len(fits)), [fit.delta_bic for fit in fits], color=colours)
-    axis.set_yticks(np.arange(len(fits)), [candidate_of(fit) for fit in fits])
-    axis.axvline(0.0, color=INK, linewidth=0.8)
-    axis.set_xlabel("BIC gained against the current model")
-    caption = (
-        "Every candidate with its own best figures, one at a time, the current model as it is. "
-        "Grey: rivals outside the catalogue, which only show that something else is amiss."
-    )
-    return Drawing(f"candidates_{k + 1}", f"Candidates of look {k + 1}", caption, figure)
-
-
-def _time(found: Discrepancy) -> tuple[FloatArray, TimeAxis]:
-    seconds = np.arange(len(found.runs)) * found.runs.sample_time
-    axis = TimeAxis.spanning(float(seconds[-1]))
-    return np.asarray(axis(seconds)), axis

@@ -10,7 +10,7 @@ from stiction_ros.discrepancy.data.controller_check import ControllerStatus
 from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.effects import behaviours
 from stiction_ros.report.page import number
-from stiction_ros.texts import HOUR, spoken
+from stiction_ros.texts import HOUR, spoken, symbol
 
 DIGITS = 3  # of a figure without an interval
 CONTROLLER = {
@@ -35,6 +35,7 @@ _SHORT = {
     "sensor": "the sensor of {tag}",
 }
 _PLACE = re.compile(rf"\b({'|'.join(_SHORT)}):(\w+)")
+_FRICTION = re.compile(r"\bf_[sd]\b")
 _WORDS = {
     "pole": "slower process",
     "bias_step": "step of the calibration",
@@ -61,7 +62,8 @@ def word_of(effect: str) -> str:
 
 def plain(sentence: str) -> str:
     """Return a sentence with the places of loop models, such as ``valve:V1``, in words."""
-    return _PLACE.sub(lambda found: _SHORT[found[1]].format(tag=found[2]), sentence)
+    said = _PLACE.sub(lambda found: _SHORT[found[1]].format(tag=found[2]), sentence)
+    return _FRICTION.sub(lambda found: symbol(found[0]), said)
 
 
 def called(place: str, effect: str) -> str:
@@ -88,7 +90,7 @@ def figures_with_units(effect: FoundEffect) -> list[str]:
             between = f", 95 % between {number(ends[0], digits)} and {number(ends[1], digits)}"
         if unit == "s" and value >= HOUR:
             shown += f" ({spoken(value)})"
-        said = f"{key} = {number(value, digits)}{shown}{between}"
+        said = f"{symbol(key)} = {number(value, digits)}{shown}{between}"
         meaning = meanings.get(key, "")
         lines.append(said + (f": {meaning}" * bool(meaning)))
     return lines
@@ -117,5 +119,7 @@ def named_figures(found: Discrepancy, fit: CandidateFit) -> str:
     parts = []
     for entry in behaviour.parameters():
         unit = "" if entry.unit == "1" or "signal" in entry.unit else f" {entry.unit}"
-        parts.append(f"{entry.key} {number(float(getattr(behaviour, entry.attribute)))}{unit}")
+        parts.append(
+            f"{symbol(entry.key)} {number(float(getattr(behaviour, entry.attribute)))}{unit}"
+        )
     return ", ".join(parts)

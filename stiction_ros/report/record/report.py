@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,56 +10,19 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, ValveEstimate
+from stiction_ros.identification.judgement.figures import definitions
+from stiction_ros.pages.frame import framed, text
+from stiction_ros.pages.plot import KINDS, SCRIPT, Curve, over_time
+from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.parts import joined
 from stiction_ros.records.record import Record
-from stiction_ros.report.drawing import (
-    INK,
-    VERMILION,
-    Drawing,
-    TimeAxis,
-    legend,
-    panels,
-    style,
-)
-from stiction_ros.report.page import Cell, duration, embedded, number, page, page_file, table, text
-from stiction_ros.report.record.cycles import Window, draw_plane, draw_window
+from stiction_ros.report.page import Cell, duration, number, page_file, table
 from stiction_ros.report.record.sections import lead, stability_table, work_table
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
-from stiction_ros.report.shapes import (
-    draw_curves,
-    draw_output,
-    draw_responses,
-    draw_valve,
-    free_run,
-)
+from stiction_ros.report.shapes import free_run, settling, step_response
 from stiction_ros.texts import finite
 
-_MEANING = {
-    "delta_bic": "BIC by which friction beats the best model without it",
-    "variance_ratio": "innovation variance without friction over that with it",
-    "free_run_ratio": "free-run error without friction over that with it",
-    "half_1": "−2 log likelihood gained in the first half",
-    "half_2": "−2 log likelihood gained in the second half",
-    "share": "f_S over the span of OP",
-    "moves": "samples at which the stem moved",
-    "rival_order": "order of the best model without friction",
-    "loop_ratio": "OP's movement in the closed loop with friction over the recorded one",
-    "loop_ratio_free": "the same without friction",
-    "loop_alike": "share of the simulated loops that move as recorded",
-    "moved_with": "movement of the repeated record with friction over the recorded one",
-    "moved_without": "the same without friction",
-    "loop_gone": "share of the movement of OP or PV − SP that goes away without friction",
-    "controller_fit": "share of OP's moves that the recovered controller explains",
-    "outside_line": "BIC gained by a wave that enters behind the valve",
-    "line_rivalry": "BIC gained by a wave alone over that by friction",
-    "echo": "how strongly what is left without friction repeats itself; above 25 a wave does it",
-    "rate": "samples that are one row where friction was judged",
-    "alike": "1 where two neighbouring rates see the same band",
-    "patterns": "switching patterns enumerated round the best",
-    "patterns_closed": "1 where all patterns at their edge are rejected",
-    "stem_error": "mean squared error of the estimated stem, %²",
-    "deadband_loss": "−2 log likelihood that a pure deadband (f_S = f_D) loses",
-}
+UNITS = Units("PV units", "% of travel")
 
 
 def report_record(
@@ -67,12 +31,12 @@ def report_record(
     out: str | Path,
     parts: Sequence[Record] = (),
 ) -> Path:
-    """Write ``report.html`` and its figures and return the page.
+    """Write the page of a record and return its file.
 
     Args:
         record: that was looked at.
         identification: of this record.
-        out: folder, made when missing; or the ``.html`` file alone.
+        out: folder of ``report.html``, made when missing; or an ``.html`` file.
         parts: all parts of the source that it is from, when there are several.
 
     Returns:
@@ -84,22 +48,20 @@ def report_record(
     Examples:
         >>> from stiction_ros import IdentificationOptions, LoopModel
         >>> from stiction_ros import find_config, identify, report_record, simulate
-        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=400)
+        >>> record = simulate(LoopModel.load(find_config("flow.loop.yaml")), samples=200)
         >>> found = identify(record, IdentificationOptions(output_order=1, delay=(2, 2)))
         >>> report_record(record, found, "report.html").name
         'report.html'
     """
-    target, folder = page_file(out)
-    drawings = draw_record(record, identification, parts)
-    target.write_text(record_page(record, identification, drawings), encoding="utf-8")
-    if folder is not None:
-        for drawing in drawings:
-            drawing.save(folder)
+    target, _ = page_file(out)
+    target.write_text(record_page(record, identification, parts), encoding="utf-8")
     return target
 
 
-def record_page(record: Record, identification: Identification, drawings: Sequence[Drawing]) -> str:
-    """Return the report of a record as HTML."""
+def record_page(
+    record: Record, identification: Identification, parts: Sequence[Record] = ()
+) -> str:
+    """Return the report of a record as HTML; ``parts`` are all parts of its source."""
     found = finite(identification.to_json())
     headline = verdict_line(found["valves"])
     kicker = (
@@ -108,88 +70,46 @@ def record_page(record: Record, identification: Identification, drawings: Sequen
     )
     trouble = ""
     if identification.reason:
-        trouble = f'<p class="warn">The fit is not to be trusted: {text(identification.reason)}</p>'
+        trouble = (
+            f'<p class="note warn">The fit is not to be trusted: {text(identification.reason)}</p>'
+        )
     notes = dict.fromkeys([*record.notes, *identification.notes])
     listed = "".join(f"<li>{text(note)}</li>" for note in notes)
-    parts = [
+    whole = (joined(parts) if parts else record).filled()
+    stem = _stem_within(record, identification, joined(parts) if parts else record)
+    sections = [
         f"<h1>{text(headline)}</h1>",
-        f'<p class="kicker">{text(kicker)}</p>',
+        f'<p class="soft">{text(kicker)}</p>',
         trouble,
         lead(identification),
         valve_cards(found["valves"]),
         work_table(record, identification),
-        *map(embedded, drawings),
+        close_look(record, identification, UNITS),
+        all_signals(whole, stem, UNITS),
+        _free_runs(record, identification),
         stability_table(identification),
         evidence_table(identification.valves),
         process_table(found["outputs"], record.sample_time),
+        _responses(record, identification),
         f"<h2>Notes</h2><ul>{listed}</ul>" if notes else "",
     ]
-    return page(f"{record.name}: {headline}", parts)
+    return framed(f"{record.name}: {headline}", sections, SCRIPT)
 
 
 def evidence_table(valves: Sequence[ValveEstimate]) -> str:
     """Return the figures behind the verdicts."""
-    keys = list(dict.fromkeys(key for valve in valves for key in valve.evidence))
-    if not keys:
+    told = [valve for valve in valves if valve.figures is not None]
+    if not told:
         return ""
     rows: list[list[Cell]] = [
-        [_MEANING.get(key, key), *[number(valve.evidence.get(key)) for valve in valves]]
-        for key in keys
-    ]
-    return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in valves]], rows)
-
-
-def draw_record(
-    record: Record, identification: Identification, parts: Sequence[Record] = ()
-) -> tuple[Drawing, ...]:
-    """Draw four cycles, PV against OP, signals with stems, valve curves, free run and responses."""
-    window = Window.of(record, identification)
-    with style():
-        drawn = [
-            draw_window(record, identification, window),
-            draw_plane(record, window),
-            _signals(record, identification, joined(parts) if parts else record),
+        [
+            f"{key.replace('_', ' ')}, {meaning['unit']}: {meaning['definition']}",
+            *[number(getattr(valve.figures, key)) for valve in told],
         ]
-        if identification.stem.shape == record.op.shape:
-            drawn += [draw_curves(record, identification.stem)]
-            if identification.outputs:
-                drawn += [_free_runs(record, identification)]
-        if identification.outputs:
-            outputs = [output.to_json() for output in identification.outputs]
-            drawn.append(
-                Drawing(
-                    "step_responses",
-                    "Identified process",
-                    "Response of each PV to a stem step of 1 %.",
-                    draw_responses(outputs, record, None, {}),
-                )
-            )
-    return tuple(drawn)
-
-
-def _signals(record: Record, identification: Identification, whole: Record) -> Drawing:
-    """Draw the signals of ``whole``, of which ``record`` is a part; its gaps stay empty."""
-    rows = len(record.outputs) + len(record.valves)
-    figure, axes = panels(rows, 0.6 + 2.0 * rows, sharex=True)
-    shown = whole.filled()
-    time = TimeAxis.spanning(shown.time[-1])
-    at = time(shown.time)
-    for j, name in enumerate(record.outputs):
-        draw_output(axes[j, 0], at, shown, j, slice(None))
-        axes[j, 0].set_ylabel(f"{name} (PV units)")
-    stem = _stem_within(record, identification, whole)
-    for j, name in enumerate(record.valves):
-        axis = axes[len(record.outputs) + j, 0]
-        true = None if shown.stem is None else shown.stem[:, j]
-        draw_valve(axis, at, shown.op[:, j], true, None if stem is None else stem[:, j])
-        axis.set_title(name)
-        legend(axis)
-    axes[-1, 0].set_xlabel(time.label)
-    axes[-1, 0].set_xlim(at[0], at[-1])
-    legend(axes[0, 0])
-    caption = "The record, and the stem positions that the identified valves give for its OP"
-    caption += "." if len(whole) == len(record) else " in the part that was looked at."
-    return Drawing("signals", "Signals and stems", caption, figure)
+        for key, meaning in definitions().items()
+    ]
+    rows.append(["probability of friction", *[number(valve.probability) for valve in told]])
+    return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in told]], rows)
 
 
 def _stem_within(
@@ -209,28 +129,41 @@ def _stem_within(
     return None
 
 
-def _free_runs(record: Record, identification: Identification) -> Drawing:
-    count = len(identification.outputs)
-    figure, axes = panels(count, 0.6 + 2.2 * count, sharex=True)
-    time = TimeAxis.spanning(record.time[-1])
-    at = time(record.time)
-    stems = dict(zip(record.valves, identification.stem.T, strict=True))
-    for row, output in enumerate(identification.outputs):
-        axis = axes[row, 0]
-        measured = record.pv[:, record.outputs.index(output.name)]
-        run = free_run(output, stems, measured)
-        axis.plot(at, measured, color=INK, linewidth=0.8, label="PV, measured")
-        axis.plot(at, run, color=VERMILION, linewidth=1.2, label="free run of the model")
-        axis.set_title(
-            f"{output.name}: free-run fit {number(output.fit_free_run)} %, "
-            f"one-step fit {number(output.fit_one_step)} %"
+def _free_runs(record: Record, found: Identification) -> str:
+    """Return each PV beside the model that is driven by the recorded OP alone."""
+    if found.stem.shape != record.op.shape:
+        return ""
+    stems = dict(zip(record.valves, found.stem.T, strict=True))
+    drawn = []
+    for model in found.outputs:
+        pv = record.pv[:, record.outputs.index(model.name)]
+        run = free_run(model, stems, pv)
+        curves = [Curve(f"{model.name}, measured", "pv", pv), Curve("model", "free", run)]
+        said = (
+            f"The model of {model.name} driven by the recorded OP alone: friction, then process. "
+            f"It fits {number(model.fit_free_run)} %, one step ahead "
+            f"{number(model.fit_one_step)} %. Slow disturbances of the loop are not in it."
         )
-        axis.set_ylabel(f"{output.name} (PV units)")
-        legend(axis)
-    axes[-1, 0].set_xlabel(time.label)
-    axes[-1, 0].set_xlim(at[0], at[-1])
-    caption = (
-        "The model driven by the recorded OP alone: friction, then process. Slow disturbances "
-        "that the loop suffered are not in it."
+        axis = f"{text(model.name)} (PV units)"
+        drawn.append(over_time(said, record.time, curves, axis, record.start))
+    return "<h2>Model against measurement</h2>" + "".join(drawn) if drawn else ""
+
+
+def _responses(record: Record, found: Identification) -> str:
+    """Return the response of each PV to a step of each stem."""
+    models = [model.to_json() for model in found.outputs]
+    if not models:
+        return ""
+    length = settling(models, None)
+    return "".join(
+        over_time(
+            f"Response of {model['name']} to a step of the stem by 1 %, from the step on.",
+            np.arange(float(length)) * record.sample_time,
+            [
+                Curve(f"{valve} → {model['name']}", kind, step_response(model, valve, length))
+                for valve, kind in zip(record.valves, itertools.cycle(KINDS), strict=False)
+            ],
+            f"{text(model['name'])} (PV units)",
+        )
+        for model in models
     )
-    return Drawing("free_run", "Model against measurement", caption, figure)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.words import cause_of, materiality, next_step, why
 from stiction_ros.identification.result.cause import CauseKind
+from stiction_ros.pages.frame import text, words
 from stiction_ros.records.record import Record
 from stiction_ros.records.valve_work import ValveWork
-from stiction_ros.report.page import Cell, duration, interval, number, table, text, words
+from stiction_ros.report.page import Cell, duration, interval, number, table
 from stiction_ros.texts import finite
 
 
@@ -58,13 +59,13 @@ def stability_table(found: Identification) -> str:
     rows: list[list[Cell]] = []
     for valve in found.valves:
         for look in () if valve.stability is None else valve.stability.tried:
-            said = "agrees" if look.agrees else "does not"
+            said = "agrees" if look.agrees else "does not agree"
             band = interval(None if look.band is None else list(look.band))
             gain = number(finite(look.gain))
             rows.append([valve.name, look.name, said, gain, band])
     if not rows:
         return ""
-    head = ("valve", "look", "", "gain", "f_S + f_D, %")
+    head = ("valve", "part or rate", "answer", "gain", "f_S + f_D, %")
     used = text(
         f"Rows of {rate['used']:g} s from samples of {rate['sample_time']:g} s. Gain: −2 log "
         "likelihood that friction adds."

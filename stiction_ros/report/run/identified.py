@@ -7,16 +7,9 @@ from typing import Any
 
 from stiction_ros.effects import Stiction, behaviours
 from stiction_ros.identification import VerdictKind
-from stiction_ros.report.page import (
-    Cell,
-    card,
-    duration,
-    interval,
-    number,
-    percent,
-    table,
-)
+from stiction_ros.report.page import Cell, card, duration, interval, number, percent, table
 from stiction_ros.report.run.story import Story
+from stiction_ros.texts import symbol
 
 KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}
 """Class of a box by its verdict; the others are open."""
@@ -65,6 +58,8 @@ def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None)
         more += "".join(f"\n{said}" for said in _further(valve))
         if valve["verdict"] == "healthy":
             more = f"f_S at most {percent(valve['f_s_interval'][1])} % of travel"
+        if valve.get("probability") is not None:
+            more += f"\nprobability of friction {valve['probability']:.2f}"
         truth = None if story is None else story.true_friction(valve["name"])
         if truth is not None:
             more += f"\nsimulated with f_S = {truth[0]:g} %, f_D = {truth[1]:g} %"
@@ -86,7 +81,7 @@ def _further(valve: Mapping[str, Any]) -> list[str]:
             ends = valve.get(f"{entry.key}_interval")
             between = "held" if ends is None else f"{number(ends[0])} … {number(ends[1])}"
             value = number(valve[entry.key])
-            said.append(f"{entry.key} {value}{unit} ({between}): {entry.description}")
+            said.append(f"{symbol(entry.key)} {value}{unit} ({between}): {entry.description}")
     return said
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from stiction_ros.pages.frame import words
 from stiction_ros.records.run.log import RunLog
-from stiction_ros.report.page import Cell, duration, number, table, words
+from stiction_ros.report.page import Cell, duration, number, table
 
 
 def monitor_section(log: RunLog) -> str:

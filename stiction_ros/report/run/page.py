@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stiction_ros.pages.frame import framed, text, words
 from stiction_ros.records.run.log import ModeChange
 from stiction_ros.report.drawing import Drawing
 from stiction_ros.report.page import (
@@ -14,11 +15,8 @@ from stiction_ros.report.page import (
     folded,
     interval,
     number,
-    page,
     percent,
     table,
-    text,
-    words,
 )
 from stiction_ros.report.run.identified import (
     KINDS,
@@ -56,7 +54,7 @@ def run_page(story: Story, drawings: Sequence[Drawing]) -> str:
         kicker += f", seed {story.seed}"
     parts = [
         f"<h1>{text(headline(story))}</h1>",
-        f'<p class="kicker">Loop {text(story.name)}: {text(kicker)}</p>',
+        f'<p class="soft">Loop {text(story.name)}: {text(kicker)}</p>',
         _trouble(story),
         *[f'<p class="lead">{words(line)}</p>' for line in findings(story)],
         valve_cards(story.identified.get("valves", []), story),
@@ -70,7 +68,7 @@ def run_page(story: Story, drawings: Sequence[Drawing]) -> str:
         _configuration(story),
         _notes(story),
     ]
-    return page(f"{story.name}: {headline(story)}", parts)
+    return framed(f"{story.name}: {headline(story)}", parts)
 
 
 def headline(story: Story) -> str:
@@ -131,7 +129,7 @@ def _trouble(story: Story) -> str:
     stuck = any(map(has_friction, story.identified.get("valves", [])))
     if found.status is PhaseStatus.OK or (story.log.swap is None and not stuck):
         return ""
-    return f'<p class="warn">No comparison of before and after: {text(found.reason)}.</p>'
+    return f'<p class="note warn">No comparison of before and after: {text(found.reason)}.</p>'
 
 
 def _gone(story: Story) -> bool:
@@ -187,7 +185,7 @@ def _gain(story: Story) -> str:
     return (
         ("<h2>What the swap gained</h2>" if after is not None else "<h2>How the loop does</h2>")
         + table(head, rows, texts=3)
-        + f'<p class="note">{text(_spans(story))}</p>'
+        + f'<p class="soft">{text(_spans(story))}</p>'
     )
 
 
@@ -205,7 +203,7 @@ def _work(story: Story) -> str:
     return (
         "<h2>What it asks of the valves</h2>"
         + table(["valve", "", *there], rows, texts=2)
-        + '<p class="note">Travel: way of the stem. Moves: samples at which it moves; without '
+        + '<p class="soft">Travel: way of the stem. Moves: samples at which it moves; without '
         "friction it follows the noise. A dash: the stem is not known.</p>"
     )
 
@@ -277,7 +275,7 @@ def _fits(story: Story) -> str:
         for valve in story.record.valves
         if (truth := story.true_friction(valve)) is not None
     ]
-    said = f'<p class="note">Simulated: {words("; ".join(known))}.</p>' if known else ""
+    said = f'<p class="soft">Simulated: {words("; ".join(known))}.</p>' if known else ""
     return "<h2>Every fit</h2>" + table(head, rows, texts=3) + said
 
 
@@ -292,7 +290,7 @@ def _messages(story: Story) -> str:
     return (
         "<h2>Messages</h2>"
         + table(("topic", "published", "recorded"), rows)
-        + '<p class="note">Published as the nodes count them in /diagnostics, whose last '
+        + '<p class="soft">Published as the nodes count them in /diagnostics, whose last '
         "message tells of itself and comes when the bag is closed. A dash: nobody counts.</p>"
     )
 

@@ -153,7 +153,7 @@ class LocalEngine:
                     raise InputError(
                         f"no worker process can start, the first ended with {code}",
                         where="survey",
-                        fix="what it said of it stands above",
+                        fix="its message stands above",
                     )
                 if worker.attempt < ATTEMPTS:
                     self._give(self._free(options), task, worker.attempt + 1)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping, Sequence
 
-from stiction_ros.survey.entry import Entry
+from stiction_ros.pages.frame import text
+from stiction_ros.survey.entry import Entry, Status
 from stiction_ros.survey.listing.headline import kind_of
 from stiction_ros.survey.listing.saved import HEADS, change, in_words, note_of
-from stiction_ros.survey.pages.frame import text
 from stiction_ros.survey.pages.trend import Earlier, Trend, trend_of, widest
 from stiction_ros.survey.pages.words import (
     cause_words,
@@ -19,28 +20,40 @@ from stiction_ros.survey.pages.words import (
     period,
 )
 
-TREND = "band before"
+TREND = "friction before and now"
 
 HINTS = {
-    "rank": "what to service first",
-    "loop": "its tag, or the name of its file",
-    "verdict": "what was found of the valve, or how far the loop came",
+    "rank": "the order in which to service the valves",
+    "loop": "the tag of the loop, or the name of its file",
+    "valve": "what was found of the valve, or how far the loop came",
     "cycles by": "what makes the loop cycle",
-    "band of OP": "share of OP's movement that is lost in the band f_S + f_D",
-    "f_S": "static friction, in % of travel, or in units of an OP that has its own",
-    "confidence": "how sure the verdict is",
+    "OP lost": "share of OP's movement that does not reach the stem: the band f_S + f_D",
+    "friction f_S": "static friction in % of travel, or in the units of an OP that has its own",
+    "probability": "of friction in the valve",
     "period": "of the cycle of PV − SP",
-    "amplitude": "of the cycle of PV − SP, in units of PV",
-    HEADS["service"]: "change of the mean |PV − SP| by a service of the valve, simulated",
-    HEADS["embedding"]: "change of the mean |PV − SP| by a controller that knows the friction, "
-    "simulated",
-    HEADS["retune"]: "change of the mean |PV − SP| by another tuning, simulated",
-    "cost/h": "what the cycle costs an hour",
-    TREND: "band f_S + f_D in the first survey and now; lines are drawn from 0 to the widest band",
-    "group": "loops of one number cycle together",
-    "reason": "why a loop was not judged",
+    "amplitude, PV units": "of the cycle of PV − SP",
+    HEADS["service"]: "change of the mean |PV − SP| by a service of the valve, simulated: −75 % "
+    "leaves a quarter of it",
+    HEADS["embedding"]: "the same by a controller that knows the friction",
+    HEADS["retune"]: "the same by another tuning of the controller",
+    "cost per hour": "what the cycle costs in an hour",
+    TREND: "f_S + f_D in the first survey and now; lines are drawn from 0 to the widest band",
+    "group": "loops with the same number cycle together",
+    "why not judged": "the reason, and what to do about it",
 }
-"""What stands under a heading."""
+"""What a heading means."""
+
+NONE = {
+    "cycles by": "It was not found what makes the loop cycle.",
+    "probability": "This method computes no probability.",
+    "period": "The loop does not cycle.",
+    "amplitude, PV units": "The loop does not cycle.",
+    "cost per hour": "No cost was given for this loop.",
+    TREND: "No earlier survey has this loop.",
+    "group": "The loop cycles with no other loop.",
+    "why not judged": "The loop was judged.",
+}
+"""Why a cell of a loop that was judged is empty; the other cells are so without friction."""
 
 Cell = tuple[str, object]
 """HTML, and what it is sorted by; None stands last."""
@@ -86,26 +99,21 @@ class Columns:
     def heads(self) -> list[tuple[str, str]]:
         """Class and heading of each column."""
         return [
-            ("rank", "rank"),
+            ("up", "rank"),
             ("t name", "loop"),
-            ("t s", "verdict"),
+            ("t s", "valve"),
             ("t", "cycles by"),
-            ("", "band of OP"),
-            ("s", "f_S"),
-            ("", "confidence"),
+            ("s", "OP lost"),
+            ("s", "friction f_S"),
+            ("", "probability"),
             ("s", "period"),
-            ("", "amplitude"),
+            ("", "amplitude, PV units"),
             *(("", head) for head in HEADS.values() if self.gains),
-            *([("", "cost/h")] if self.costs else []),
+            *([("", "cost per hour")] if self.costs else []),
             *([("trend", TREND)] if self.earlier else []),
-            ("", "group"),
-            ("t wordy", "reason"),
+            ("up", "group"),
+            ("t wordy", "why not judged"),
         ]
-
-    @staticmethod
-    def hint(label: str) -> str:
-        """Return what stands under a heading."""
-        return HINTS[label]
 
     def cells(self, entry: Entry) -> list[tuple[str, str]]:
         """Return what each column shows of a loop, and what it is sorted by."""
@@ -117,7 +125,7 @@ class Columns:
             (text(why), why),
             (percent(entry.band_share) if entry.found else "", entry.band_share),
             (_friction(entry), entry.f_s if entry.found else None),
-            (percent(entry.confidence), entry.confidence),
+            (percent(entry.probability), entry.probability),
             _figure(None if cycle is None else cycle.period, period),
             _figure(None if cycle is None else cycle.amplitude, figure),
             *(_saved(entry, what) for what in HEADS if self.gains),
@@ -126,7 +134,10 @@ class Columns:
             (text(entry.group or ""), entry.group),
             (text(entry.reason), entry.reason),
         ]
-        return [(shown, _value(value)) for shown, value in found]
+        return [
+            (shown or _dash(label, entry), _value(value))
+            for (_, label), (shown, value) in zip(self.heads, found, strict=True)
+        ]
 
     def _trend(self, entry: Entry) -> Cell:
         trend = self.trends.get(entry.name)
@@ -141,7 +152,7 @@ def _figure(value: float | None, words: Callable[[float | None], str]) -> Cell:
 
 
 def _name(entry: Entry) -> str:
-    name = text(entry.name)
+    name = "<wbr>".join(text(part) for part in re.split(r"(?<=[_.:/])", entry.name))
     return f'<a href="{text(entry.report)}">{name}</a>' if entry.report else name
 
 
@@ -158,6 +169,17 @@ def _saved(entry: Entry, what: str) -> Cell:
         return "", None
     whole = text(shown).replace(" %", "&nbsp;%")
     return f'<span title="{text(note)}">{whole}</span>', change(entry, what)
+
+
+def _dash(label: str, entry: Entry) -> str:
+    """Return an empty cell, which says why it is empty."""
+    why = NONE.get(label, "")
+    if not why:
+        healthy = entry.verdict == "healthy"
+        why = "The valve is healthy." if healthy else "It is not decided whether the valve sticks."
+    if entry.status is not Status.OK and label != "why not judged":
+        why = "The loop was not judged."
+    return f'<span role="img" aria-label="{why}" title="{why}">–</span>'
 
 
 def _value(value: object) -> str:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stiction_ros import __version__
+from stiction_ros.pages.frame import SCROLLED, card, framed, text, words
 from stiction_ros.survey.entry import Entry
-from stiction_ros.survey.listing.columns import Columns
+from stiction_ros.survey.listing.columns import HINTS, Columns
 from stiction_ros.survey.listing.headline import changed, headline, kind_of, worked
-from stiction_ros.survey.pages.frame import card, framed, text
 from stiction_ros.survey.pages.trend import Earlier
 from stiction_ros.survey.pages.words import cause_words, period
 from stiction_ros.survey.survey import Survey
@@ -32,9 +31,10 @@ const filter = () => {
   shown.textContent = count + " of " + rows.length + " loops";
 };
 for (const input of [search, kind, cause]) input.addEventListener("input", filter);
-const heads = [...document.querySelectorAll("table.list th")];
+const heads = [...document.querySelectorAll("table.list thead th")];
 heads.forEach((head, column) => head.querySelector("button").addEventListener("click", () => {
-  const up = head.getAttribute("aria-sort") !== "ascending";
+  const now = head.getAttribute("aria-sort"), first = head.matches(".t, .up");
+  const up = now ? now !== "ascending" : first;
   heads.forEach(other => other.removeAttribute("aria-sort"));
   head.setAttribute("aria-sort", up ? "ascending" : "descending");
   const of = row => row.children[column].dataset.value;
@@ -69,7 +69,7 @@ def list_page(survey: Survey, earlier: Sequence[Earlier] = ()) -> str:
         _groups(survey),
         _legend(columns),
     ]
-    return framed(f"Survey: {first}", parts, f"stiction_ros {__version__}", SCRIPT)
+    return framed(f"Survey: {first}", parts, SCRIPT, full=True)
 
 
 def _how(survey: Survey) -> str:
@@ -83,15 +83,15 @@ def _how(survey: Survey) -> str:
 def _counts(entries: Sequence[Entry]) -> str:
     kinds = ("sticky", "backlash", "undecided", "healthy", "skipped", "failed")
     counts = {kind: sum(kind_of(entry) == kind for entry in entries) for kind in kinds}
-    return "".join(card(kind, str(count)) for kind, count in counts.items() if count)
+    return "".join(card(text(kind), str(count)) for kind, count in counts.items() if count)
 
 
 def _tools(entries: Sequence[Entry]) -> str:
     kinds = list(dict.fromkeys(kind_of(entry) for entry in entries))
     causes = sorted({entry.cause for entry in entries if entry.cause})
     return (
-        '<div class="tools"><input id="search" type="search" placeholder="Search tags, reasons" '
-        'aria-label="Search">'
+        '<div class="tools"><input id="search" type="search" placeholder="Search tags and reasons" '
+        'aria-label="Search tags and reasons">'
         f'<select id="kind" aria-label="Verdict"><option value="">all verdicts</option>'
         f"{''.join(f'<option>{text(kind)}</option>' for kind in kinds)}</select>"
         f'<select id="cause" aria-label="Cause"><option value="">all causes</option>'
@@ -106,27 +106,27 @@ def _cause(cause: str) -> str:
 
 def _table(entries: Sequence[Entry], columns: Columns) -> str:
     head = [
-        f'<th class="{kind}"><button type="button" title="{text(columns.hint(label))}">'
-        f"{text(label)}</button></th>"
+        f'<th class="{kind}" scope="col"><button type="button" title="{text(HINTS[label])}">'
+        f"{words(label)}</button></th>"
         for kind, label in columns.heads
     ]
     rows = []
     for entry in entries:
-        cells = "".join(
-            f'<td class="{kind}" data-label="{text(label)}" data-value="{text(value)}">{shown}</td>'
-            for (kind, label), (shown, value) in zip(
-                columns.heads, columns.cells(entry), strict=True
-            )
-        )
+        cells = []
+        for (kind, label), (shown, value) in zip(columns.heads, columns.cells(entry), strict=True):
+            tag = 'th scope="row"' if label == "loop" else f'td data-label="{text(label)}"'
+            kind += " none" * shown.endswith(">–</span>")
+            cells.append(f'<{tag} class="{kind}" data-value="{text(value)}">{shown}</{tag[:2]}>')
         rows.append(
             f'<tr data-kind="{text(kind_of(entry))}" data-cause="{text(entry.cause or "")}">'
-            f"{cells}</tr>"
+            f"{''.join(cells)}</tr>"
         )
     if not rows:
         return '<p class="note">There is no loop in what was given.</p>'
     return (
-        f'<table class="list"><thead><tr>{"".join(head)}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table>"
+        '<table class="list"><caption class="hidden">Loops, first the valves to service first. '
+        "A heading sorts the list.</caption>"
+        f"<thead><tr>{''.join(head)}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
 
@@ -139,6 +139,8 @@ def _groups(survey: Survey) -> str:
         page = pages.get(name)
         return f'<a href="{text(page)}">{text(name)}</a>' if page else text(name)
 
+    heads = (("", "group"), ("", "period"), ("t", "likely source"), ("t", "with it"))
+    titles = "".join(f'<th scope="col" class="{kind}">{head}</th>' for kind, head in heads)
     rows = "".join(
         f"<tr><td>{group.number}</td><td>{text(period(group.period))}</td>"
         f"<td class='t'>{named(group.names[0])}</td>"
@@ -147,25 +149,20 @@ def _groups(survey: Survey) -> str:
     )
     return (
         "<h2>Loops that cycle together</h2><p>They keep the same time; the likely source comes "
-        "first.</p><div class='wide'><table><thead><tr><th>group</th><th>period</th>"
-        "<th class='t'>likely source</th><th class='t'>with it</th></tr></thead>"
+        f"first.</p>{SCROLLED}<table><thead><tr>{titles}</tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
 
 
 def _legend(columns: Columns) -> str:
-    money = " Where a cost was given it weighs in." if columns.costs else ""
-    gain = (
-        " <i>|PV−SP| serviced</i>, <i>embedding</i> and <i>retuned</i> say what a service, a "
-        "controller that knows the friction or another tuning changes of the mean |PV − SP|, "
-        "simulated: −75 % leaves a quarter of it. Where a word stands the record does not tell, "
-        "or nothing is gained; the page of the loop says more."
-        if columns.gains
-        else ""
+    money = " A cost that was given counts too." if columns.costs else ""
+    hints = "".join(
+        f"<dt>{words(label)}</dt><dd>{words(HINTS[label])}</dd>" for _, label in columns.heads
     )
     return (
         "<h2>How to read it</h2><p>Valves that stick or have backlash and make their loop cycle "
-        "come first, those that are surest and lose most of OP's movement in their band at the "
-        "top. Undecided ones follow in the order of what speaks for their friction."
-        f"{money}{gain} The page of a loop has all figures with their intervals.</p>"
+        "come first. Of these, the surest ones that lose most of OP's movement are at the top. "
+        "Undecided valves follow in the order of what speaks for their friction."
+        f"{money} The page of a loop has all figures with their intervals. A dash says on "
+        f"pointing why a cell is empty.</p><dl>{hints}</dl>"
     )

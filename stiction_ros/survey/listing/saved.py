@@ -9,9 +9,9 @@ from stiction_ros.survey.entry import Entry
 from stiction_ros.survey.pages.words import signed_percent
 
 HEADS = {
-    "service": "|PV−SP| serviced",
-    "embedding": "|PV−SP| embedding",
-    "retune": "|PV−SP| retuned",
+    "service": "|PV−SP| after service",
+    "embedding": "|PV−SP| with friction known",
+    "retune": "|PV−SP| after retuning",
 }
 """Heading of each thing that may be done, wherever people read it."""
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
-from stiction_ros import __version__
-from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.words import materiality, next_step, why
+from stiction_ros.pages.frame import card, framed, text, words
+from stiction_ros.pages.plot import SCRIPT
+from stiction_ros.pages.signals import Units, all_signals, close_look
 from stiction_ros.records.record import Record
 from stiction_ros.survey.entry import Entry
-from stiction_ros.survey.pages.frame import card, framed, marked_card, text
-from stiction_ros.survey.pages.plot import SCRIPT, Curve, against, over_time
 from stiction_ros.survey.pages.trend import PLACE
 from stiction_ros.survey.pages.unit import unit_mark
 from stiction_ros.survey.pages.words import (
@@ -64,16 +61,18 @@ def loop_page(
     op_unit = "% of travel" if entry.op_unit == PERCENT else "OP's own unit"
     cycle = entry.oscillation
     cards = [
-        card(f"friction f_S, {op_unit}", figure(entry.f_s) or "–"),
-        card("between", interval(entry.f_s_interval) or "–"),
-        card(f"sliding friction f_D, {op_unit}", figure(entry.f_d) or "–"),
-        card("of what OP moves is lost in the band", percent(entry.band_share) or "–"),
-        card("confidence", percent(entry.confidence) or "–"),
-        card("why it cycles", cause_words(entry.cause or "none")),
+        card(words(f"friction f_S, {op_unit}"), figure(entry.f_s) or "–"),
+        card("f<sub>S</sub> lies between", interval(entry.f_s_interval) or "–"),
+        card(words(f"sliding friction f_D, {op_unit}"), figure(entry.f_d) or "–"),
+        card("share of OP's movement lost to it", percent(entry.band_share) or "–"),
+        card("probability", percent(entry.probability) or "–"),
+        card("the loop cycles by", text(cause_words(entry.cause or "none"))),
     ]
     if cycle is not None and cycle.period is not None:
         cards.append(card("period of the cycle", period(cycle.period)))
-        cards.append(marked_card("its amplitude", f"{figure(cycle.amplitude)} {unit_mark(unit)}"))
+        cards.append(card("amplitude of the cycle", f"{figure(cycle.amplitude)} {unit_mark(unit)}"))
+    known = found.stem.shape == record.op.shape
+    units = Units(unit_mark(unit), text(op_unit))
     sentence = next((o.cause.sentence for o in found.outputs if o.cause is not None), "")
     reason = found.reason
     parts = [
@@ -82,14 +81,15 @@ def loop_page(
         f'<p class="soft">{text(_span(record))}</p>',
         f'<p class="note warn">The fit is not to be trusted: {text(reason)}</p>' if reason else "",
         f"<p>{text(sentence)}</p>" if sentence else "",
-        *[f"<p>{text(said)}</p>" for said in _answers(found, entry.op_unit)],
+        *[f"<p>{words(said)}</p>" for said in _answers(found, entry.op_unit)],
         f'<div class="cards">{"".join(cards)}</div>',
         PLACE,
         gain_table(gain, unit, op_unit),
-        *_figures(record, found, unit, op_unit),
+        close_look(record, found, units),
+        all_signals(record, found.stem if known else None, units),
         _notes(entry),
     ]
-    return framed(f"{entry.name}: {headline}", parts, f"stiction_ros {__version__}", SCRIPT)
+    return framed(f"{entry.name}: {headline}", parts, SCRIPT)
 
 
 def _answers(found: Identification, op_unit: str) -> list[str]:
@@ -105,7 +105,10 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
     """Return what would help as a table; nothing where it was not simulated."""
     if gain is None:
         return ""
-    head = ("", "amplitude", "period, s", "mean |PV−SP|", "travel/h", "moves/h", "reversals/h", "")
+    head = (
+        *("what is done", "amplitude", "period, s", "mean |PV−SP|"),
+        *("travel/h", "moves/h", "reversals/h", "how it was found"),
+    )
     keys = (
         "amplitude",
         "period",
@@ -120,7 +123,7 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
         between = f" Mean |PV−SP| {interval((ends[0], ends[1]))}." if ends else ""
         name = OPTIONS[option["what"]]
         rows.append(_gain_row(name, option, head, keys, option["note"] + between))
-    titles = "".join(f"<th>{text(title)}</th>" for title in head)
+    titles = "".join(f"<th scope='col'>{text(title)}</th>" for title in head)
     return (
         f"<h2>What would help</h2><p class='soft'>Amplitude and mean |PV−SP| in "
         f"{unit_mark(unit)}, travel in {text(op_unit)}.</p><table class='list'><thead><tr>"
@@ -136,7 +139,8 @@ def _gain_row(
         for label, key in zip(head[1:], keys, strict=False)
     )
     return (
-        f"<tr><td class='t name'>{text(name)}</td>{cells}<td class='t wordy'>{text(note)}</td></tr>"
+        f"<tr><th scope='row' class='t name'>{text(name)}</th>{cells}"
+        f"<td class='t wordy'>{text(note)}</td></tr>"
     )
 
 
@@ -146,38 +150,6 @@ def _span(record: Record) -> str:
         f"{len(record)} samples of {record.sample_time:g} s, {period(seconds)} of operation, were "
         "looked at."
     )
-
-
-def _figures(record: Record, found: Identification, unit: str, op_unit: str) -> list[str]:
-    time, word = _hours(record)
-    drawn = []
-    for i, name in enumerate(record.outputs):
-        curves = [Curve(f"{name}, measured", "pv", record.pv[:, i])]
-        if record.sp is not None:
-            curves.append(Curve("set-point", "sp", record.sp[:, i]))
-        axis = f"{text(name)} ({unit_mark(unit)})"
-        drawn.append(over_time(f"{name} and its set-point.", time, word, curves, axis))
-    known = found.stem.shape == record.op.shape
-    for j, name in enumerate(record.valves):
-        curves = [Curve(f"{name}, controller output", "op", record.op[:, j])]
-        if known:
-            curves.append(Curve("stem, estimated", "stem", found.stem[:, j], steps=True))
-        drawn.append(over_time(f"{name} and its stem.", time, word, curves, text(op_unit)))
-        if known:
-            title = (
-                f"Stem of {name} against OP: a valve that sticks rests on level lines and then "
-                "jumps, a healthy one stays on the diagonal."
-            )
-            drawn.append(against(title, record.op[:, j], found.stem[:, j], op_unit))
-    return ["<h2>Signals</h2>", *drawn]
-
-
-def _hours(record: Record) -> tuple[FloatArray, str]:
-    span = len(record) * record.sample_time
-    for word, size in (("hours", 3600.0), ("minutes", 60.0)):
-        if span > 4.0 * size:
-            return np.asarray(record.time / size), word
-    return record.time, "seconds"
 
 
 def _notes(entry: Entry) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 
+from stiction_ros.pages.frame import text
+from stiction_ros.pages.plot import spark
 from stiction_ros.survey.entry import Entry
-from stiction_ros.survey.pages.frame import text
-from stiction_ros.survey.pages.plot import spark
 from stiction_ros.survey.pages.words import figure, op_figure
 
 PLACE = "<!-- trend --><!-- /trend -->"

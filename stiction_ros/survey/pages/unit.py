@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from stiction_ros.survey.pages.frame import text
+from stiction_ros.pages.frame import text
 
 NONE = "PV units"
 """What stands where no unit was given."""

@@ -54,7 +54,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "bench",
-        help="measure speed, side by side",
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
         "loops that share nothing with it), how often identification is (field), whether its "
@@ -67,7 +66,7 @@ def add(commands: Any) -> None:
         nargs="?",
         default="graph",
         choices=(*BENCHMARKS, "gap", *COUNTS),
-        help="default: graph",
+        help="what to measure (graph)",
     )
     group = parser.add_argument_group("identification; --seed and --quick also for control")
     group.add_argument(
@@ -76,7 +75,7 @@ def add(commands: Any) -> None:
         metavar="N",
         help="runs of the exact search; nlp and grid run once (3)",
     )
-    group.add_argument("--seed", type=int, metavar="N", help="of the simulated records (7)")
+    group.add_argument("--seed", type=int, metavar="N", help="seed of the simulated records (7)")
     group.add_argument(
         "--longest", type=int, metavar="N", help="longest record of growing N (100000)"
     )

@@ -3,40 +3,16 @@
 COMMANDS: dict[str, tuple[str, str]] = {
     name: (f"stiction_studies.{module}", text)
     for name, module, text in (
-        ("example", "commands.example", "identify a loop whose truth is known, and compare"),
-        ("study", "commands.scenario", "run a scenario over many seeds, without ROS"),
-        (
-            "study-change",
-            "commands.change",
-            "run a scenario whose sticky valve changes after the swap, without ROS",
-        ),
-        (
-            "study-control",
-            "commands.control",
-            "the exact embedding on the tank when friction or inputs are not as known",
-        ),
-        (
-            "study-monitor",
-            "commands.monitor",
-            "the estimator's monitor over loops in which an effect sets in half-way",
-        ),
-        (
-            "study-wear",
-            "commands.wear",
-            "IAE against moves of the stem, over controllers and the worth of a move",
-        ),
-        (
-            "faults",
-            "commands.faults",
-            "put faults into a running graph and judge what becomes of it",
-        ),
-        (
-            "soak",
-            "commands.soak",
-            "a long run with the real nodes: missed samples, growth of memory",
-        ),
-        ("paper", "commands.paper", "every figure and table of the paper, printed beside ours"),
-        ("bench", "benches.command", "measure speed, side by side"),
+        ("example", "commands.example", "identify an example, compare with truth"),
+        ("study", "commands.scenario", "run a scenario over many seeds"),
+        ("study-change", "commands.change", "a valve that changes after the swap"),
+        ("study-control", "commands.control", "the tank when friction is not as known"),
+        ("study-monitor", "commands.monitor", "the monitor when an effect sets in"),
+        ("faults", "commands.faults", "put faults into a running graph"),
+        ("soak", "commands.soak", "run the nodes for long: misses, memory"),
+        ("paper", "commands.paper", "figures and tables of the paper, and ours"),
+        ("calibrate", "commands.calibrate", "fit the probability of friction"),
+        ("bench", "benches.command", "measure speed and accuracy"),
         ("demo opcua", "commands.demo_opcua", "the tank behind a control system"),
         ("demo --compare", "commands.compare", "Example 2 under five controllers, without ROS"),
         ("experiment plant", "commands.experiment_plant", "a folder of exports of known truth"),

@@ -58,16 +58,21 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study-change",
-        help="run a scenario whose sticky valve changes after the swap, without ROS",
         description="Run a scenario's live loop over many seeds by the core, without ROS; once the "
         "controller knows the friction, the valve changes: serviced (no friction is left), "
         "little (f_S .2 %, f_D .1 %), grown (f_S half as large again), both (f_D as well), or "
         "unchanged. Exit code 1 when a run did not do what is asked.",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
-    parser.add_argument("--change", choices=CHANGES, default="serviced", help="(serviced)")
     parser.add_argument(
-        "--seeds", type=seed_range, default=(11, 30), metavar="A:B", help="inclusive (11:30)"
+        "--change", choices=CHANGES, default="serviced", help="how the valve changes (serviced)"
+    )
+    parser.add_argument(
+        "--seeds",
+        type=seed_range,
+        default=(11, 30),
+        metavar="A:B",
+        help="seeds from A to B (11:30)",
     )
     add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write every run; - for stdout")

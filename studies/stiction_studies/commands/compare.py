@@ -50,7 +50,9 @@ def add_options(parser: Any) -> None:
         help="Figure 6: unaware, inversion and embedding as printed, exact, no friction",
     )
     group.add_argument("--plant", choices=choices.PLANTS, help="linear is (A.3) (default: both)")
-    group.add_argument("--seeds", type=seed_range, metavar="A:B", help="inclusive (101:103)")
+    group.add_argument(
+        "--seeds", type=seed_range, metavar="A:B", help="seeds from A to B (101:103)"
+    )
     group.add_argument(
         "--preset",
         choices=choices.PRESETS,
@@ -59,15 +61,17 @@ def add_options(parser: Any) -> None:
     group.add_argument(
         "--warm-start",
         choices=choices.WARM_STARTS,
-        help="of the embedding as printed (compensation)",
+        help="start of the embedding as printed (compensation)",
     )
     group.add_argument(
         "--programme-cost",
         choices=choices.PROGRAMME_COSTS,
-        help="of the embedding as printed: (22), or the plain (19a) (revised)",
+        help="cost of the embedding as printed: (22), or the plain (19a) (revised)",
     )
     group.add_argument(
-        "--law", choices=choices.PRINTED_LAWS, help="of the sticky valve and its controllers (he)"
+        "--law",
+        choices=choices.PRINTED_LAWS,
+        help="friction law of the sticky valve and its controllers (he)",
     )
     group.add_argument(
         "--known",
@@ -79,7 +83,12 @@ def add_options(parser: Any) -> None:
         "--schedule", choices=choices.SCHEDULES, help="set-points drawn for each seed (held-out)"
     )
     group.add_argument("--hold", type=int, metavar="MIN", help="minutes between moves (120)")
-    group.add_argument("--jobs", type=int, metavar="N", help="processes; times need 1 (all cores)")
+    group.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="number of processes; to measure times take 1 (all cores)",
+    )
     group.add_argument("--json", metavar="F", help="write all scores; - for stdout")
 
 

@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
-from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 from stiction_ros.signals.holds import holds
 from stiction_studies.commands import choices
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 OFFSET_LIMITS = (0.006, 0.02)  # kg/m³, °C
 WIDTH = 118  # characters that the table needs
 WORK = ("moves", "travel", "reversals")
-TWO = "two_valves"  # the case whose valves both stick
 CYCLE_LIMIT = 0.15  # of the amplitude that the unaware controller leaves
 
 
@@ -69,22 +67,20 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study-control",
-        help="the exact embedding on the tank when friction or inputs are not as known",
         description="Run the tank of Example 2 under the exact embedding on set-points that no "
         "tuning has seen, with right and wrong friction, unmeasured steps and two sticky valves, "
         "and compare the noise-free outputs with the loop without stiction. Exit code 1 when a "
         "case misses what is asked of it.",
     )
     parser.add_argument(
-        "--seeds", type=seed_range, default=(101, 110), metavar="A:B", help="inclusive (101:110)"
+        "--seeds",
+        type=seed_range,
+        default=(101, 110),
+        metavar="A:B",
+        help="seeds from A to B (101:110)",
     )
     known = ", ".join(choices.CONTROL_CASES)
     parser.add_argument("--cases", metavar="A,B", help=f"some of {known}")
-    parser.add_argument(
-        "--floor",
-        action="store_true",
-        help=f"{TWO}: also the least IAE that so many moves of either valve can buy at all",
-    )
     add_jobs(parser)
     parser.add_argument("--json", metavar="F", help="write the scores; - for stdout")
     parser.set_defaults(run=run)
@@ -160,8 +156,6 @@ def run(options: argparse.Namespace) -> int:
         if name not in choices.CONTROL_CASES:
             known = ", ".join(choices.CONTROL_CASES)
             raise InputError(f"no case {name!r}", where="--cases", fix=f"use {known}")
-    if options.floor and TWO not in names:
-        raise InputError(f"is that of {TWO}", where="--floor", fix=f"add {TWO} to --cases")
     work = functools.partial(run_seed, names)
     seeds = run_seeds(work, options.seeds, options.jobs, "tank")
     found = [scores(name, [seed[name] for seed in seeds]) for name in names]
@@ -170,31 +164,7 @@ def run(options: argparse.Namespace) -> int:
         [{**dataclasses.asdict(s), "met": s.met} for s in found],
         lambda: _print(found, options.seeds),
     )
-    if options.floor:
-        _print_floor([seed[TWO] for seed in seeds])
     return 0 if all(score.met for score in found) else 1
-
-
-def _print_floor(runs: list[Runs]) -> None:
-    from stiction_ros.online.session import Scenario
-    from stiction_ros.processes.stirred_tank import StirredTank
-    from stiction_studies.examples.control_cases import SECOND, TANK
-    from stiction_studies.examples.wear_floor import floor_of, least_iae_beside
-
-    process = Scenario.load(find_config(TANK)).plant.process
-    assert isinstance(process, StirredTank)
-    sp = runs[0][0].sp
-    jumps = [getattr(law, "jump", 0.0) for law in SECOND.values()]
-    floors = floor_of(process, sp[:, 0], jumps[0]), least_iae_beside(process, sp, jumps[1])
-    hours = len(sp) * process.sample_time / 3600.0
-    free = np.mean([reference.iae for _, reference, _ in runs], axis=0) * hours
-    table = Table(title=f"{TWO}, least IAE over that without friction", title_justify="left")
-    for name in ("moves of the valve", "C, by V1", "T, by V2"):
-        table.add_column(name, justify="right")
-    for moves in range(max(map(len, floors))):
-        cells = [floor[min(moves, len(floor) - 1)] for floor in floors] / free
-        table.add_row(f"{moves}", *(f"{cell:.2f}" for cell in cells))
-    Console().print(table)
 
 
 def _print(found: list[CaseScores], seeds: tuple[int, int]) -> None:

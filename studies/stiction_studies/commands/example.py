@@ -108,23 +108,29 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "example",
-        help="identify a loop whose truth is known, and compare",
         description="Make a record whose truth is known, identify it and print both side by "
         "side: the paper's Examples 1 and 2, or loops without friction that oscillate for "
         "another reason. With --seeds: how often the identification is right.",
     )
     parser.add_argument("name", choices=tuple(NAMES), metavar="NAME", help=", ".join(NAMES))
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
-    parser.add_argument("--seeds", type=seed_range, metavar="A:B", help="many, inclusive")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the noise (1)")
+    parser.add_argument(
+        "--seeds", type=seed_range, metavar="A:B", help="seeds from A to B, in place of --seed"
+    )
     add_jobs(parser)
     for name, (option, known) in VARIANTS.items():
         parser.add_argument(f"--{option}", choices=known, help=f"{name} (default: {known[0]})")
     parser.add_argument(
-        "--samples", type=int, metavar="N", help="of examples 1 (2500) and 2 (1240)"
+        "--samples", type=int, metavar="N", help="number of samples of example 1 (2500) or 2 (1240)"
     )
     parser.add_argument("--na", type=int, metavar="N", help="order n_a (default: the example's)")
     parser.add_argument("--nb", type=int, metavar="N", help="order n_b (default: n_a)")
-    parser.add_argument("--method", default="exact", choices=choices.COUNTED, help="search (exact)")
+    parser.add_argument(
+        "--method",
+        default="exact",
+        choices=choices.COUNTED,
+        help="method of identification (exact)",
+    )
     add_search_options(parser)
     parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
     parser.add_argument(

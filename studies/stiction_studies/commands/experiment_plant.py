@@ -22,7 +22,9 @@ DESCRIPTION = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of a plant to those of ``stiction experiment``."""
-    parser.add_argument("--loops", type=int, default=500, metavar="N", help="of a plant (500)")
+    parser.add_argument(
+        "--loops", type=int, default=500, metavar="N", help="number of loops of a plant (500)"
+    )
     add_jobs(parser)
 
 

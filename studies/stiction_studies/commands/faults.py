@@ -31,32 +31,29 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "faults",
-        help="put faults into a running graph and judge what becomes of it",
         description="Start the nodes of a loop as processes, put one fault into it, and hold "
         "what is seen against what is expected: before and after the swap, in both paces. "
-        "docs/faults.md tells all of them, docs/connect.md those with --opcua.",
+        "Without --only and --all print the table of all faults. "
+        "docs/faults.md tells all of them, docs/opcua.md those with --opcua.",
     )
-    which = parser.add_mutually_exclusive_group(required=True)
-    which.add_argument(
-        "--only", action="append", metavar="NAME", help="this fault; may be repeated"
-    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--only", action="append", metavar="NAME", help="one fault; may be repeated")
     which.add_argument("--all", action="store_true", help="every fault (up to an hour)")
-    which.add_argument("--list", action="store_true", help="print the table of all faults")
     parser.add_argument(
         "--opcua",
         action="store_true",
-        help="those between a control system and its bridge, in place of those of the loop",
+        help="faults between a control system and its bridge, in place of faults of the loop",
     )
-    parser.add_argument("--pace", choices=[p.value for p in Pace], help="in this pace alone")
+    parser.add_argument("--pace", choices=[p.value for p in Pace], help="only in this pace")
     parser.add_argument(
-        "--phase", choices=[p.value for p in Phase], help="on this side of the swap"
+        "--phase", choices=[p.value for p in Phase], help="only on this side of the swap"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the noise (1)")
     parser.add_argument(
-        "--speed", type=float, default=25.0, metavar="N", help="of realtime pace (25)"
+        "--speed", type=float, default=25.0, metavar="N", help="speed in realtime pace (25)"
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="keep logs and bags of cases that fail here (out/faults)"
+        "--out", metavar="DIR", help="folder for logs and bags of cases that fail (out/faults)"
     )
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="loops that run at a time (1)"
@@ -76,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
         return faults_opcua.run(options)
     from stiction_studies.faults.catalogue import FAULTS, find, table
 
-    if options.list:
+    if not (options.all or options.only):
         print(table(), end="")
         return 0
     faults = FAULTS if options.all else tuple(find(name) for name in options.only)

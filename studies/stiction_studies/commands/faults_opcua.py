@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     for key in ("pace", "phase"):
         if getattr(options, key) is not None:
             raise InputError("has no meaning with --opcua", where=f"--{key}", fix="leave it out")
-    if options.list:
+    if not (options.all or options.only):
         print(table(), end="")
         return 0
     faults = FAULTS if options.all else tuple(find(name) for name in options.only)

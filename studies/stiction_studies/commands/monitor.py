@@ -23,14 +23,17 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study-monitor",
-        help="the estimator's monitor over loops in which an effect sets in half-way",
         description="Run the monitor over long loops drawn by seed. From the middle on one effect "
         "acts, or none with --healthy. Print alarms and what was named.",
     )
     parser.add_argument(
-        "--seeds", type=seed_range, default=(10000, 10019), metavar="A:B", help="(10000:10019)"
+        "--seeds",
+        type=seed_range,
+        default=(10000, 10019),
+        metavar="A:B",
+        help="seeds from A to B (10000:10019)",
     )
-    parser.add_argument("--healthy", action="store_true", help="nothing sets in")
+    parser.add_argument("--healthy", action="store_true", help="loops in which no effect sets in")
     parser.add_argument(
         "--false-alarm", type=float, metavar="P", help="monitor_false_alarm (as the node)"
     )

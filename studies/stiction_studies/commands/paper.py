@@ -20,18 +20,21 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "paper",
-        help="every figure and table of the paper, printed beside ours",
         description="Draw the paper's figures and print its tables, the printed number beside "
         "ours, as one page. With --success: count how often a method finds the friction.",
     )
     parser.add_argument(
-        "--figure", type=int, action="append", choices=choices.FIGURES, help="one figure; repeat"
+        "--figure",
+        type=int,
+        action="append",
+        choices=choices.FIGURES,
+        help="one figure; may be repeated",
     )
     parser.add_argument(
-        "--table", action="append", choices=choices.TABLES, help="one table; repeat"
+        "--table", action="append", choices=choices.TABLES, help="one table; may be repeated"
     )
     parser.add_argument("--all", action="store_true", help="every figure and every table")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the noise (1)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the noise (1)")
     parser.add_argument("--out", required=True, metavar="DIR", help="page, figures, paper.json")
     group = parser.add_argument_group("counting, in place of figures and tables")
     group.add_argument(

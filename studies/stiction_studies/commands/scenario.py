@@ -54,14 +54,17 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study",
-        help="run a scenario over many seeds, without ROS",
         description="Run a scenario's live loop over many seeds by the core, without ROS, and "
         "print what was identified and what the swap gained. Exit code 1 when a run with "
         "sticky valves was not swapped, or one with ideal valves was.",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="tank, siso, or a file")
     parser.add_argument(
-        "--seeds", type=seed_range, default=(11, 20), metavar="A:B", help="inclusive (11:20)"
+        "--seeds",
+        type=seed_range,
+        default=(11, 20),
+        metavar="A:B",
+        help="seeds from A to B (11:20)",
     )
     parser.add_argument("--ideal-valves", action="store_true", help="valves that follow OP")
     add_jobs(parser)

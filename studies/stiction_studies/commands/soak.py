@@ -26,7 +26,6 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "soak",
-        help="a long run with the real nodes: missed samples, growth of memory",
         description="Run the nodes of a scenario as processes for hours. Fails when a sample was "
         "missed, or when a node's memory has grown since a tenth of the run (docs/faults.md).",
     )
@@ -37,15 +36,18 @@ def add(commands: Any) -> None:
         metavar="SCENARIO",
         help="siso, tank, or a file (siso)",
     )
-    parser.add_argument("--hours", type=float, metavar="H", help="wall time")
+    parser.add_argument("--hours", type=float, metavar="H", help="hours of wall time")
     parser.add_argument("--samples", type=int, metavar="N", help="samples, in place of hours")
     parser.add_argument(
-        "--pace", choices=[p.value for p in Pace], default="lockstep", help="(lockstep)"
+        "--pace",
+        choices=[p.value for p in Pace],
+        default="lockstep",
+        help="pace of the loop (lockstep)",
     )
     parser.add_argument(
-        "--speed", type=float, default=100.0, metavar="N", help="of realtime pace (100)"
+        "--speed", type=float, default=100.0, metavar="N", help="speed in realtime pace (100)"
     )
-    parser.add_argument("--out", metavar="DIR", help="keep bag and logs here")
+    parser.add_argument("--out", metavar="DIR", help="folder for bag and logs")
     parser.add_argument("--json", metavar="F", help="write the figures; - for stdout")
     parser.set_defaults(run=run)
 

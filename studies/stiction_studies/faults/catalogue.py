@@ -30,7 +30,7 @@ def find(name: str) -> Fault:
     Raises:
         InputError: there is none.
     """
-    return named(FAULTS, name, "stiction faults --list")
+    return named(FAULTS, name, "stiction faults")
 
 
 def table() -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from stiction_ros.pages.frame import framed, text
 from stiction_ros.paper.controllers.weights import ProgrammeCost
 from stiction_ros.report.drawing import (
     BLUE,
@@ -22,7 +23,7 @@ from stiction_ros.report.drawing import (
     data_limits,
     style,
 )
-from stiction_ros.report.page import Cell, embedded, number, page, table, text
+from stiction_ros.report.page import Cell, embedded, number, table
 from stiction_ros.report.run.story import TANK_UNITS
 from stiction_studies.examples.control_study import COLUMNS, ColumnRun, StudyOptions, Trial
 from stiction_studies.pages.control_scores import ColumnScore, mean_score, score_trial
@@ -111,7 +112,7 @@ def report_study(studies: Sequence[PlantStudy], directory: Path) -> Path:
     """Write ``compare.html`` and its figures as PNG and SVG, and return the page."""
     parts = [
         "<h1>Example 2: three formulations of the paper, one exact, one without friction</h1>",
-        f'<p class="kicker">{text(describe(studies[0]))}</p>',
+        f'<p class="soft">{text(describe(studies[0]))}</p>',
     ]
     for study in studies:
         drawing = draw_study(study)
@@ -125,9 +126,9 @@ def report_study(studies: Sequence[PlantStudy], directory: Path) -> Path:
             f"<p>{text(_choices(study))}</p>",
             embedded(drawing),
         ]
-    parts.append(f'<p class="note">{text(_NOTE)}</p>')
+    parts.append(f'<p class="soft">{text(_NOTE)}</p>')
     target = directory / "compare.html"
-    page_text = page("Example 2: controllers compared", parts)
+    page_text = framed("Example 2: controllers compared", parts)
     target.write_text(page_text, encoding="utf-8")
     return target
 

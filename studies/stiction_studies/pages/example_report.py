@@ -10,6 +10,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
+from stiction_ros.pages.frame import framed, text
 from stiction_ros.processes import StirredTank
 from stiction_ros.report.drawing import (
     BLUE,
@@ -23,7 +24,7 @@ from stiction_ros.report.drawing import (
     panels,
     style,
 )
-from stiction_ros.report.page import Cell, card, duration, embedded, number, page, table, text
+from stiction_ros.report.page import Cell, card, duration, embedded, number, table
 from stiction_ros.report.record.report import evidence_table
 from stiction_ros.report.run.identified import KINDS, process_table, verdict_line
 from stiction_ros.report.run.story import TANK_UNITS
@@ -71,7 +72,7 @@ def report_example(
     )
     parts = [
         f"<h1>{text(headline)}</h1>",
-        f'<p class="kicker">{text(kicker)}</p>',
+        f'<p class="soft">{text(kicker)}</p>',
         f'<div class="cards">{"".join(map(_card, comparison.valves))}</div>',
         comparison_table(comparison),
         _errors(comparison),
@@ -79,7 +80,7 @@ def report_example(
         evidence_table(found.valves),
         process_table(values["outputs"], record.sample_time),
     ]
-    target.write_text(page(headline, parts), encoding="utf-8")
+    target.write_text(framed(headline, parts), encoding="utf-8")
     return target
 
 
@@ -224,7 +225,7 @@ def _errors(comparison: Comparison) -> str:
         f"{number(comparison.square_error, 6)}; with the true stems and delays it is "
         f"{number(comparison.true_stem_square_error, 6)}. The smaller SE need not belong to "
         "the better stem: the data show PV, not the stem.</p>"
-        '<p class="note">Step responses are compared by their largest difference, as a share '
+        '<p class="soft">Step responses are compared by their largest difference, as a share '
         "of the output’s largest true gain.</p>"
     )
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.pages.frame import framed
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
 from stiction_ros.records.run.log import RunLog, read_run
 from stiction_ros.records.storage.bag_metadata import BagTopic
@@ -28,7 +29,7 @@ from stiction_ros.report.drawing import (
     panels,
     style,
 )
-from stiction_ros.report.page import card, duration, embedded, number, page, table
+from stiction_ros.report.page import card, duration, embedded, number, table
 from stiction_ros.report.run.scoring import Phases, phases
 from stiction_ros.report.run.summary import measured, messages, write_json
 from stiction_ros.report.run.work_table import work_rows
@@ -278,7 +279,7 @@ def _page(summary: Mapping[str, Any], drawing: Drawing) -> str:
     good = summary["status"] == "ok"
     parts = [
         "<h1>A loop bridged by OPC UA</h1>",
-        f'<p class="kicker">{summary["samples"]} samples in {duration(summary["seconds"])}</p>',
+        f'<p class="soft">{summary["samples"]} samples in {duration(summary["seconds"])}</p>',
         '<div class="cards">',
         card(
             "good" if good else "bad",
@@ -310,4 +311,4 @@ def _page(summary: Mapping[str, Any], drawing: Drawing) -> str:
     parts.append("<h2>The handshake</h2>")
     told = [(duration(one["time"]), one["state"], one["reason"]) for one in summary["grants"]]
     parts.append(table(("time", "grant", "reason"), told, 3))
-    return page("A loop bridged by OPC UA", parts)
+    return framed("A loop bridged by OPC UA", parts)

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from stiction_ros.errors import InputError, storing
-from stiction_ros.report.page import embedded, page, table, text
+from stiction_ros.pages.frame import framed, text
+from stiction_ros.report.page import embedded, table
 from stiction_studies.paper.exhibit import Exhibit
 from stiction_studies.paper.figures import controllers, diagrams, responses, trends
 from stiction_studies.paper.sources import Sources
@@ -85,7 +86,7 @@ def draw(
 def _write(made: Sequence[Exhibit], directory: Path) -> Path:
     parts = [
         "<h1>The paper, printed beside ours</h1>",
-        '<p class="kicker">Enhancing MPC formulations by identification and estimation of valve '
+        '<p class="soft">Enhancing MPC formulations by identification and estimation of valve '
         "stiction. What stands behind each row: docs/paper.md.</p>",
     ]
     for exhibit in made:
@@ -97,9 +98,9 @@ def _write(made: Sequence[Exhibit], directory: Path) -> Path:
             rows = [(row.what, row.printed, row.ours, row.remark) for row in exhibit.rows]
             parts.append(table(HEAD, rows, texts=4))
         if exhibit.remark:
-            parts.append(f'<p class="note">{text(exhibit.remark)}</p>')
+            parts.append(f'<p class="soft">{text(exhibit.remark)}</p>')
     target = directory / PAGE
-    target.write_text(page("The paper", parts), encoding="utf-8")
+    target.write_text(framed("The paper", parts), encoding="utf-8")
     document = [
         {
             "name": exhibit.name,

@@ -20,20 +20,6 @@ def test_a_case_is_scored_and_written(tmp_path: Path) -> None:
     assert max(found["cycle"]) < 0.3
 
 
-@pytest.mark.trial
-def test_the_floor_stands_below_the_table(capsys: pytest.CaptureFixture[str]) -> None:
-    call = ["study-control", "--seeds", "41:41", "--jobs", "1", "--cases", "two_valves"]
-    assert main([*call, "--floor"]) in (0, 1)
-    shown = capsys.readouterr().out
-    assert "moves of the valve" in shown
-    assert "T, by V2" in shown
-
-
-def test_a_floor_needs_its_case(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["study-control", "--cases", "nominal", "--floor"]) == 2
-    assert "two_valves" in capsys.readouterr().err
-
-
 def test_an_unknown_case_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study-control", "--cases", "none"]) == 2
     assert "nominal" in capsys.readouterr().err

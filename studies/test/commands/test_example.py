@@ -25,17 +25,20 @@ def result(directory: Path) -> dict[str, Any]:
     return dict(json.loads((directory / "result.json").read_text(encoding="utf-8")))
 
 
+@pytest.mark.trial
 def test_three_files_are_written(written: Path) -> None:
     names = {path.name for path in written.iterdir()}
     assert names == {"record.csv", "result.json", "report.html"}
 
 
+@pytest.mark.trial
 def test_the_record_is_the_example(written: Path) -> None:
     record, made = read_csv(written / "record.csv"), example1(2).record
     assert np.array_equal(record.op, made.op)
     assert np.array_equal(record.pv, made.pv)
 
 
+@pytest.mark.trial
 def test_the_result_compares_with_the_truth(written: Path) -> None:
     found = result(written)
     assert (found["example"], found["variant"], found["seed"]) == ("example1", "measurement", 2)
@@ -48,6 +51,7 @@ def test_the_result_compares_with_the_truth(written: Path) -> None:
     assert found["identification"]["samples"] == 2500
 
 
+@pytest.mark.trial
 def test_the_report_shows_the_figures(written: Path) -> None:
     page = (written / "report.html").read_text(encoding="utf-8")
     for name in ("step_responses", "window", "record", "valve_curves"):

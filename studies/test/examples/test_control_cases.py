@@ -49,6 +49,7 @@ def test_a_soft_bound_of_c_stops_the_loop_short_of_a_set_point_beyond_it(
     assert apart < 7.42
 
 
+@pytest.mark.trial
 def test_waiting_for_the_end_of_an_unmeasured_step_spares_moves() -> None:
     at_once, waiting = (
         [run_case(CASES["C_B"], seed, {"longest_wait": longest}) for seed in (41, 42)]

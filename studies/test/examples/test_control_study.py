@@ -30,16 +30,19 @@ def trial() -> Trial:
     return run_trial(SHORT, 5)
 
 
+@pytest.mark.trial
 def test_every_column_has_the_same_set_points(trial: Trial) -> None:
     first = trial.runs["free"].run.record.sp
     assert all(np.array_equal(run.run.record.sp, first) for run in trial.runs.values())  # type: ignore[arg-type]
 
 
+@pytest.mark.trial
 def test_every_column_has_the_same_noise(trial: Trial) -> None:
     noises = [run.run.record.pv - run.run.pv_clean for run in trial.runs.values()]
     assert all(noise == pytest.approx(noises[0], abs=1e-9) for noise in noises)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("column", COLUMNS, ids=lambda column: column.key)
 def test_the_valve_sticks_where_it_should(trial: Trial, column: Any) -> None:
     record = trial.runs[column.key].run.record
@@ -50,17 +53,20 @@ def test_the_valve_sticks_where_it_should(trial: Trial, column: Any) -> None:
     assert record.stem[:, 1] == pytest.approx(record.op[:, 1])
 
 
+@pytest.mark.trial
 def test_choices_are_counted_for_the_embedding_as_printed(trial: Trial) -> None:
     samples = len(trial.runs["printed"].run.record)
     assert sum(trial.runs["printed"].choices.values()) == samples
     assert trial.runs["exact"].choices == {}
 
 
+@pytest.mark.trial
 def test_all_steps_are_solved(trial: Trial) -> None:
     for run in trial.runs.values():
         assert run.statuses == {"solved": len(run.run.record)}
 
 
+@pytest.mark.trial
 def test_a_preset_changes_the_unaware_controller_alone() -> None:
     chosen = [column for column in COLUMNS if column.key in ("unaware", "exact")]
     own = run_trial(SHORT, 5, columns=chosen)
@@ -72,6 +78,7 @@ def test_a_preset_changes_the_unaware_controller_alone() -> None:
     assert same == {"unaware": False, "exact": True}
 
 
+@pytest.mark.trial
 def test_the_scenario_s_own_set_points_last_one_round() -> None:
     found = run_trial(StudyOptions(schedule="scenario"), 5, columns=COLUMNS[:1])
     run = found.runs["unaware"].run

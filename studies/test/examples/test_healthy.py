@@ -10,7 +10,7 @@ from stiction_ros.errors import InputError
 from stiction_ros.loop import PiController, SetPoints, simulate_closed_loop
 from stiction_studies.examples import FAMILIES, Example, healthy_loop
 
-SEEDS = range(1, 13)
+SEEDS = range(1, 8)
 
 
 @pytest.fixture(scope="module", params=FAMILIES)

@@ -18,7 +18,7 @@ from stiction_studies.faults.bridge.case import Seen, judge
 from stiction_studies.faults.bridge.catalogue import FAULTS, find, table
 from stiction_studies.faults.observation import BagFound, Shown
 
-PAGE = Path(__file__).parents[3] / "docs" / "connect.md"
+PAGE = Path(__file__).parents[3] / "docs" / "opcua.md"
 ALLOWED = Allowed(low=35.0, high=65.0, rate=0.05, sample_time=60.0, speed=600.0)
 FAULT = BridgeFault("trouble", "is overcome", nothing, "trouble")
 STEADY = dataclasses.replace(FAULT, taken_over=False)
@@ -149,7 +149,7 @@ def test_where_nothing_is_to_happen_the_plant_must_not_take_over() -> None:
 
 def test_the_page_and_the_command_show_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert table() in PAGE.read_text(encoding="utf-8")
-    assert main(["faults", "--opcua", "--list"]) == 0
+    assert main(["faults", "--opcua"]) == 0
     assert capsys.readouterr().out == table()
 
 

@@ -128,6 +128,7 @@ def test_slow_noise_is_named_although_an_autoregression_describes_it() -> None:
     assert any("the model declares" in sentence for sentence in found.where)
 
 
+@pytest.mark.trial
 def test_a_load_that_wanders_is_told_where_it_enters() -> None:
     found = answer(loop(0.05), "load:V1", RandomWalkDisturbance(0.4))
     (effect,) = found.effects

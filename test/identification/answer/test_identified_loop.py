@@ -148,6 +148,7 @@ def test_a_process_too_slow_for_its_record_rests_at_the_mean(
         plant.apply(loop.op0)
 
 
+@pytest.mark.trial
 def test_the_command_writes_it(record: Record, tmp_path: Path) -> None:
     source, target = tmp_path / "loop.csv", tmp_path / "FIC101.loop.yaml"
     write_csv(record, source)

@@ -88,12 +88,10 @@ def test_without_friction_nothing_is_material() -> None:
     assert materiality(found(HEALTHY, CauseKind.NONE).valves[0]) == ""
 
 
-def test_a_valve_that_its_loop_acquits_is_said_to_move_nothing() -> None:
-    told = found(HEALTHY, CauseKind.TUNING, evidence={"by_loop": 1.0})
-    assert why(told, 0) == (
-        "Simulated without friction, the loop of V1 moves as recorded; what friction this record "
-        "does not rule out, f_S up to 0.4 %, moves it hardly more."
-    )
+def test_an_undecided_loop_that_does_not_cycle_says_so() -> None:
+    quiet, cycling = found(UNDECIDED, CauseKind.NONE), found(UNDECIDED, CauseKind.TUNING)
+    assert why(quiet, 0).startswith("The loop does not oscillate: nothing to repair is visible.")
+    assert "does not oscillate" not in why(cycling, 0)
 
 
 @pytest.mark.parametrize(

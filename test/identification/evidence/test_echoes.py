@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from evidence_loops import FloatArray, pi_loop
 
-from stiction_ros.identification.closed_loop.explanation import ECHO, PLAIN_LINE, RIVAL, is_echoed
 from stiction_ros.identification.evidence.candidate import Candidate, ideal
 from stiction_ros.identification.evidence.echoes import SHORTEST, echo
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.records import Record
 
 SAMPLES = 1200
+ECHO = 25.0  # white noise exceeds 20 at the most of a thousand lags in one record of 250
 
 
 def irregular(samples: int, *, seed: int, length: int = 60) -> FloatArray:
@@ -66,21 +66,3 @@ def test_a_record_without_room_for_a_turn_has_none() -> None:
     nothing = np.zeros((1, 2))
     candidate = Candidate(nothing, nothing[:, 0], problem.ideal_stems(), (fit,))
     assert echo(problem, candidate) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("told", "expected"),
-    [
-        ({}, False),
-        ({"echo": 0.9 * ECHO}, False),
-        ({"echo": 1.1 * ECHO}, True),
-        ({"echo": 1.1 * ECHO, "outside_line": 0.9 * PLAIN_LINE}, True),
-        ({"echo": 1.1 * ECHO, "outside_line": 1.1 * PLAIN_LINE}, False),
-        ({"echo": 1.1 * ECHO, "delta_bic": 1.0 * ECHO / RIVAL}, True),
-        ({"echo": 1.1 * ECHO, "delta_bic": 1.2 * ECHO / RIVAL}, False),
-    ],
-)
-def test_a_wave_is_a_rival_unless_a_line_stands_for_it_or_friction_gains_far_more(
-    told: dict[str, float], expected: bool
-) -> None:
-    assert is_echoed(told) is expected

@@ -9,14 +9,12 @@ from evidence_loops import pi_loop, slow_loop
 from stiction_ros.identification import IdentificationOptions, identify
 from stiction_ros.identification.closed_loop.tuning import Tuning
 from stiction_ros.identification.evidence.accepted import Accepted
-from stiction_ros.identification.evidence.engine import evidence_of
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.rates import (
     ALIKE,
     BESIDE,
     INEXACT,
     PRICE,
-    TIED,
     UNDIED,
     Agreement,
     Look,
@@ -91,18 +89,6 @@ def test_what_is_best_at_one_rate_is_tried_at_the_others() -> None:
 def test_the_pair_with_the_larger_lesser_gain_is_taken(seen: tuple[Look, ...]) -> None:
     found = agreement(changed(seen, (2.0, 1.0, 2.0), (40.0, 1.0, 2.0), (30.0, 1.0, 2.0)), 0)
     assert (found.gain, found.alike, rate_of(found)) == (30.0 - PRICE, True, 2)
-
-
-def test_halves_count_at_both_rates_where_their_gains_are_the_same(seen: tuple[Look, ...]) -> None:
-    apart = changed(seen, (40.0, 1.0, 2.0), (40.0 + 1.01 * TIED, 1.0, 2.0))
-    same = changed(seen, (40.0, 1.0, 2.0), (40.0 + 0.99 * TIED, 1.0, 2.0))
-    alone = evidence_of(agreement(apart, 0), 0)
-    assert agreement(apart, 0).tied is None
-    assert agreement(same, 0).tied is same[0]
-    other = evidence_of(Agreement(same[0], 0.0, True), 0)
-    both = evidence_of(agreement(same, 0), 0)
-    for half in ("half_1", "half_2"):
-        assert both[half] == min(alone[half], other[half])
 
 
 def test_a_rate_that_does_not_see_the_end_of_a_response_needs_coarser_ones_that_do(

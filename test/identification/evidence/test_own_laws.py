@@ -25,6 +25,7 @@ def moving() -> Identification:
     return identify(loops.example1(2, samples=700, valve=valve))
 
 
+@pytest.mark.trial
 def test_a_law_that_explains_pv_better_is_named_and_its_figures_are_true(
     moving: Identification,
 ) -> None:
@@ -73,6 +74,6 @@ def test_a_law_that_is_given_is_kept() -> None:
 
 
 def test_the_other_methods_keep_he_s_law() -> None:
-    options = IdentificationOptions("exact", output_order=1, delay=(0, 4), one_step_best=False)
+    options = IdentificationOptions("exact", output_order=1, delay=(0, 4))
     assert identify(pi_loop(3.0, 1.0), options).valves[0].law == "he"
     assert PaperOptions.of(options, "grid").law == "he"

@@ -225,12 +225,12 @@ def test_no_controller_holds_a_process_of_the_other_sign() -> None:
 
 def test_a_rate_speaks_of_what_the_controller_of_its_valve_holds() -> None:
     look = looks(pi_loop(3.0, 1.0), IdentificationOptions())[0]
-    assert look.speaks(0)
+    assert look.is_held(0, look.found.best)
     best = look.found.best
     fits = tuple(dataclasses.replace(fit, responses=60.0 * fit.responses) for fit in best.fits)
     wild = dataclasses.replace(best, fits=fits)
     other = dataclasses.replace(look, found=dataclasses.replace(look.found, best=wild))
-    assert not other.speaks(0)
+    assert not other.is_held(0, other.found.best)
     assert not look.is_held(0, wild)
     unknown = dataclasses.replace(other.problem, tunings=())
-    assert dataclasses.replace(other, problem=unknown).speaks(0)
+    assert dataclasses.replace(other, problem=unknown).is_held(0, other.found.best)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from evidence_loops import pi_loop
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.identification import IdentificationOptions, VerdictKind, identify
@@ -27,6 +27,21 @@ def frozen(record: Record, seed: int) -> Record:
 def test_rounding_alone_holds_nothing(seed: int, step: float) -> None:
     walk = np.cumsum(np.random.default_rng(seed).uniform(-0.4, 0.4, 300))
     assert not held_rows(step * np.round(walk)).any()
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.5, 1.0))
+def test_a_sensor_that_reports_by_exception_holds_until_it_reports(seed: int, width: float) -> None:
+    walk = np.cumsum(np.random.default_rng(seed).uniform(-0.4, 0.4, 300))
+    read = np.empty_like(walk)
+    last = walk[0]
+    for row, value in enumerate(walk):
+        last = value if abs(value - last) > width else last
+        read[row] = last
+    reports = np.flatnonzero(np.diff(read)) + 1
+    assume(len(reports) > 20)  # of fewer the least difference may be as long as a jump
+    end = reports[-1]
+    repeats = np.append(False, np.diff(read) == 0.0)[:end]
+    assert (held_rows(read)[:end] == repeats).all()
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 12), st.integers(0, 11))

@@ -30,9 +30,10 @@ def test_part_is_where_op_moves_most(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (part.y == data.y[:, begin : begin + 300]).all()
 
 
+@pytest.mark.trial
 def test_conclusion_uses_all_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(long_records, "PART", 1300)
-    options = IdentificationOptions(output_order=3, input_order=3, one_step_best=False)
+    options = IdentificationOptions(output_order=3, input_order=3)
     record = loops.example1(1, "equation")
     found = identify(record, options)
     valve = found.valves[0]

@@ -67,6 +67,7 @@ def test_valve_without_friction_has_no_polygons(at_truth: tuple[Data, Model, Ord
     assert refine_near(data, linear, orders, 0, 8.0) == (linear, None)
 
 
+@pytest.mark.trial
 def test_growing_windows_end_at_the_truth(at_truth: tuple[Data, Model, Orders]) -> None:
     data, model, orders = at_truth
     found = growing_swarm(data, linear_model(data, orders), orders, 0)

@@ -61,6 +61,7 @@ def test_long_experiments_give_the_gains_of_the_tank() -> None:
     assert gains.mean(axis=0) == pytest.approx(truth, rel=0.03, abs=2e-4)
 
 
+@pytest.mark.trial
 def test_experiment_on_the_linear_model_gives_its_gains() -> None:
     gains = tank_gains(LINEAR_TANK, 3000, 5, range(4))
     truth = LINEAR_TANK.process.linear(60.0).gain

@@ -87,7 +87,9 @@ def test_a_file_whose_keys_do_not_fit_is_warned_of(tmp_path: Path) -> None:
     assert said.count(f"{path} holds nothing for /unit1/plant, only for plant") == 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.trial)]
+)
 def test_compilation_in_the_worker_is_not_waited_for(number: int, tmp_path: Path) -> None:
     process = start("estimator", NUMBA_CACHE_DIR=str(tmp_path))
     try:

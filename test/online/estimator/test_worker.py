@@ -17,6 +17,7 @@ from stiction_ros.records import Record
 PATIENCE = 60.0  # s
 
 
+@pytest.mark.trial
 def test_a_process_that_died_is_replaced_for_the_next_fit() -> None:
     short = Record("short", 1.0, ("V1",), ("PV1",), np.eye(5)[:, :1], np.eye(5)[:, :1])
     worker = FitWorker()

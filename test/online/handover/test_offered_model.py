@@ -36,6 +36,7 @@ BAD = {
     "a date that is none": ("loop: 2026-13-01", "no valid YAML"),
     "another sample time": (GOOD.replace("sample_time: 1.0", "sample_time: 2.0"), "sample time"),
     "a delay without end": (GOOD.replace("{V1: 5}", "{V1: 1000000000}"), "delay"),
+    "a dead time without end": (GOOD.replace("delay: {V1: 5}", "dead_time: {V1: 1.0e+9}"), "delay"),
     "a long key": (GOOD + f"{'x' * 1000}: 1\n", "unknown key"),
     "valid_from is text": (GOOD + "valid_from: noon\n", "valid_from"),
 }

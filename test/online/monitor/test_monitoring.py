@@ -170,6 +170,7 @@ def test_a_fit_without_a_process_is_no_model() -> None:
     assert monitoring.text.startswith("no loop model yet: model identified for watched")
 
 
+@pytest.mark.trial
 def test_turned_on_again_it_has_found_nothing_yet() -> None:
     monitoring = Monitoring(RULE, live(), loop())
     fed(monitoring, 0, 1050)

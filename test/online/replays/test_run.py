@@ -198,6 +198,7 @@ def test_another_op_is_named_by_its_time(bag: Path, tmp_path: Path) -> None:
     assert found.op.compared - found.op.equal == 1
 
 
+@pytest.mark.trial
 def test_another_pv_makes_another_fit(bag: Path, tmp_path: Path) -> None:
     found = replay(copy_bag(bag, tmp_path / "bag", joint(bag, "/pv", 490, 0.5)))
     assert found.match is Match.DIFFERENT

@@ -19,7 +19,7 @@ from stiction_ros.discrepancy import (
 from stiction_ros.effects import from_mapping
 from stiction_ros.loop import LoopModel, SetPoints, simulate
 from stiction_ros.report.gap.effects import WINDOW, _liveliest
-from stiction_ros.report.gap.report import _before_and_after, report_gap
+from stiction_ros.report.gap.report import report_gap
 from stiction_ros.report.gap.words import figures_with_units
 
 
@@ -88,14 +88,14 @@ def test_no_internal_words(said: str) -> None:
 def test_it_shows_what_the_effect_does_and_what_would_decide(said: str, page: Path) -> None:
     assert "What it does" in said
     assert "What would decide" in said
-    assert (page.parent / "effect_1.png").stat().st_size > 1000
-    assert (page.parent / "preview.png").stat().st_size > 1000
+    assert page.read_text(encoding="utf-8").count("<figure") > 8
+    assert [path.name for path in page.parent.iterdir()] == [page.name]
 
 
 def test_an_effect_is_listed_once_in_each_look(page: Path) -> None:
     assert page.name == "report.html"
     for look in page.read_text(encoding="utf-8").split("the candidates</h2>")[1:]:
-        names = re.findall(r'<tr><td class="text">([^<]*)</td>', look.split("</table>")[0])
+        names = re.findall(r'<tr><td class="t">([^<]*)</td>', look.split("</table>")[0])
         assert len(names) > 5
         assert len(set(names)) == len(names)
 
@@ -105,12 +105,3 @@ def test_moves_of_an_effect_are_what_it_adds(lagging: Discrepancy) -> None:
     assert moves is not None
     assert moves.shape == lagging.runs.pv.shape
     assert np.ptp(moves) > 0.0
-
-
-def test_the_gap_that_is_drawn_is_the_one_that_is_told(lagging: Discrepancy) -> None:
-    axes = _before_and_after(lagging).figure.axes[1]
-    drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in axes.get_lines()}
-    held = lagging.base_after.blocks[0].held
-    for label, told in (("gap before", lagging.before[0]), ("gap after", lagging.after[0])):
-        rms = np.sqrt(np.mean(drawn[label][held] ** 2))
-        assert rms == pytest.approx(told.free_run_rmse)

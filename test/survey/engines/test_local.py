@@ -37,6 +37,7 @@ def _tasks(count: int) -> list[Task]:
     return [Task(str(k), unreadable(k)) for k in range(count)]
 
 
+@pytest.mark.trial
 def test_every_loop_comes_back_with_its_reason_and_is_drawn_no_faster() -> None:
     drawn = 0
 

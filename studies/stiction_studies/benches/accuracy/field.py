@@ -276,7 +276,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
     group = parser.add_argument_group("field and stability; --seeds also for gain, --jobs for all")
     group.add_argument(
-        "--seeds", type=seed_range, metavar="A:B", help=f"of the field's loops ({FIRST}:{LAST})"
+        "--seeds",
+        type=seed_range,
+        metavar="A:B",
+        help=f"seeds of the loops of the field ({FIRST}:{LAST})",
     )
     group.add_argument("--method", choices=choices.COUNTED, help=f"search ({METHOD})")
     group.add_argument(

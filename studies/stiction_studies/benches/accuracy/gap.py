@@ -20,8 +20,8 @@ from rich.table import Table
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.orphans import spared
-from stiction_studies.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_studies.commands import choices
+from stiction_studies.judged_log import check_seeds, logged_rows, start_log
 from stiction_studies.seeds import drop
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--family",
         action="append",
         choices=(*choices.BLIND_FAMILIES, choices.PHYSICS),
-        help="of loops; may be repeated (single); physics are loops of bench world",
+        help="family of loops; may be repeated (single); physics are loops of bench world",
     )
     group.add_argument("--first", type=int, metavar="SEED", help=f"first seed ({FIRST_SEED})")
     group.add_argument("--loops", type=int, metavar="N", help=f"loops of each family ({LOOPS})")

@@ -18,8 +18,8 @@ from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.errors import InputError, storing
 from stiction_ros.texts import json_text
 from stiction_studies.benches.accuracy.gap import matrix_table, rate_table
-from stiction_studies.benches.accuracy.judged import check_seeds, logged_rows, start_log
 from stiction_studies.commands import choices
+from stiction_studies.judged_log import check_seeds, logged_rows, start_log
 from stiction_studies.seeds import run_each
 
 if TYPE_CHECKING:

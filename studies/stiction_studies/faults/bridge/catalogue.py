@@ -248,7 +248,7 @@ def find(name: str) -> BridgeFault:
     Raises:
         InputError: there is none.
     """
-    return named(FAULTS, name, "stiction faults --opcua --list")
+    return named(FAULTS, name, "stiction faults --opcua")
 
 
 def table() -> str:

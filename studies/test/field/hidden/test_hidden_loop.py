@@ -73,6 +73,7 @@ def test_families_hold_what_they_say() -> None:
         assert friction.key == (VALVE, "stiction")
 
 
+@pytest.mark.trial
 def test_every_kind_of_effect_changes_the_loop() -> None:
     """Each kind, hidden in one of many loops, makes another PV than the healthy loop has."""
     changed: set[str] = set()

@@ -1,0 +1,1 @@
+"""The judgement of a valve: named figures, one probability, two cuts."""

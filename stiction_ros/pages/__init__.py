@@ -1,0 +1,1 @@
+"""What all pages share: the frame with its style, and figures that can be zoomed."""

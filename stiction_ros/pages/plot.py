@@ -1,0 +1,351 @@
+"""Figures as SVG that take their colours from the page; those over time can be zoomed."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.intake.tables.clock import DATED
+from stiction_ros.pages.frame import text
+from stiction_ros.signals.holds import stretches
+from stiction_ros.texts import DAY, HOUR
+
+WIDTH, HEIGHT = 960, 280
+LEFT, RIGHT, TOP, BOTTOM = 96, 8, 8, 32
+"""Size of a figure and its margins, units of its own: a phone shows it at a third, and the figures
+on its axes twice as large."""
+
+SIDE = 300
+"""Width and height of a figure that has no time."""
+
+MOST = 3000
+"""Points of a curve; of a longer one the lowest and highest of each stretch are kept."""
+
+ROOM = 0.04
+"""Share of the range that is left free above and below."""
+
+KINDS = ("pv", "op", "stem", "free", "sp", "ink")
+"""Colours of curves that are of one kind."""
+
+CALENDAR = [
+    *(1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800),
+    *(round(HOUR * k) for k in (1, 2, 3, 6, 12)),
+    *(round(DAY * k) for k in (1, 2, 7, 14, 28, 91, 182, 364)),
+]
+"""Steps between two dates on an axis, s."""
+
+SCRIPT = """
+const CALENDAR = STEPS, views = new Map();
+const show = (view, a, b) => {
+  const least = (view.high - view.low) / 500, span = Math.max(b - a, least);
+  view.a = Math.max(view.low, Math.min(a, view.high - span));
+  view.b = Math.min(view.high, view.a + span);
+  for (const draw of view.drawn) draw();
+  view.whole.disabled = view.a === view.low && view.b === view.high;
+};
+const ticks = (a, b, dated) => {
+  let step = dated ? CALENDAR.find(one => (b - a) / one <= 8) || CALENDAR.at(-1)
+    : Math.pow(10, Math.floor(Math.log10((b - a) / 3)));
+  if (!dated && (b - a) / step > 12) step *= 2.5;
+  if (!dated && (b - a) / step > 8) step *= 2;
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), found = [];
+  for (let k = Math.ceil(a / step - 1e-9); k * step <= b + 1e-9 * step; k++) {
+    const iso = dated && new Date(1000 * k * step).toISOString();
+    const day = dated && +iso.slice(8, 10) + " " + new Date(1000 * k * step).toLocaleString("en",
+      { month: "short", timeZone: "UTC" });
+    const clock = dated && (step % 86400 ? iso.slice(11, step % 60 ? 19 : 16) : "");
+    found.push([k * step, !dated ? (k * step).toFixed(digits) : !clock || !(k * step % 86400) ? day
+      : found.length ? clock : day + " " + clock]);
+  }
+  return found;
+};
+const toolbar = figure => {
+  const low = +figure.dataset.low, high = +figure.dataset.high;
+  const view = { low, high, a: low, b: high, drawn: [] }, bar = document.createElement("div");
+  bar.className = "zoom";
+  bar.setAttribute("role", "group");
+  bar.setAttribute("aria-label", "Time that the figures show");
+  const button = (name, act) => {
+    const made = document.createElement("button");
+    made.type = "button";
+    made.textContent = name;
+    made.addEventListener("click", act);
+    bar.append(made);
+    return made;
+  };
+  const turn = (from, to) => () => { const wide = view.b - view.a;
+    show(view, view.a + from * wide, view.b + to * wide); };
+  button("closer", turn(0.25, -0.25));
+  button("wider", turn(-0.5, 0.5));
+  button("earlier", turn(-0.5, -0.5));
+  button("later", turn(0.5, 0.5));
+  view.whole = button("all", () => show(view, low, high));
+  view.whole.disabled = true;
+  figure.before(bar);
+  return view;
+};
+for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
+  const svg = figure.querySelector("svg"), area = svg.querySelector("svg");
+  const key = figure.dataset.low + " " + figure.dataset.high;
+  if (!views.has(key)) views.set(key, toolbar(figure));
+  const view = views.get(key), left = +figure.dataset.left, wide = +figure.dataset.wide;
+  const whole = area.getAttribute("viewBox").split(" ").map(Number);
+  const axis = svg.querySelector("g.x"), dated = "dated" in figure.dataset;
+  let from = null;
+  view.drawn.push(() => {
+    const { a, b, low, high } = view, scale = whole[2] / (high - low);
+    area.setAttribute("viewBox",
+      [(a - low) * scale, whole[1], (b - a) * scale, whole[3]].join(" "));
+    axis.textContent = "";
+    for (const [value, label] of ticks(a, b, dated)) {
+      const tick = document.createElementNS("http://www.w3.org/2000/svg", "text");
+      tick.setAttribute("x", left + wide * (value - a) / (b - a));
+      tick.setAttribute("y", axis.dataset.y);
+      tick.setAttribute("text-anchor", "middle");
+      tick.textContent = label;
+      axis.append(tick);
+    }
+  });
+  const at = event => {
+    const box = svg.getBoundingClientRect();
+    const x = (event.clientX - box.left) * svg.viewBox.baseVal.width / box.width;
+    return view.a + (view.b - view.a) * Math.min(Math.max((x - left) / wide, 0), 1);
+  };
+  svg.addEventListener("pointerdown", event => { from = at(event); });
+  svg.addEventListener("pointerup", event => {
+    const to = at(event);
+    if (from !== null && Math.abs(to - from) > (view.high - view.low) / 200)
+      show(view, Math.min(from, to), Math.max(from, to));
+    from = null;
+  });
+  svg.addEventListener("wheel", event => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    const middle = at(event), factor = event.deltaY > 0 ? 1.25 : 0.8;
+    show(view, middle - (middle - view.a) * factor, middle + (view.b - middle) * factor);
+  }, { passive: false });
+}
+""".replace("STEPS", str(CALENDAR))
+
+
+@dataclasses.dataclass(frozen=True)
+class Curve:
+    """A curve: the word beside its colour, the class that colours it, and its values, (N,)."""
+
+    name: str
+    kind: str
+    values: FloatArray
+    steps: bool = False
+
+
+def over_time(
+    title: str,
+    time: FloatArray,
+    curves: Sequence[Curve],
+    axis: str,
+    start: float = 0.0,
+    shade: Sequence[tuple[float, float]] = (),
+) -> str:
+    """Return a figure of curves over one time, which the script of the page can zoom.
+
+    Args:
+        title: below the figure.
+        time: s since the first sample, shape (N,), increasing.
+        curves: values that are not finite leave a gap.
+        axis: name and unit of what goes up, HTML.
+        start: of the record; dates are shown where it is one, s since 1970.
+        shade: begin and end of stretches that are shaded, in the unit of ``time``.
+    """
+    low, high = _range([curve.values for curve in curves])
+    wide, tall = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
+    span = float(max(time[-1] - time[0], 1e-9))
+    dated = DATED[0] <= start <= DATED[1]
+    unit, size = ("date", 1.0) if dated else _unit(span)
+    begin = (start if dated else 0.0) + float(time[0]) / size
+    end = begin + span / size
+    lines = [
+        f'<rect x="{(a - time[0]) / span * wide:.1f}" y="0" height="{tall}" class="shade" '
+        f'width="{(b - a) / span * wide:.1f}"/>'
+        for a, b in shade
+    ]
+    for curve in curves:
+        x = (time - time[0]) / span * wide
+        y = (high - curve.values) / (high - low) * tall
+        for part in _parts(x, y, curve.steps):
+            lines.append(f'<polyline class="{curve.kind}" points="{part}"/>')
+    grid, labels = [], []
+    for value in _ticks(low, high, 5):
+        up = TOP + (high - value) / (high - low) * tall
+        grid.append(
+            f'<line class="grid" x1="{LEFT}" x2="{LEFT + wide}" y1="{up:.1f}" y2="{up:.1f}"/>'
+        )
+        labels.append(
+            f'<text x="{LEFT - 6}" y="{up + 4:.1f}" text-anchor="end">{_label(value)}</text>'
+        )
+    marks = (
+        _dates(begin, end) if dated else [(value, _label(value)) for value in _ticks(begin, end, 8)]
+    )
+    across = "".join(
+        f'<text x="{LEFT + wide * (value - begin) / (end - begin):.1f}" y="{HEIGHT - 8}" '
+        f'text-anchor="middle">{label}</text>'
+        for value, label in marks
+    )
+    told = f"Time from {_stamp(begin)} to {_stamp(end)}." if dated else f"Time in {unit}."
+    return (
+        f'<figure class="plot" data-low="{begin:.12g}" data-high="{end:.12g}" '
+        f'{"data-dated " * dated}data-left="{LEFT}" data-wide="{wide}">{_keys(curves, axis)}'
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{text(title)}">'
+        f'{"".join(grid)}<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{tall}" '
+        f'viewBox="0 0 {wide} {tall}" preserveAspectRatio="none">{"".join(lines)}</svg>'
+        f'<rect class="frame" x="{LEFT}" y="{TOP}" width="{wide}" height="{tall}"/>'
+        f'{"".join(labels)}<g class="x" data-y="{HEIGHT - 8}">{across}</g></svg>'
+        f"<figcaption>{text(title)} {told}</figcaption></figure>"
+    )
+
+
+def against(
+    title: str, curves: Sequence[tuple[FloatArray, Curve]], axes: tuple[str, str], *, equal: bool
+) -> str:
+    """Return a figure of curves over what is not a time.
+
+    Args:
+        title: below the figure.
+        curves: each with what goes right, shape (N,), and what goes up.
+        axes: name and unit of what goes right and of what goes up, HTML.
+        equal: both have one scale, and the diagonal is drawn.
+    """
+    right, up = [x for x, _ in curves], [curve.values for _, curve in curves]
+    across = _range([*right, *up] if equal else right)
+    along = across if equal else _range(up)
+    left, below = 46, 40
+    wide, tall = SIDE - left - 14, SIDE - below - 6
+
+    def place(x: FloatArray, y: FloatArray) -> str:
+        return _points(
+            left + (x - across[0]) / (across[1] - across[0]) * wide,
+            6 + (along[1] - y) / (along[1] - along[0]) * tall,
+        )
+
+    ends = np.array(across)
+    keys = [curve for _, curve in curves]
+    lines = [f'<polyline class="{c.kind}" points="{place(x, c.values)}"/>' for x, c in curves]
+    if equal:
+        lines.insert(0, f'<polyline class="diagonal" points="{place(ends, ends)}"/>')
+        keys.append(Curve("valve without friction", "diagonal", ends))
+    for value in _ticks(*across, 4):
+        x = left + (value - across[0]) / (across[1] - across[0]) * wide
+        lines.append(
+            f'<text x="{x:.1f}" y="{SIDE - below + 16}" text-anchor="middle">{_label(value)}</text>'
+        )
+    for value in _ticks(*along, 4):
+        y = 6 + (along[1] - value) / (along[1] - along[0]) * tall
+        lines.append(
+            f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{_label(value)}</text>'
+        )
+    return (
+        f'<figure class="plot square" style="max-width:460px">{_keys(keys, axes[1])}'
+        f'<svg viewBox="0 0 {SIDE} {SIDE}" role="img" aria-label="{text(title)}">'
+        f'<rect class="frame" x="{left}" y="6" width="{wide}" height="{tall}"/>{"".join(lines)}'
+        f'<text x="{left + wide / 2}" y="{SIDE - 8}" text-anchor="middle">{axes[0]}</text></svg>'
+        f"<figcaption>{text(title)}</figcaption></figure>"
+    )
+
+
+def _keys(curves: Sequence[Curve], axis: str) -> str:
+    shown = "".join(
+        f'<span><i class="{curve.kind}"></i>{text(curve.name)}</span>' for curve in curves
+    )
+    return f'<div class="key">{shown}<span class="soft">{axis}</span></div>'
+
+
+def _unit(span: float) -> tuple[str, float]:
+    """Return the unit of an axis of ``span`` seconds that bears no dates, and its size in s."""
+    units = (("hours", HOUR), ("minutes", 60.0))
+    return next(((word, size) for word, size in units if span > 4.0 * size), ("seconds", 1.0))
+
+
+def _stamp(seconds: float) -> str:
+    shown = datetime.datetime.fromtimestamp(seconds, datetime.UTC)
+    return f"{shown:%Y-%m-%d %H:%M}" if seconds % 60.0 == 0.0 else f"{shown:%Y-%m-%d %H:%M:%S}"
+
+
+def _dates(low: float, high: float) -> list[tuple[float, str]]:
+    """Return dates between two ends, s since 1970, at most eight, as the script writes them."""
+    steps = (step for step in CALENDAR if (high - low) / step <= 8)
+    step, found = next(steps, CALENDAR[-1]), list[tuple[float, str]]()
+    for k in range(math.ceil(low / step), math.floor(high / step) + 1):
+        shown = datetime.datetime.fromtimestamp(k * step, datetime.UTC)
+        day = f"{shown.day} {shown:%b}"
+        clock = f"{shown:%H:%M:%S}" if step % 60 else f"{shown:%H:%M}"
+        only_day = step % round(DAY) == 0 or k * step % round(DAY) == 0
+        label = day if only_day else clock if found else f"{day} {clock}"
+        found.append((float(k * step), label))
+    return found
+
+
+def spark(values: Sequence[float], most: float) -> str:
+    """Return a small line without axes, from 0 to ``most``: lines of one scale compare."""
+    numbers = np.asarray(values, dtype=float)
+    x = np.linspace(2.0, 90.0, len(numbers))
+    y = 20.0 - 18.0 * np.clip(numbers / max(most, 1e-12), 0.0, 1.0)
+    said = ", ".join(f"{value:.3g}" for value in numbers)
+    return (
+        f'<svg class="spark" viewBox="0 0 92 22" role="img" aria-label="{said}">'
+        f'<polyline points="{_points(x, y)}"/></svg>'
+    )
+
+
+def _range(values: Sequence[FloatArray]) -> tuple[float, float]:
+    joined = np.concatenate([np.ravel(each)[np.isfinite(np.ravel(each))] for each in values])
+    if not len(joined):
+        return 0.0, 1.0
+    low, high = float(joined.min()), float(joined.max())
+    room = ROOM * (high - low) or max(abs(high), 1.0) * 1e-3
+    return low - room, high + room
+
+
+def _parts(x: FloatArray, y: FloatArray, steps: bool) -> list[str]:
+    """Return the points of each stretch without a gap."""
+    begins, ends = stretches(np.isfinite(y))
+    found = []
+    for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
+        a, b = _thinned(x[first:last], y[first:last], MOST * (last - first) // len(x) + 4)
+        if steps:
+            a, b = np.repeat(a, 2)[1:], np.repeat(b, 2)[:-1]
+        found.append(_points(a, b))
+    return found
+
+
+def _thinned(x: FloatArray, y: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:
+    """Return at most about ``most`` points: of each stretch the lowest and the highest."""
+    if len(x) <= most:
+        return x, y
+    edges = np.linspace(0, len(x), max(most // 2, 1) + 1).astype(int)
+    rows = []
+    for a, b in itertools.pairwise(edges.tolist()):
+        if b > a:
+            rows += sorted({a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))})
+    return x[rows], y[rows]
+
+
+def _points(x: FloatArray, y: FloatArray) -> str:
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))
+
+
+def _ticks(low: float, high: float, wanted: int) -> list[float]:
+    """Return round values between two ends, about as many as wanted."""
+    rough = (high - low) / wanted
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(power * k for k in (1.0, 2.0, 2.5, 5.0, 10.0) if power * k >= rough * (1 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    return [k * step for k in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def _label(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−")

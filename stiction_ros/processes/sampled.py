@@ -1,0 +1,72 @@
+"""Transfer functions as difference equations of samples, stems held between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
+
+WHOLE = 1e-9
+"""Samples by which a dead time may be off a whole number of them and counts as that."""
+
+Channel = tuple[FloatArray, FloatArray, int]
+"""How one PV answers one valve: b₁ …, a₀ = 1, a₁ … and the delay in samples."""
+
+
+def held(num: ArrayLike, den: ArrayLike, dead_time: float, sample_time: float) -> Channel:
+    """Return a continuous transfer function at its samples, the stem held between them.
+
+    Args:
+        num, den: coefficients, the highest power of s first, time in s.
+        dead_time: s, 0 up; it need be no whole number of samples.
+        sample_time: s.
+
+    Raises:
+        InputError: PV would answer at once.
+    """
+    above, below = (np.trim_zeros(np.array(each, dtype=float), "f") for each in (num, den))
+    n = len(below) - 1
+    if len(above) > n:
+        said = f"num has {len(above)} coefficients, den {len(below)}"
+        raise InputError(f"PV answers at once: {said}", fix="give more in den than in num")
+    a, b = np.eye(n, k=-1), np.eye(n, 1)
+    a[0] = -below[1:] / below[0]
+    whole = math.floor(dead_time / sample_time + WHOLE)
+    part = max(dead_time - whole * sample_time, 0.0)
+    late, late_in = transition(a, b, part)
+    early, early_in = transition(a, b, sample_time - part)
+    states = [early_in, early @ (late_in + late @ early_in)]
+    while len(states) <= n:
+        states.append(early @ late @ states[-1])
+    poles = np.asarray(np.poly(early @ late), dtype=np.float64)
+    pulse = np.pad(above, (n - len(above), 0)) / below[0] @ np.hstack(states)
+    taps = np.convolve(pulse, poles)[: n + 1]
+    return taps if part > WHOLE * sample_time else taps[:n], poles, whole
+
+
+def transition(a: FloatArray, b: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
+    """Return e^{A t}, and what inputs bring that are held for that time, s."""
+    from scipy.linalg import expm  # slow to import
+
+    n, m = b.shape
+    whole = expm(time * np.vstack([np.hstack([a, b]), np.zeros((m, n + m))]))
+    return whole[:n, :n], whole[:n, n:]
+
+
+def equation(channels: Mapping[str, Channel]) -> dict[str, dict[str, list[float]] | list[float]]:
+    """Return ``a``, ``b`` and ``delay`` of the ARX equation of one PV, by valve."""
+    whole, taps = np.ones(1), {valve: b for valve, (b, _, _) in channels.items()}
+    for valve, (_, a, _) in channels.items():
+        whole = np.convolve(whole, a)
+        taps = {other: b if other == valve else np.convolve(b, a) for other, b in taps.items()}
+    delay = {valve: late for valve, (_, _, late) in channels.items()}
+    return {
+        "a": whole[1:].tolist(),
+        "b": {valve: b.tolist() for valve, b in taps.items()},
+        "delay": delay,
+    }

@@ -1,0 +1,1 @@
+"""The probability of friction, fitted to simulated loops and checked on others."""

@@ -1,0 +1,46 @@
+"""The worlds of the calibration: loops by their seeds, and whether their valve has friction."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+
+from stiction_ros.records.record import Record
+from stiction_studies.calibration.plain_loops import plain_loop
+
+
+@dataclasses.dataclass(frozen=True)
+class KnownLoop:
+    """One record and its truth.
+
+    Attributes:
+        record: as the package reads it.
+        friction: whether the valve has friction that matters and shows; None where it has some
+            that shows in too few slips.
+    """
+
+    record: Record
+    friction: bool | None
+
+
+def _plain(seed: int, quiet: bool = False, cascade: bool = False) -> KnownLoop:
+    loop = plain_loop(seed, quiet=quiet, cascade=cascade)
+    return KnownLoop(loop.record, loop.friction)
+
+
+def _field(seed: int) -> KnownLoop:
+    from stiction_studies.field import MANY, ValveKind, field_loop
+
+    loop = field_loop(seed)
+    if loop.truth.valve is ValveKind.HEALTHY:
+        return KnownLoop(loop.record, False)
+    return KnownLoop(loop.record, True if loop.judged_slips >= MANY else None)
+
+
+WORLDS: Mapping[str, Callable[[int], KnownLoop]] = {
+    "field": _field,
+    "plain": _plain,
+    "quiet": functools.partial(_plain, quiet=True),
+    "cascade": functools.partial(_plain, cascade=True),
+}

@@ -1,0 +1,152 @@
+"""``stiction calibrate``: the probability of friction, fitted to loops whose truth is known."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from stiction_ros.errors import InputError, storing
+from stiction_studies.judged_log import logged_rows, start_log
+from stiction_studies.seeds import add_jobs, run_each, seed_range
+
+if TYPE_CHECKING:
+    from stiction_studies.calibration.fitting import Judged
+
+NAMES = ("field", "plain", "quiet", "cascade")
+SEEDS = (0, 399)
+"""Of each world, when none are given."""
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "calibrate",
+        description="Identify simulated loops, fit the probability to their figures, and hold "
+        "each loop against what is fitted to others.",
+    )
+    parser.add_argument(
+        "--worlds",
+        nargs="+",
+        choices=NAMES,
+        default=NAMES,
+        metavar="NAME",
+        help="worlds of simulated loops (all)",
+    )
+    parser.add_argument(
+        "--seeds", type=seed_range, default=SEEDS, metavar="A:B", help="seeds from A to B (0:399)"
+    )
+    parser.add_argument(
+        "--log",
+        type=Path,
+        metavar="F",
+        help="file that keeps the figures, and from which a run goes on",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="F.json", help="write the fitted trees to this file"
+    )
+    parser.add_argument(
+        "--ablate", action="store_true", help="fit again without each figure in turn"
+    )
+    add_jobs(parser)
+    parser.set_defaults(run=run)
+
+
+def judged(log: Path | None, task: tuple[str, int]) -> Judged | None:
+    """Return the figures of one loop; None where its truth or the record is not clear."""
+    from stiction_ros.identification import identify
+    from stiction_ros.records.parts import longest_part
+    from stiction_studies.calibration.fitting import Judged
+    from stiction_studies.calibration.loops import WORLDS
+
+    world, seed = task
+    loop = WORLDS[world](seed)
+    row = None
+    if loop.friction is not None:
+        try:
+            (valve,) = identify(longest_part([loop.record])).valves
+        except InputError:
+            return None
+        if valve.figures is not None:
+            row = Judged(world, seed, loop.friction, valve.figures)
+    if log is not None and row is not None:
+        with storing(log), log.open("a", encoding="utf-8") as out:
+            out.write(json.dumps({"full": True} | dataclasses.asdict(row)) + "\n")
+    return row
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    from stiction_studies.calibration.fitting import fitted
+
+    known: list[Judged] = []
+    if options.log is not None:
+        known = logged_rows(options.log, True, _row_of) if options.log.exists() else []
+        if not known:
+            start_log(options.log)
+    there = {(row.world, row.seed) for row in known}
+    first, last = options.seeds
+    tasks = [(world, seed) for seed in range(first, last + 1) for world in options.worlds]
+    due = [task for task in tasks if task not in there]
+    work = functools.partial(judged, options.log)
+    found = [row for row in run_each(work, due, options.jobs or 1, "calibrate") if row is not None]
+    rows = [row for row in (*known, *found) if (row.world, row.seed) in set(tasks)]
+    show(rows, options.ablate)
+    if options.out is not None:
+        command = f"stiction calibrate --seeds {first}:{last} --worlds {' '.join(options.worlds)}"
+        model = fitted(rows)
+        told = {"fitted_by": command, "loops": len(rows)} | model._asdict()
+        with storing(options.out):
+            options.out.write_text(json.dumps(told, separators=(",", ":")) + "\n", "utf-8")
+    return 0
+
+
+def show(rows: list[Judged], ablate: bool) -> None:
+    """Print how loops are told by trees fitted to others: of all worlds, and of other worlds."""
+    from stiction_ros.identification.judgement.figures import definitions
+    from stiction_studies.calibration.fitting import (
+        by_folds,
+        counts,
+        fitted,
+        loss,
+        probabilities,
+        reliability,
+    )
+
+    console = Console()
+    folds = by_folds(rows)
+    for world in sorted({row.world for row in rows}):
+        own = [i for i, row in enumerate(rows) if row.world == world]
+        rest = [row for row in rows if row.world != world]
+        parts = {"other loops": folds[own]}
+        if rest:
+            parts["other worlds"] = probabilities(fitted(rest), [rows[i] for i in own])
+        for name, told in parts.items():
+            table = Table(f"{world}, told by {name}", "")
+            for key, value in counts(told, [rows[i] for i in own]).items():
+                table.add_row(key, f"{value:.3f}")
+            console.print(table)
+    bins = Table("probability", "loops", "with friction")
+    for one in reliability(folds, rows):
+        bins.add_row(f"{one.told:.2f}", str(one.loops), f"{one.true:.2f}")
+    console.print(bins)
+    if ablate:
+        table = Table("without", "loss, nats a loop", "more")
+        whole = loss(folds, rows)
+        for name in definitions():
+            other = loss(by_folds(rows, name), rows)
+            table.add_row(name, f"{other:.4f}", f"{other - whole:+.4f}")
+        console.print(table)
+
+
+def _row_of(values: Any) -> Judged:
+    from stiction_ros.identification.judgement.figures import Figures
+    from stiction_studies.calibration.fitting import Judged
+
+    return Judged(**{**values, "figures": Figures(**values["figures"])})

@@ -1,0 +1,68 @@
+"""Figures as SVG: their axes, and which curves they show."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from made import identification, record
+
+from stiction_ros.pages.plot import MOST, Curve, over_time
+from stiction_ros.pages.signals import Units, all_signals, close_look
+
+UNITS = Units("bar", "%")
+MARCH = 1709330400.0
+"""2024-03-01 22:00 UTC, s since 1970."""
+
+
+@pytest.mark.parametrize(
+    ("span", "start", "marks", "told"),
+    [
+        (90.0, 0.0, "0 20 40 60 80", "Time in seconds."),
+        (4000.0, 0.0, "0 10 20 30 40 50 60", "Time in minutes."),
+        (3600.0, MARCH, "1 Mar 22:00 22:10 22:20 22:30 22:40 22:50 23:00", "22:00 to 2024-03-01"),
+        (3e4, MARCH, "1 Mar 22:00 2 Mar 02:00 04:00 06:00", "from 2024-03-01 22:00 to 2024-03-02"),
+        (1e6, MARCH, "2 Mar 4 Mar 6 Mar 8 Mar 10 Mar 12 Mar", "to 2024-03-13 11:46:40."),
+    ],
+)
+def test_a_time_axis_bears_dates_where_the_record_has_them(
+    span: float, start: float, marks: str, told: str
+) -> None:
+    time = np.linspace(0.0, span, 50)
+    made = over_time("A figure.", time, [Curve("PV", "pv", time)], "PV", start)
+    shown = re.findall(">([^<>]+)</text>", made.partition('class="x"')[2])
+    assert " ".join(shown) == marks
+    assert told in made
+
+
+def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
+    values = np.zeros(50_000)
+    values[31_234] = 7.0
+    values[100:200] = np.nan
+    figure = over_time("t", np.arange(50_000.0), [Curve("PV", "pv", values)], "PV")
+    lines = [part.split('"')[0] for part in figure.split('points="')[1:]]
+    assert len(lines) == 2
+    points = [tuple(map(float, pair.split(","))) for line in lines for pair in line.split()]
+    assert len(points) <= 1.2 * MOST
+    assert min(y for _, y in points) < 0.1 * max(y for _, y in points)
+
+
+def test_a_close_look_shows_pv_over_time_and_against_op() -> None:
+    of = record()
+    page = close_look(of, identification(of), UNITS)
+    assert "Four cycles of 60 s from the middle of the record." in page
+    assert "PV against OP." in page
+    assert "Stem of V1 against OP." in page
+    assert page.count("<figure") == 4
+    without = dataclasses.replace(identification(of), stem=np.empty((0, 1)))
+    assert "estimated" not in close_look(of, without, UNITS)
+
+
+def test_all_signals_have_one_figure_each() -> None:
+    page = all_signals(record(), None, UNITS)
+    assert page.count("<figure") == 2
+    assert "PV1 (bar)" in page
+    assert "set-point" in page
+    assert "set-point" not in all_signals(dataclasses.replace(record(), sp=None), None, UNITS)
