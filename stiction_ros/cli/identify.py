@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -199,7 +200,8 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
         said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
         console.print(f"{valve.name}: {' '.join(filter(None, said))}")
     if any(valve.verdict == "undecided" for valve in found.valves):
-        console.print("stiction valve-test plan RECORD prints a test in manual that would decide.")
+        planned = shlex.join(["stiction", "valve-test", "plan", document["record"]])
+        console.print(f"A test in manual that would decide: {planned}")
     for note in found.notes:
         console.print(f"note: {note}")
 

@@ -48,7 +48,7 @@ def answer(record: Record, facts: Facts | None, limits: Limits) -> Answer:
     Raises:
         InputError: several valves or outputs, or OP does not move as by hand.
     """
-    judgement = judged_record(record)
+    judgement = judged_record(record, None if facts is None else facts.gain)
     plan = None
     if not judgement.decided:
         if facts is None:

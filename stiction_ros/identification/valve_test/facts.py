@@ -92,7 +92,7 @@ def facts_of_answer(answer: StepAnswer, valve: str, op: float, pv: float) -> Fac
         gain = float(answer.values[min(count, known - 1)]) or None
     noise = answer.noise / math.sqrt(count)
     everywhere = (-math.inf, math.inf)
-    return Facts(valve, op, pv, gain, noise, count * step, math.inf, everywhere)
+    return Facts(valve, op, pv, gain, noise, answer.dead_time, count * step, math.inf, everywhere)
 
 
 def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts:
@@ -109,15 +109,20 @@ def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts
         pv=pv,
         gain=None,
         noise=0.0,
+        dead=0.0,
         hold=trial.hold * record.sample_time,
-        op_limit=WIDENS**2 * float(np.abs(levels - levels[0]).max()),
+        op_limit=WIDENS**2 * trial.steps.reach,
         pv_limit=(pv - room, pv + room),
     )
     return limits.of(facts)
 
 
-def judged_record(record: Record) -> Judgement:
+def judged_record(record: Record, gain: float | None = None) -> Judgement:
     """Return the verdict on a record of a test: of what is marked as manual, if anything is.
+
+    Args:
+        record: of one valve and one output.
+        gain: what 1 % of the stem makes of PV within a hold, where that was known before.
 
     Raises:
         InputError: several valves or outputs, or OP does not move as by hand.
@@ -142,7 +147,7 @@ def judged_record(record: Record) -> Judgement:
             where=record.name,
             fix="record PV at a shorter sample time, or hold each move for longer",
         )
-    return judged(part.op[:, 0], part.pv[:, 0])
+    return judged(part.op[:, 0], part.pv[:, 0], gain)
 
 
 def _of_one_loop(record: Record) -> None:

@@ -16,12 +16,14 @@ SMALLEST = 0.4
 """Smallest f_S of interest, %: a valve with less follows its signal as good positioners do."""
 LARGEST = 15.0
 """Largest f_S of all, %."""
-CELLS = (30, 16, 6)
+CELLS = (24, 8, 4)
 """Cells over log f_S, f_D / f_S and the start, before they are refined."""
 RAMP = 12  # parts of a step behind an actuator's lag
 LEVELS = 5
 """Times that cells are halved: the last ones are .6 % of f_S wide."""
-REFINED = 64  # cells that are halved at once
+REFINED = 48  # sets of moves of which the cells are halved at once
+NEGLIGIBLE = 1e-9
+"""Share of the likeliest cell below which a cell is dropped."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,8 +93,12 @@ class Frictions:
         moves, which = distinct(np.diff(stems))
         return cls(middles, widths, lags, logs, moves, which, steps.levels[-1] - stems[:, -1])
 
+    def along(self, steps: Steps) -> Frictions:
+        """Return the same cells on another path of OP that begins where this one does."""
+        return self._at(steps, self.middles, self.widths, self.lags, self.logs)
+
     def refined(self, steps: Steps, shares: FloatArray) -> Frictions:
-        """Return the cells with the likeliest of them halved in each direction.
+        """Return the likely cells, the likeliest of them halved in each direction.
 
         Args:
             steps: of OP.
@@ -103,20 +109,25 @@ class Frictions:
         likely = np.zeros(len(best), dtype=bool)
         likely[np.argsort(best)[-REFINED:]] = True
         chosen = np.flatnonzero(likely[self.which] & self.moved)
-        chosen = chosen[np.argsort(shares[chosen])[-4 * REFINED :]]
-        parts = []
-        for signs in itertools.product((-0.25, 0.25), repeat=3):
-            parts.append(self.middles[chosen] + np.array(signs) * self.widths[chosen])
-        count = len(parts)
-        keep = np.ones(len(shares), dtype=bool)
-        keep[chosen] = False
-        return self._at(
+        chosen = chosen[np.argsort(shares[chosen])[-2 * REFINED :]]
+        signs = 0.25 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+        halves = np.repeat(chosen, len(signs))
+        fine = self._at(
             steps,
-            np.vstack([self.middles[keep], *parts]),
-            np.vstack([self.widths[keep], np.tile(0.5 * self.widths[chosen], (count, 1))]),
-            np.concatenate([self.lags[keep], np.tile(self.lags[chosen], count)]),
-            np.concatenate([self.logs[keep], np.tile(self.logs[chosen] - np.log(count), count)]),
+            self.middles[halves] + np.tile(signs, (len(chosen), 1)) * self.widths[halves],
+            0.5 * self.widths[halves],
+            self.lags[halves],
+            self.logs[halves] - np.log(len(signs)),
         )
+        keep = shares > NEGLIGIBLE * shares.max()
+        keep[chosen] = False
+        moves, which = distinct(np.vstack([self.moves[self.which[keep]], fine.moves[fine.which]]))
+        rest = (
+            np.concatenate([getattr(self, name)[keep], getattr(fine, name)])
+            for name in ("middles", "widths", "lags", "logs", "ends")
+        )
+        middles, widths, lags, logs, ends = rest
+        return type(self)(middles, widths, lags, logs, moves, which, ends)
 
     @functools.cached_property
     def prior(self) -> FloatArray:

@@ -18,6 +18,9 @@ from stiction_ros.identification.valve_test.steps import Steps
 
 DECIDED = 0.95
 """Probability from which on a verdict is given, either way."""
+STOPS = 0.99
+"""Probability at which a test that goes on ends, so that one of a hundred ends wrongly; also that
+PV stays within its limits."""
 NO_LINK = 0.1
 """Prior of a PV that OP does not move at all: a wrong tag, a bypass. The rest is shared evenly by
 friction and none, as only loops whose record left that open are tested."""
@@ -58,6 +61,18 @@ class Judgement:
         return self.verdict is not VerdictKind.UNDECIDED
 
     @property
+    def sure(self) -> bool:
+        """Whether a test that goes on may end."""
+        return self.decided and not 1.0 - STOPS < self.probability < STOPS
+
+    @property
+    def known_to(self) -> float:
+        """Half the widths of the intervals of f_S and f_D together, over f_S; 0 where none is."""
+        if not self.verdict.has_friction:
+            return 0.0
+        return 0.5 * float(np.ptp(self.f_s_interval) + np.ptp(self.f_d_interval)) / self.f_s
+
+    @property
     def gain(self) -> float:
         """What 1 % of the stem makes of PV within a hold by the likelier explanation."""
         best, row = self.ideal, 0
@@ -65,7 +80,7 @@ class Judgement:
             best = self.sticky
             row = int(self.frictions.which[np.argmax(best.cells(self.frictions))])
         shape = Shape.of(best.dynamics, self.trial.hold)
-        return float(best.gains[row]) * shape.shown(self.trial.hold)
+        return float(best.gains[row] * shape.shown(self.trial.hold))
 
     @property
     def sentence(self) -> str:
@@ -111,15 +126,21 @@ class Judgement:
         }
 
 
-def judged(op: FloatArray, pv: FloatArray) -> Judgement:
+def judged(
+    op: FloatArray, pv: FloatArray, gain: float | None = None, before: Judgement | None = None
+) -> Judgement:
     """Return the verdict on a test.
 
     Args:
         op: that moves by steps, %, shape (N,).
         pv: engineering units, shape (N,).
+        gain: what 1 % of the stem makes of PV within a hold, where that was known before.
+        before: the verdict after fewer moves of this test, from which the search goes on.
     """
-    trial = Trial(pv, ~held_rows(pv), Steps.of(op))
-    ideal, still, sticky, frictions = trial.explained()
+    trial = Trial(pv, ~held_rows(pv), Steps.of(op), gain)
+    ideal, still, sticky, frictions = trial.explained(
+        () if before is None else (before.ideal.dynamics, before.sticky.dynamics)
+    )
     share = 0.5 * (1.0 - NO_LINK)
     logs = np.array([ideal.evidence, sticky.evidence, still.evidence])
     logs += np.log([share, share, NO_LINK])

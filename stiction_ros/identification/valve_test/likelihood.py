@@ -8,7 +8,8 @@ with the step response s of two lags and a dead time, moves Δχ of the stem at 
 and v a load that walks at random behind the first lag, first-order noise and white noise. The walk
 of the load and c_1 make a level possible, whose first lag is longer than the record. The moves are
 those of a friction law, but for δ: what the law leaves out, and a gain that changes with the
-opening. c is flat, K has unit information (Kass and Wasserman 1995, Am. Stat. 90, 928), 1/σ² of the
+opening. c is flat, K is known from before or has unit information (Kass and Wasserman 1995, Am.
+Stat. 90, 928), 1/σ² of the
 innovations is flat over log σ; all are integrated out, so that one number compares frictions.
 """
 
@@ -26,7 +27,10 @@ from stiction_ros.identification.valve_test.steps import Steps
 
 OWN_ERROR = 0.05
 """Standard deviation of what a law leaves out of a move, %: an eighth of the smallest friction."""
-ROUNDING = 1e-14  # share of PV's energy that computing leaves where nothing else does
+KNOWN = 0.5
+"""Standard deviation of a gain that was known before the test, over it: weak, as such a gain comes
+from a record that hardly moves, or from the model of a controller."""
+ROUNDING = 1e-12  # share of PV's energy that computing leaves where nothing else does
 CURVATURE = math.log(50.0) / 200.0
 """Half the relative change of the gain per % of travel of an equal percentage valve of rangeability
 50, the largest that is usual (IEC 60534-2-4)."""
@@ -82,9 +86,15 @@ class Shape:
             np.array([_share(dynamics.kept), math.exp(dynamics.noise)]),
         )
 
-    def shown(self, samples: float) -> float:
+    def shown(self, samples: FloatArray | float) -> FloatArray:
         """Return how much of a step PV shows after some samples, but for the second lag."""
-        return -math.expm1(-max(samples - self.dead, 0.0) / self.first)
+        return np.asarray(-np.expm1(-np.maximum(samples - self.dead, 0.0) / self.first))
+
+    def unsure(self, samples: float) -> float:
+        """Return the variance of the mean of PV over some samples, load and noise together."""
+        kept, variance = self.noise
+        held = min((1.0 + kept) / (1.0 - kept) / samples, 1.0)
+        return 1.0 / samples + float(variance) * held + self.load * samples
 
 
 def log_sum(logs: FloatArray) -> float:
@@ -129,44 +139,53 @@ class Answered:
         """
         answers = step_answers(steps.rows, len(pv), shape.first, shape.second, shape.dead)
         fading = -np.expm1(-np.arange(len(pv)) / shape.first)
-        columns = np.column_stack([answers, np.ones(len(pv)), fading / fading[-1], pv])
+        middle = pv - pv[seen].mean()
+        columns = np.column_stack([answers, np.ones(len(pv)), fading / fading[-1], middle])
         white, logarithms = white_rows(columns, seen, shape.first, shape.load, shape.noise)
-        q, r = np.linalg.qr(white[:, -3:-1])
-        white -= q @ (q.T @ white)
-        moves, y = white[:, :-3], white[:, -1]
-        determinant = float(np.log(np.abs(np.diag(r))).sum())
-        lead = steps.levels - steps.levels[0]
+        gram, count = white.T @ white, len(steps.rows)
+        levels, others = slice(count, count + 2), np.append(np.arange(count), count + 2)
+        within, across = gram[levels, levels], gram[levels][:, others]
+        rest = gram[np.ix_(others, others)] - across.T @ np.linalg.solve(within, across)
         return cls(
-            moves.T @ moves,
-            moves.T @ y,
-            float(y @ y),
-            len(y) - 2,
-            -logarithms - determinant,
-            np.diff(lead**2),
+            rest[:-1, :-1],
+            rest[:-1, -1],
+            float(rest[-1, -1]),
+            len(white) - 2,
+            -logarithms - 0.5 * float(np.linalg.slogdet(within)[1]),
+            np.diff((steps.levels - steps.levels[0]) ** 2),
         )
 
-    def likelihoods(self, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the log likelihood of moves of the stem, and K, shape (U,) each.
+    def likelihoods(
+        self, moves: FloatArray, gain: float | None
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Return the log likelihood of moves of the stem, K, (U,) each, and σ of the best.
 
         Args:
             moves: at each step of OP, %, shape (U, M).
+            gain: K as it was known before; None where it was not.
         """
-        with_pv, own = moves @ self.beside, _forms(moves, self.gram)
+        with_pv, across = moves @ self.beside, moves @ self.gram
+        own = _sums(across, moves)
         best = int(np.argmax(with_pv**2 / own))
         variance = max(self.energy - with_pv[best] ** 2 / own[best], 1e-300) / self.count
         spread = self._spread((with_pv[best] / own[best]) ** 2 / variance)
         inner = np.linalg.inv(np.eye(len(spread)) + spread @ self.gram)
         taken = inner @ spread
-        with_pv = moves @ (self.beside - self.gram @ (taken @ self.beside))
-        own = _forms(moves, self.gram - self.gram @ taken @ self.gram)
+        with_pv = with_pv - across @ (taken @ self.beside)
+        own = _sums(across, moves - across @ taken)
         energy = self.energy - float(self.beside @ taken @ self.beside)
-        left = energy - with_pv**2 / own * (self.count / (self.count + 1.0))
+        told, known = own / self.count, 0.0  # unit information
+        if gain:
+            told, known = np.full(len(own), variance / (KNOWN * gain) ** 2), gain
+        gains = (with_pv + told * known) / (own + told)
+        left = energy + told * known**2 - (with_pv + told * known) * gains
         left = np.maximum(left, ROUNDING * self.energy)
         half = 0.5 * self.count
-        found = -half * np.log(left) - 0.5 * math.log1p(self.count)
+        found = -half * np.log(left) + 0.5 * np.log(told / (own + told))
         found += 0.5 * np.linalg.slogdet(inner)[1]
         found[~moves.any(axis=1)] = -half * math.log(self.energy)
-        return self.constant + found, with_pv / own
+        noise = math.sqrt(float(left[np.argmax(found)]) / self.count)
+        return self.constant + found, gains, noise
 
     def _spread(self, scale: float) -> FloatArray:
         """Return the covariance of δ K / σ, shape (M, M)."""
@@ -174,6 +193,6 @@ class Answered:
         return np.asarray(scale * (own + CURVATURE**2 * np.outer(self.bend, self.bend)))
 
 
-def _forms(rows: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Return x A x of each row x, above 0, shape (U,)."""
-    return np.asarray(np.maximum(np.einsum("ij,ij->i", rows @ matrix, rows), 1e-300))
+def _sums(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the sum of the products of each two rows, above 0, shape (U,)."""
+    return np.asarray(np.maximum(np.einsum("ij,ij->i", one, other), 1e-300))

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros.identification.valve_test.forecast import Forecast
 from stiction_ros.identification.valve_test.frictions import LARGEST, SMALLEST
-from stiction_ros.identification.valve_test.judgement import Judgement
+from stiction_ros.identification.valve_test.judgement import DECIDED, STOPS, Judgement
 from stiction_ros.texts import spoken
 
 CLEAR = 4.0
@@ -16,10 +17,9 @@ CLEAR = 4.0
 WIDENS = 2.5
 """Times by which a pair is wider than the one before: five go from the smallest friction of
 interest to the largest."""
+SIZES = 12  # of pairs that a further round is chosen from
 PAIRS = 3  # of a round
 ROUNDS = 3
-STOPS = 0.99
-"""Probability at which a test that goes on ends, so that one of a hundred ends wrongly."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Facts:
         gain: what 1 % of the stem makes of PV within a hold, engineering units, sign included; None
             where it is not known.
         noise: standard deviation of the mean of PV over a hold, same units.
+        dead: time after which PV begins to answer, s.
         hold: s between two moves.
         op_limit: how far OP may go from ``op``, %.
         pv_limit: lowest and highest PV, engineering units.
@@ -42,6 +43,7 @@ class Facts:
     pv: float
     gain: float | None
     noise: float
+    dead: float
     hold: float
     op_limit: float
     pv_limit: tuple[float, float]
@@ -115,23 +117,37 @@ def first_round(facts: Facts) -> Plan:
     return _round(facts, max(SMALLEST, seen))
 
 
-def further_round(facts: Facts, judgement: Judgement) -> Plan | None:
-    """Return the next round: about the widest pair, or wider where PV did not answer.
+def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> Plan | None:
+    """Return the next round: the pair that tells most, or a wider one where PV did not answer.
+
+    Of pairs that tell as much to :data:`DECIDED` it is the smallest.
+
+    PV stays within its limits with probability :data:`STOPS`, by all that the test leaves possible.
 
     Args:
         facts: of the loop.
         judgement: of the rounds before.
+        sizing: whether friction is known to be there, and only its size is asked for.
 
     Returns:
-        None where PV did not answer and the limits leave no wider one.
+        None where the limits leave no such pair.
     """
-    levels = judgement.trial.steps.levels
-    reach = float(np.abs(levels - levels[0]).max())
+    reach = judgement.trial.steps.reach
     if judgement.responded:
-        return _round(dataclasses.replace(facts, gain=judgement.gain), reach / WIDENS)
-    if reach >= 0.99 * facts.widest:
+        facts = dataclasses.replace(facts, gain=judgement.gain)
+        reaches = np.geomspace(0.5 * SMALLEST, max(facts.op_limit, SMALLEST), SIZES)
+    else:
+        reaches = np.geomspace(WIDENS, 1.0, SIZES, endpoint=False) * reach
+    told: dict[float, float] = {}
+    for one in np.minimum(reaches, min(facts.op_limit, LARGEST)).tolist():
+        pair = Forecast.of(judgement, (facts.op + one, facts.op - one))
+        if pair.beyond(*facts.pv_limit) <= 1.0 - STOPS:
+            told[one] = pair.apart(sizing) if judgement.responded else one
+    enough = DECIDED * max(told.values(), default=0.0)
+    best = min((one for one, value in told.items() if value >= enough), default=0.0)
+    if best <= (0.0 if judgement.responded else reach):
         return None
-    return _round(facts, WIDENS * reach)
+    return Plan(facts, (*(facts.op + best, facts.op - best) * PAIRS, facts.op))
 
 
 def _round(facts: Facts, least: float) -> Plan:

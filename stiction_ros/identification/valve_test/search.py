@@ -29,6 +29,7 @@ CURVED = 0.1
 """Share of the width of the prior by which the evidence is differenced."""
 COLD, WARM = 0.7, 0.3
 """First steps of a search over the width of the prior: from its middle, and from a former end."""
+UNSHOWN = 1e-3  # least share of a step that PV is taken to show within a hold
 START = Dynamics(lag=-0.5, second=-1.0, dead=-1.5, load=-5.0, kept=0.0, noise=-2.0)
 WIDE = Dynamics(lag=1.7, second=1.5, dead=1.0, load=2.0, kept=1.5, noise=2.0)
 """Middle and standard deviation of the prior of process and noise, weak as they are known to a
@@ -44,12 +45,14 @@ class Explanation:
         dynamics: process and noise.
         values: log of how likely it is with each set of moves of the stem, shape (U,).
         gains: K of each.
+        noise: σ of the white noise, engineering units.
     """
 
     evidence: float
     dynamics: Dynamics
     values: FloatArray
     gains: FloatArray
+    noise: float
 
     def cells(self, frictions: Frictions) -> FloatArray:
         """Return how likely each cell is, shape (G,)."""
@@ -64,11 +67,13 @@ class Trial:
         pv: shape (N,).
         seen: samples that were measured, shape (N,).
         steps: of OP.
+        gain: what 1 % of the stem makes of PV within a hold as it was known before; None: nothing.
     """
 
     pv: FloatArray
     seen: BoolArray
     steps: Steps
+    gain: float | None = None
 
     @functools.cached_property
     def hold(self) -> float:
@@ -83,31 +88,42 @@ class Trial:
             asked: frictions, or moves of the stem, %, shape (G, M).
         """
         shape = Shape.of(dynamics, self.hold)
+        gain = self.gain
+        if gain is not None:
+            gain /= max(float(shape.shown(self.hold)), UNSHOWN)
         answered = Answered.of(self.pv, self.seen, self.steps, shape)
         told = zip(dynamics, START, WIDE, strict=True)
         prior = -0.5 * sum(((value - middle) / wide) ** 2 for value, middle, wide in told)
         moves = asked.moves if isinstance(asked, Frictions) else asked
-        values, gains = answered.likelihoods(moves)
+        values, gains, noise = answered.likelihoods(moves, gain)
         values += prior
         logs = values + asked.prior if isinstance(asked, Frictions) else values
-        return Explanation(log_sum(logs), dynamics, values, gains)
+        return Explanation(log_sum(logs), dynamics, values, gains, noise)
 
-    def explained(self) -> tuple[Explanation, Explanation, Explanation, Frictions]:
+    def explained(
+        self, before: Sequence[Dynamics] = ()
+    ) -> tuple[Explanation, Explanation, Explanation, Frictions]:
         """Return how an ideal valve, a PV that OP does not move, and friction explain the record.
 
         Each search also begins where another ended, as each may miss the best process.
+
+        Args:
+            before: process and noise that explained fewer moves of the same test, of an ideal
+                valve and of friction; nothing for a search from the middle of the prior.
         """
         moves, still = np.diff(self.steps.levels)[None], np.zeros((1, len(self.steps.rows)))
         frictions = Frictions.all(self.steps)
-        ideal = self._best((START,), moves)
-        sticky = self._best((START, ideal.dynamics), frictions)
-        for _ in range(2):
-            for _ in range(LEVELS):
-                frictions = frictions.refined(self.steps, sticky.cells(frictions))
-                sticky = self.at(sticky.dynamics, frictions)
-            sticky = self._best((sticky.dynamics,), frictions)
+        ideal = self._best(before[:1] or (START,), moves)
+        sticky = self._best(before[1:] or (START, ideal.dynamics), frictions)
+        for _ in range(LEVELS):
+            frictions = frictions.refined(self.steps, sticky.cells(frictions))
+            sticky = self.at(sticky.dynamics, frictions)
+        sticky = self._best((sticky.dynamics,), frictions)
+        frictions = frictions.refined(self.steps, sticky.cells(frictions))
+        sticky = self.at(sticky.dynamics, frictions)
         ideal = max(ideal, self._best((sticky.dynamics,), moves), key=lambda one: one.evidence)
-        return ideal, self._best((START,), still), self._averaged(sticky, frictions), frictions
+        none = self._best(before[:1] or (START,), still)
+        return ideal, none, self._averaged(sticky, frictions), frictions
 
     def _averaged(self, best: Explanation, asked: Frictions) -> Explanation:
         """Return the best explanation, each friction averaged over process and noise.

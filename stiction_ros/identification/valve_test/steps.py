@@ -38,6 +38,11 @@ class Steps:
         """Samples for which each level was held, the first included, shape (M + 1,)."""
         return np.diff(np.concatenate([[0], self.rows, [self.count]]))
 
+    @property
+    def reach(self) -> float:
+        """How far OP went from its start, %."""
+        return float(np.abs(self.levels - self.levels[0]).max())
+
     def refusal(self) -> str:
         """Return why this is no test in manual, one clause; empty where it is.
 

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
+from stiction_ros.control import ControlMode
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -119,6 +120,8 @@ class ControllerInputs(ManagedNode):
         self.port.add_preview(preview)
 
     def _on_stiction(self, message: JointState) -> None:
+        if message.header.frame_id == ControlMode.VALVE_TEST:
+            return  # it is its own
         if self.settings.pace == "lockstep":  # who waits for nobody need not remember
             self.fits[to_ns(message.header.stamp)] = message.header.frame_id
         self._go_in_lockstep()

@@ -31,6 +31,7 @@ class ValveTestingController(LiveController):
 
     Attributes:
         test: the one that runs or was the last; None where there was none.
+        tested: how the last one ended.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class ValveTestingController(LiveController):
         """Build the first controller, as :class:`LiveController` does."""
         super().__init__(settings, model, background)
         self.test: ValveTest | None = None
+        self.tested: ModeChange | None = None
         self._wanted = settings.mode == ControlMode.VALVE_TEST
         self._sp: FloatArray | None = None
 
@@ -126,7 +128,9 @@ class ValveTestingController(LiveController):
         room = room or abs(facts.gain or 0.0) * reach + float(np.abs(pv - sp)[0])
         middle = facts.pv
         facts = dataclasses.replace(facts, op_limit=reach, pv_limit=(middle - room, middle + room))
-        self.test, self._sp = ValveTest(facts, round(facts.hold / step), self._background), sp
+        margin = self.settings.jump_margin
+        self.test = ValveTest(facts, round(facts.hold / step), self._background, margin)
+        self._sp = sp
         begun = ModeChange(
             self._sample, ControlMode.VALVE_TEST, "a valve test begins", self._known.name
         )
@@ -158,11 +162,11 @@ class ValveTestingController(LiveController):
             self._sample, self._controller.mode, f"valve test: {self.test.over}", self._known.name
         )
         self.changes.append(change)
+        self.tested = change
         found = self.test.judgement
         if found is None or not found.verdict.has_friction:
             return
-        wide = sum(np.ptp(ends) for ends in (found.f_s_interval, found.f_d_interval))
-        if 0.5 * wide > self.settings.jump_margin * found.f_s:
+        if found.known_to > self.settings.jump_margin:
             return  # jumps would be much larger than need be; the estimator will know better
         name = self.model.valve_names[0]
         model = self.model.with_valve_effects(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import Future
 
 import numpy as np
 
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
 from stiction_ros.identification.valve_test.plan import (
+    PAIRS,
     ROUNDS,
-    STOPS,
     Facts,
-    Plan,
     first_round,
     further_round,
 )
@@ -21,32 +21,41 @@ from stiction_ros.online.handover.background import Background
 class ValveTest:
     """The moves of one test, decided as they are answered.
 
-    OP rests for a hold, makes the moves of the plan, and is judged after each; the test ends when
-    it is decided, when three rounds or the limits leave no other move, or when something happens
-    that it does not allow for. OP then goes back to where it was, unless someone else has it.
+    OP rests for a hold, makes the moves of the plan, and is judged after each; each further pair is
+    chosen by what was answered so far. The test ends when it is decided, friction also known to
+    ``margin``, when three rounds or the limits leave no other move, or when something happens that
+    it does not allow for. OP then goes back to where it was, unless someone else has it.
 
     Attributes:
         over: why it ended; empty while it runs.
         judgement: the last one; None before the second move has been held.
     """
 
-    def __init__(self, facts: Facts, hold: int, background: Background) -> None:
+    def __init__(
+        self, facts: Facts, hold: int, background: Background, margin: float = math.inf
+    ) -> None:
         """Begin with OP where it is.
 
         Args:
             facts: of the loop.
             hold: samples for which each level is held.
             background: where the judgements are made.
+            margin: of f_S, to which friction is sized.
         """
-        self.facts, self.hold, self._background = facts, hold, background
+        self.facts, self.hold, self._background, self._margin = facts, hold, background, margin
         self.over = ""
         self.judgement: Judgement | None = None
-        self._plan: Plan | None = first_round(facts)
-        self._level, self._moves, self._made, self._rounds = facts.op, 0, 0, 1
-        self._left = hold
+        self._level, *self._levels = (facts.op, *first_round(facts).levels[:2])
+        self._made, self._left = 0, hold
+        self._late = max(math.ceil(facts.dead / facts.hold * hold), 1) + 1
         self._op: list[float] = []
         self._pv: list[float] = []
         self._work: Future[Judgement] | None = None
+
+    @property
+    def moves(self) -> int:
+        """Moves of OP that were made."""
+        return self._made
 
     def stop(self, reason: str) -> None:
         """End the test."""
@@ -61,8 +70,8 @@ class ValveTest:
         low, high = self.facts.pv_limit
         if not np.isfinite(pv):
             self.stop("PV is bad")
-        elif not low <= pv <= high:
-            self.stop(f"PV {pv:.4g} is outside {low:.4g} to {high:.4g}")
+        elif not low <= pv <= high or not low <= self._coming(pv) <= high:
+            self.stop(f"PV {pv:.4g} goes beyond {low:.4g} to {high:.4g}")
         if not self.over and self._left <= 0:
             self._go_on()
         if self.over:
@@ -72,26 +81,35 @@ class ValveTest:
         self._left -= 1
         return self._level
 
+    def _coming(self, pv: float) -> float:
+        """Return PV a dead time from now, before which no move of OP can show, by its trend."""
+        late = self._late
+        recent = [*self._pv[1 - 2 * late :], pv]
+        if len(recent) < 2 * late:
+            return pv
+        now = float(np.mean(recent[late:]))
+        return now + 1.5 * (now - float(np.mean(recent[:late])))
+
     def _go_on(self) -> None:
         """Judge what was answered, and move on where the judgement is there and leaves it open."""
-        if self._moves > 1:
+        if self._made > 1:
             if self._work is None:
-                op, pv = np.array(self._op), np.array(self._pv)
-                self._work = self._background.submit(judged, op, pv)
+                signals = np.array(self._op), np.array(self._pv)
+                known = self.facts.gain, self.judgement
+                self._work = self._background.submit(judged, *signals, *known)
             if not self._work.done():
                 return
             self.judgement, self._work = self._work.result(), None
-            told = self.judgement.probability
-            if self.judgement.decided and not 1.0 - STOPS < told < STOPS:
+            if self.judgement.sure and self.judgement.known_to <= self._margin:
                 self.stop(self.judgement.sentence)
                 return
-        if self._plan is not None and self._made == len(self._plan.levels):
-            assert self.judgement is not None
-            self._plan = further_round(self.facts, self.judgement)
-            self._rounds, self._made = self._rounds + 1, 0
-        if self._plan is None or self._rounds > ROUNDS:
+            if not self._levels and self._made < 2 * PAIRS * ROUNDS:
+                sizing = self.judgement.sure
+                plan = further_round(self.facts, self.judgement, sizing)
+                self._levels = [] if plan is None else list(plan.levels[:2])
+        if not self._levels:
             assert self.judgement is not None
             self.stop(self.judgement.sentence)
             return
-        self._level = self._plan.levels[self._made]
-        self._made, self._moves, self._left = self._made + 1, self._moves + 1, self.hold
+        self._level, *self._levels = self._levels
+        self._made, self._left = self._made + 1, self.hold

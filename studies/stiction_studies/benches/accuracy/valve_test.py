@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,16 +16,10 @@ from rich.table import Table
 
 from stiction_ros.cli.shared.as_json import hand_over
 from stiction_ros.identification.valve_test.facts import LAGS
-from stiction_ros.identification.valve_test.judgement import Judgement, judged
-from stiction_ros.identification.valve_test.plan import (
-    ROUNDS,
-    STOPS,
-    Facts,
-    Plan,
-    first_round,
-    further_round,
-)
+from stiction_ros.identification.valve_test.plan import Facts
 from stiction_ros.identification.valve_test.steps import SHORTEST
+from stiction_ros.online.controller.valve_test import ValveTest
+from stiction_ros.online.handover.background import AtOnce
 from stiction_studies.field.manual_test import ManualTest, manual_test
 from stiction_studies.field.truth import ValveKind
 from stiction_studies.seeds import run_seeds
@@ -44,10 +39,11 @@ class Ended:
     Attributes:
         seed, kind, plant, law, f_s, circumstances: of the valve.
         verdict, probability, interval: of the last judgement.
-        moves, rounds: that were made.
+        moves: that were made.
         duration: in times of dead time and lag together.
         beyond: of PV's limit, in standard deviations of the noise.
         seconds: of a judgement.
+        ended: why the test ended.
     """
 
     seed: int
@@ -60,10 +56,10 @@ class Ended:
     probability: float
     interval: tuple[float, float]
     moves: int
-    rounds: int
     duration: float
     beyond: float
     seconds: float
+    ended: str
 
     @property
     def sticks(self) -> bool:
@@ -86,9 +82,6 @@ class Ended:
         return self.interval[0] <= self.f_s <= self.interval[1]
 
 
-STOPPED = 3.0  # standard deviations of the noise beyond PV's limit at which a test is stopped
-
-
 def facts_of(case: ManualTest) -> Facts:
     """Return what is known before a test, as a routine record would tell it roughly."""
     random = np.random.default_rng([case.seed, 48])
@@ -105,6 +98,7 @@ def facts_of(case: ManualTest) -> Facts:
         pv=middle,
         gain=each * off[2],
         noise=case.noise / np.sqrt(samples),
+        dead=case.answer.dead_time * off[1],
         hold=samples * step,
         op_limit=REACH,
         pv_limit=(middle - ROOM * abs(each), middle + ROOM * abs(each)),
@@ -112,38 +106,25 @@ def facts_of(case: ManualTest) -> Facts:
 
 
 def judge(seed: int) -> Ended:
-    """Test the valve of a seed: decide after each move, three rounds at most.
+    """Test the valve of a seed as a running loop does, three rounds at most.
 
-    OP goes back and the test ends where PV passes its limit.
+    PV counts until the dead time after the last move is over: what is under way comes.
     """
     case = manual_test(seed)
     facts = facts_of(case)
-    samples = round(facts.hold / case.sample_time)
-    op, began = np.full(samples, case.op), time.perf_counter()
-    plan: Plan | None = first_round(facts)
-    found: Judgement | None = None
-    moves = rounds = calls = 0
-    beyond = 0.0
-    while plan is not None and rounds < ROUNDS and (found is None or _open(found)):
-        rounds += 1
-        for level in plan.levels:
-            op, moves = np.append(op, np.full(samples, level)), moves + 1
-            pv, clean = case.pv(op)
-            away = np.maximum(pv - facts.pv_limit[1], facts.pv_limit[0] - pv)
-            stopped = int(np.argmax(np.append(away, np.inf) > STOPPED * case.noise))
-            if stopped < len(op):
-                op[stopped + 1 :] = case.op
-                pv, clean = case.pv(op)
-                away = np.maximum(clean - facts.pv_limit[1], facts.pv_limit[0] - clean)
-                beyond, plan = max(float(away.max()) / case.noise, 0.0), None
-            if moves > 1:
-                found, calls = judged(op, pv), calls + 1
-                if not _open(found):
-                    break
-            if plan is None:
+    hold = round(facts.hold / case.sample_time)
+    late = math.ceil(case.answer.dead_time / case.sample_time) + 1
+    test, op = ValveTest(facts, hold, AtOnce()), np.empty(0)
+    began = time.perf_counter()
+    while not test.over:
+        ahead = np.append(op, np.full(hold, op[-1] if len(op) else case.op))
+        for value in case.pv(ahead)[0][len(op) :].tolist():
+            op = np.append(op, test.next_op(value))
+            if test.over or op[-1] != ahead[len(op) - 1]:
                 break
-        assert found is not None
-        plan = None if plan is None else further_round(facts, found)
+    clean = case.pv(np.append(op, np.full(late, op[-1])))[1]
+    away = np.maximum(clean - facts.pv_limit[1], facts.pv_limit[0] - clean)
+    found, moves = test.judgement, test.moves
     assert found is not None
     return Ended(
         seed=seed,
@@ -156,16 +137,11 @@ def judge(seed: int) -> Ended:
         probability=found.probability,
         interval=found.f_s_interval,
         moves=moves,
-        rounds=rounds,
         duration=moves * facts.hold / case.time,
-        beyond=beyond,
-        seconds=(time.perf_counter() - began) / calls,
+        beyond=max(float(away.max()) / case.noise, 0.0),
+        seconds=(time.perf_counter() - began) / max(moves - 1, 1),
+        ended=test.over,
     )
-
-
-def _open(found: Judgement) -> bool:
-    """Return whether a test goes on."""
-    return 1.0 - STOPS < found.probability < STOPS or not found.decided
 
 
 def groups(rows: Sequence[Ended]) -> Mapping[str, list[Ended]]:
