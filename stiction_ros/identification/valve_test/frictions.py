@@ -16,14 +16,13 @@ SMALLEST = 0.4
 """Smallest f_S of interest, %: a valve with less follows its signal as good positioners do."""
 LARGEST = 15.0
 """Largest f_S of all, %."""
-CELLS = (24, 8, 4)
+CELLS = (30, 12, 6)
 """Cells over log f_S, f_D / f_S and the start, before they are refined."""
 RAMP = 12  # parts of a step behind an actuator's lag
 LEVELS = 5
 """Times that cells are halved: the last ones are .6 % of f_S wide."""
-REFINED = 48  # sets of moves of which the cells are halved at once
-NEGLIGIBLE = 1e-9
-"""Share of the likeliest cell below which a cell is dropped."""
+REFINED = 64  # sets of moves of which the cells are halved at once
+KEPT = 3000  # likeliest cells that are kept besides
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,7 +108,7 @@ class Frictions:
         likely = np.zeros(len(best), dtype=bool)
         likely[np.argsort(best)[-REFINED:]] = True
         chosen = np.flatnonzero(likely[self.which] & self.moved)
-        chosen = chosen[np.argsort(shares[chosen])[-2 * REFINED :]]
+        chosen = chosen[np.argsort(shares[chosen])[-3 * REFINED :]]
         signs = 0.25 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
         halves = np.repeat(chosen, len(signs))
         fine = self._at(
@@ -119,7 +118,8 @@ class Frictions:
             self.lags[halves],
             self.logs[halves] - np.log(len(signs)),
         )
-        keep = shares > NEGLIGIBLE * shares.max()
+        keep = np.zeros(len(shares), dtype=bool)
+        keep[np.argsort(shares)[-KEPT:]] = True
         keep[chosen] = False
         moves, which = distinct(np.vstack([self.moves[self.which[keep]], fine.moves[fine.which]]))
         rest = (

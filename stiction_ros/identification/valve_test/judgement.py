@@ -19,8 +19,7 @@ from stiction_ros.identification.valve_test.steps import Steps
 DECIDED = 0.95
 """Probability from which on a verdict is given, either way."""
 STOPS = 0.99
-"""Probability at which a test that goes on ends, so that one of a hundred ends wrongly; also that
-PV stays within its limits."""
+"""Probability at which a test that goes on ends: one of a hundred ends wrongly."""
 NO_LINK = 0.1
 """Prior of a PV that OP does not move at all: a wrong tag, a bypass. The rest is shared evenly by
 friction and none, as only loops whose record left that open are tested."""

@@ -42,7 +42,8 @@ class Dynamics(NamedTuple):
     Attributes:
         lag: log of the first lag over the median hold.
         second: log-odds of the second lag over the first, or over the hold where that is shorter.
-        dead: log of the dead time over the median hold.
+        dead: log-odds of the dead time over the median hold, in which PV answers each move: by a
+            dead time of a whole hold each move could be taken for the one before.
         load: log of the variance of a step of the load over that of white noise; the load counts
             by what it makes of PV in a hold.
         kept: log-odds of the share that first-order noise keeps in a sample.
@@ -81,7 +82,7 @@ class Shape:
         return cls(
             first,
             0.999 * _share(dynamics.second) * min(first, hold),
-            hold * math.exp(dynamics.dead),
+            hold * _share(dynamics.dead),
             math.exp(dynamics.load) * late**2,
             np.array([_share(dynamics.kept), math.exp(dynamics.noise)]),
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction_ros.identification.valve_test.forecast import Forecast
 from stiction_ros.identification.valve_test.frictions import LARGEST, SMALLEST
-from stiction_ros.identification.valve_test.judgement import DECIDED, STOPS, Judgement
+from stiction_ros.identification.valve_test.judgement import DECIDED, Judgement
 from stiction_ros.texts import spoken
 
 CLEAR = 4.0
@@ -122,7 +122,7 @@ def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> P
 
     Of pairs that tell as much to :data:`DECIDED` it is the smallest.
 
-    PV stays within its limits with probability :data:`STOPS`, by all that the test leaves possible.
+    PV stays within its limits with probability :data:`DECIDED`, by all that the test leaves possible.
 
     Args:
         facts: of the loop.
@@ -141,7 +141,7 @@ def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> P
     told: dict[float, float] = {}
     for one in np.minimum(reaches, min(facts.op_limit, LARGEST)).tolist():
         pair = Forecast.of(judgement, (facts.op + one, facts.op - one))
-        if pair.beyond(*facts.pv_limit) <= 1.0 - STOPS:
+        if pair.beyond(*facts.pv_limit) <= 1.0 - DECIDED:
             told[one] = pair.apart(sizing) if judgement.responded else one
     enough = DECIDED * max(told.values(), default=0.0)
     best = min((one for one, value in told.items() if value >= enough), default=0.0)
