@@ -10,7 +10,12 @@ from scipy.special import ndtr
 
 from stiction_ros.effects.behaviour import FloatArray, IntArray
 from stiction_ros.identification.valve_test.judgement import Judgement
-from stiction_ros.identification.valve_test.likelihood import CURVATURE, OWN_ERROR, Shape
+from stiction_ros.identification.valve_test.likelihood import (
+    CURVATURE,
+    KNOWN,
+    OWN_ERROR,
+    Shape,
+)
 from stiction_ros.identification.valve_test.search import UNSHOWN, Explanation, Trial
 from stiction_ros.identification.valve_test.steps import Steps
 
@@ -84,7 +89,9 @@ class Forecast:
         middle, frictions = self.alike[0], self.alike[1:]
         if sizing:
             middle = self.weights[1:] @ frictions / self.weights[1:].sum()
-        energy = (((frictions - middle) / self.noise) ** 2).sum(axis=1)
+        apart, straight = (frictions - middle) / self.noise, self.alike[0] / self.noise
+        energy = (apart**2).sum(axis=1)
+        energy -= (apart @ straight) ** 2 / (KNOWN**-2 + straight @ straight)  # another gain
         return float(self.weights[1:] @ -np.expm1(-energy / 8.0))
 
 

@@ -12,7 +12,7 @@ from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.identification.evidence.sensor_hold import held_rows
 from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.identification.valve_test.frictions import SMALLEST, Frictions
-from stiction_ros.identification.valve_test.likelihood import Shape, log_sum
+from stiction_ros.identification.valve_test.likelihood import OWN_ERROR, Shape, log_sum
 from stiction_ros.identification.valve_test.search import Explanation, Trial
 from stiction_ros.identification.valve_test.steps import Steps
 
@@ -155,7 +155,8 @@ def judged(
     static = _spread(frictions.static, cells, frictions.even)
     dynamic = _spread(np.maximum(frictions.dynamic, 0.0), cells, frictions.even)
     low, high = bracket(trial.steps, frictions, cells)
-    static = min(static[0], low), static[1], max(static[2], high)
+    own = 2.0 * OWN_ERROR  # two standard deviations of what the law leaves out
+    static = max(min(static[0], low) - own, 0.0), static[1], max(static[2], high) + own
     if verdict is VerdictKind.HEALTHY:
         static = dynamic = (0.0, 0.0, SMALLEST)
     elif verdict is VerdictKind.UNDECIDED:

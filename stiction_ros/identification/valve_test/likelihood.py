@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class Shape:
             np.array([_share(dynamics.kept), math.exp(dynamics.noise)]),
         )
 
-    def shown(self, samples: FloatArray | float) -> FloatArray:
+    def shown(self, samples: Any) -> FloatArray:
         """Return how much of a step PV shows after some samples, but for the second lag."""
         return np.asarray(-np.expm1(-np.maximum(samples - self.dead, 0.0) / self.first))
 
@@ -95,7 +95,7 @@ class Shape:
         """Return the variance of the mean of PV over some samples, load and noise together."""
         kept, variance = self.noise
         held = min((1.0 + kept) / (1.0 - kept) / samples, 1.0)
-        return 1.0 / samples + float(variance) * held + self.load * samples
+        return float(1.0 / samples + variance * held + self.load * samples)
 
 
 def log_sum(logs: FloatArray) -> float:

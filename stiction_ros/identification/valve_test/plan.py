@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ WIDENS = 2.5
 """Times by which a pair is wider than the one before: five go from the smallest friction of
 interest to the largest."""
 SIZES = 12  # of pairs that a further round is chosen from
-PAIRS = 3  # of a round
+PAIRS, LOOKS = 3, 2  # pairs of a round, and those of which PV is forecast when it begins
 ROUNDS = 3
 
 
@@ -118,40 +119,48 @@ def first_round(facts: Facts) -> Plan:
 
 
 def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> Plan | None:
-    """Return the next round: the pair that tells most, or a wider one where PV did not answer.
+    """Return the next round: the pairs that tell most, or wider ones where PV did not answer.
 
-    Of pairs that tell as much to :data:`DECIDED` it is the smallest.
-
-    PV stays within its limits with probability :data:`DECIDED`, by all that the test leaves possible.
+    The first pairs of a round keep PV within its limits with probability :data:`DECIDED`, by all
+    that the test leaves possible; of rounds that tell as much it is the smallest.
 
     Args:
         facts: of the loop.
         judgement: of the rounds before.
-        sizing: whether friction is known to be there, and only its size is asked for.
+        sizing: whether friction is known to be there, and only its size is asked for, by the
+            fewest moves: a pair at a time.
 
     Returns:
-        None where the limits leave no such pair.
+        None where the limits leave no such round.
     """
-    reach = judgement.trial.steps.reach
+    reach, most = judgement.trial.steps.reach, min(facts.op_limit, LARGEST)
     if judgement.responded:
         facts = dataclasses.replace(facts, gain=judgement.gain)
-        reaches = np.geomspace(0.5 * SMALLEST, max(facts.op_limit, SMALLEST), SIZES)
+        reaches = np.geomspace(0.5 * SMALLEST, max(most, SMALLEST), SIZES)
     else:
         reaches = np.geomspace(WIDENS, 1.0, SIZES, endpoint=False) * reach
-    told: dict[float, float] = {}
-    for one in np.minimum(reaches, min(facts.op_limit, LARGEST)).tolist():
-        pair = Forecast.of(judgement, (facts.op + one, facts.op - one))
-        if pair.beyond(*facts.pv_limit) <= 1.0 - DECIDED:
-            told[one] = pair.apart(sizing) if judgement.responded else one
-    enough = DECIDED * max(told.values(), default=0.0)
-    best = min((one for one, value in told.items() if value >= enough), default=0.0)
-    if best <= (0.0 if judgement.responded else reach):
-        return None
-    return Plan(facts, (*(facts.op + best, facts.op - best) * PAIRS, facts.op))
+    told: dict[float, Plan] = {}
+    for least in np.minimum(reaches, most).tolist():
+        plan = _round(facts, least, 1 if sizing else PAIRS)
+        if plan.levels and stays(facts, judgement, plan.levels[: 2 * LOOKS]):
+            value = Forecast.of(judgement, plan.levels[:-1]).apart(sizing)
+            told[value if judgement.responded else plan.levels[0] - facts.op] = plan
+    enough = DECIDED * max(told, default=0.0)
+    best = min((plan for value, plan in told.items() if value >= enough), key=_first, default=None)
+    return best if best and (judgement.responded or _first(best) > reach) else None
 
 
-def _round(facts: Facts, least: float) -> Plan:
+def stays(facts: Facts, judgement: Judgement, levels: Sequence[float]) -> bool:
+    """Return whether PV stays within its limits with probability :data:`DECIDED`."""
+    return Forecast.of(judgement, levels).beyond(*facts.pv_limit) <= 1.0 - DECIDED
+
+
+def _first(plan: Plan) -> float:
+    return plan.levels[0] - plan.facts.op
+
+
+def _round(facts: Facts, least: float, pairs: int = PAIRS) -> Plan:
     """Return pairs of moves up and down, which leave a level where it was."""
-    reaches = sorted({min(least * WIDENS**k, facts.widest) for k in range(PAIRS)})
+    reaches = sorted({min(least * WIDENS**k, facts.widest) for k in range(pairs)})
     levels = [facts.op + sign * reach for reach in reaches for sign in (1.0, -1.0)]
     return Plan(facts, (*levels, facts.op))

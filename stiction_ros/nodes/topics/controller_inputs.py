@@ -22,7 +22,7 @@ from stiction_ros.nodes.shared.managed import LATCHED_READER_QOS, READER_QOS, Ma
 from stiction_ros.nodes.shared.messages import rows_of, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.nodes.shared.typed import quality
-from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.handover.background import Background
 from stiction_ros.online.handover.offered_model import read_offer
 from stiction_ros.online.input.port import InputPort
@@ -38,7 +38,7 @@ class ControllerInputs(ManagedNode):
 
     settings: ControllerNodeSettings
     model: LoopModel
-    live: LiveController
+    live: ValveTestingController
     port: InputPort
     background: Background
     listening: bool  # whether a PV is for this node: it is active

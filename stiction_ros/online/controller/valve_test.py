@@ -14,6 +14,7 @@ from stiction_ros.identification.valve_test.plan import (
     Facts,
     first_round,
     further_round,
+    stays,
 )
 from stiction_ros.online.handover.background import Background
 
@@ -45,7 +46,7 @@ class ValveTest:
         self.facts, self.hold, self._background, self._margin = facts, hold, background, margin
         self.over = ""
         self.judgement: Judgement | None = None
-        self._level, *self._levels = (facts.op, *first_round(facts).levels[:2])
+        self._level, *self._levels = (facts.op, *first_round(facts).levels[:-1])
         self._made, self._left = 0, hold
         self._late = max(math.ceil(facts.dead / facts.hold * hold), 1) + 1
         self._op: list[float] = []
@@ -103,10 +104,13 @@ class ValveTest:
             if self.judgement.sure and self.judgement.known_to <= self._margin:
                 self.stop(self.judgement.sentence)
                 return
-            if not self._levels and self._made < 2 * PAIRS * ROUNDS:
-                sizing = self.judgement.sure
-                plan = further_round(self.facts, self.judgement, sizing)
-                self._levels = [] if plan is None else list(plan.levels[:2])
+            if self._made % 2 == 0 and not (
+                self._levels and stays(self.facts, self.judgement, self._levels[:2])
+            ):
+                plan = None
+                if self._made < 2 * PAIRS * ROUNDS:
+                    plan = further_round(self.facts, self.judgement, self.judgement.sure)
+                self._levels = [] if plan is None else list(plan.levels[:-1])
         if not self._levels:
             assert self.judgement is not None
             self.stop(self.judgement.sentence)
