@@ -16,8 +16,9 @@ SMALLEST = 0.4
 """Smallest f_S of interest, %: a valve with less follows its signal as good positioners do."""
 LARGEST = 15.0
 """Largest f_S of all, %."""
-CELLS = (30, 12, 6)
-"""Cells over log f_S, f_D / f_S and the start, before they are refined."""
+CELLS = (30, 8, 20)
+"""Cells over log f_S, f_D / f_S and the start, before they are refined: a stem near the edge of its
+band slips at the first small move, which coarser starts would miss for a large f_S."""
 RAMP = 12  # parts of a step behind an actuator's lag
 LEVELS = 5
 """Times that cells are halved: the last ones are .6 % of f_S wide."""

@@ -143,15 +143,23 @@ def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> P
     for least in np.minimum(reaches, most).tolist():
         plan = _round(facts, least, 1 if sizing else PAIRS)
         if plan.levels and stays(facts, judgement, plan.levels[: 2 * LOOKS]):
-            value = Forecast.of(judgement, plan.levels[:-1]).apart(sizing)
-            told[value if judgement.responded else plan.levels[0] - facts.op] = plan
+            value = _first(plan)
+            if judgement.responded:
+                value = Forecast.of(judgement, plan.levels[:-1]).apart(sizing)
+            told[value] = plan
     enough = DECIDED * max(told, default=0.0)
     best = min((plan for value, plan in told.items() if value >= enough), key=_first, default=None)
     return best if best and (judgement.responded or _first(best) > reach) else None
 
 
 def stays(facts: Facts, judgement: Judgement, levels: Sequence[float]) -> bool:
-    """Return whether PV stays within its limits with probability :data:`DECIDED`."""
+    """Return whether PV stays within its limits with probability :data:`DECIDED`.
+
+    Before PV has answered the gain bounds the round: how far a stem that is stuck jumps when it
+    breaks loose does not depend on how far OP goes beyond that.
+    """
+    if not judgement.responded:
+        return True
     return Forecast.of(judgement, levels).beyond(*facts.pv_limit) <= 1.0 - DECIDED
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
 from stiction_ros.identification.valve_test.plan import (
+    CLEAR,
     PAIRS,
     ROUNDS,
     Facts,
@@ -18,12 +19,14 @@ from stiction_ros.identification.valve_test.plan import (
 )
 from stiction_ros.online.handover.background import Background
 
+RESTS = 5  # holds that are waited for at most until PV rests
+
 
 class ValveTest:
     """The moves of one test, decided as they are answered.
 
-    OP rests for a hold, makes the moves of the plan, and is judged after each; each further pair is
-    chosen by what was answered so far. The test ends when it is decided, friction also known to
+    OP rests until PV does, makes the moves of the plan, and is judged after each; each further pair
+    is chosen by what was answered so far. The test ends when it is decided, friction also known to
     ``margin``, when three rounds or the limits leave no other move, or when something happens that
     it does not allow for. OP then goes back to where it was, unless someone else has it.
 
@@ -91,6 +94,12 @@ class ValveTest:
         now = float(np.mean(recent[late:]))
         return now + 1.5 * (now - float(np.mean(recent[:late])))
 
+    def _rests(self) -> bool:
+        """Return whether PV is the same in both halves of the last hold, but for noise."""
+        half = self.hold // 2
+        one, other = np.mean(self._pv[-2 * half : -half]), np.mean(self._pv[-half:])
+        return abs(float(other - one)) <= CLEAR * self.facts.noise
+
     def _go_on(self) -> None:
         """Judge what was answered, and move on where the judgement is there and leaves it open."""
         if self._made > 1:
@@ -115,5 +124,10 @@ class ValveTest:
             assert self.judgement is not None
             self.stop(self.judgement.sentence)
             return
+        if not self._made:
+            if len(self._op) < RESTS * self.hold and not self._rests():
+                self._left = self.hold
+                return
+            del self._op[: -self.hold], self._pv[: -self.hold]
         self._level, *self._levels = self._levels
         self._made, self._left = self._made + 1, self.hold
