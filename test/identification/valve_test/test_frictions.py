@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from manual_tests import path
 
 from stiction_ros.effects import HeStiction
-from stiction_ros.identification.valve_test.frictions import LARGEST, SMALLEST, Frictions
+from stiction_ros.identification.valve_test.frictions import KEPT, LARGEST, SMALLEST, Frictions
 from stiction_ros.identification.valve_test.steps import Steps
 
 STEPS = Steps.of(path())
@@ -25,12 +25,14 @@ def test_the_prior_is_one_and_half_of_it_is_without_a_jump() -> None:
 
 @settings(max_examples=5, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_refining_keeps_the_prior(seed: int) -> None:
+def test_refining_keeps_the_prior_of_the_likely_cells(seed: int) -> None:
     cells = Frictions.all(STEPS)
-    finer = cells.refined(STEPS, np.random.default_rng(seed).standard_normal(len(cells.logs)))
-    assert len(finer.logs) > len(cells.logs)
-    assert np.isclose(np.exp(finer.logs).sum(), 1.0)
-    assert np.isclose(np.exp(finer.logs)[finer.even].sum(), 0.5)
+    shares = np.random.default_rng(seed).random(len(cells.logs))
+    finer = cells.refined(STEPS, shares)
+    likely = np.sort(np.argsort(shares)[-KEPT:])
+    assert np.exp(finer.logs).sum() >= np.exp(cells.logs[likely]).sum() - 1e-12
+    assert np.exp(finer.logs).sum() <= 1.0 + 1e-9
+    assert finer.widths[:, 0].min() == 0.5 * cells.widths[:, 0].min()
 
 
 @settings(max_examples=20, deadline=None)

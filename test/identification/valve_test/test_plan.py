@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manual_tests import answer, path
 
+from stiction_ros.identification.valve_test.forecast import Forecast
 from stiction_ros.identification.valve_test.frictions import SMALLEST
+from stiction_ros.identification.valve_test.judgement import Judgement, judged
 from stiction_ros.identification.valve_test.plan import Facts, Plan, first_round, further_round
 
-FACTS = Facts("V1", 50.0, 100.0, 0.8, 0.01, 20.0, 10.0, (92.0, 108.0))
+FACTS = Facts("V1", 50.0, 100.0, 0.8, 0.01, 3.0, 20.0, 10.0, (92.0, 108.0))
 
 
 def ways(plan: Plan) -> np.ndarray:
     return np.array(plan.levels) - plan.facts.op
 
 
-def seen(reach: float, responded: bool, gain: float = 0.8) -> Any:
-    steps = SimpleNamespace(levels=np.array([50.0, 50.0 + reach, 50.0 - reach, 50.0]))
-    trial = SimpleNamespace(steps=steps)
-    return SimpleNamespace(trial=trial, responded=responded, gain=gain)
+@pytest.fixture(scope="module")
+def answered() -> Judgement:
+    return judged(path(), answer(path(), (2.0, 0.8), seed=1))
+
+
+@pytest.fixture(scope="module")
+def unanswered() -> Judgement:
+    return judged(path(), answer(path(), None, seed=4, gain=0.0), 0.8)
 
 
 def test_the_first_round_widens_from_the_smallest_friction_of_interest() -> None:
@@ -40,42 +45,45 @@ def test_a_noisy_pv_takes_larger_pairs() -> None:
 
 
 @settings(deadline=None)
-@given(
-    st.floats(-2.0, 2.0),
-    st.floats(0.0, 1.0),
-    st.floats(0.1, 30.0),
-    st.floats(0.1, 50.0),
-    st.booleans(),
-)
-def test_no_round_passes_a_limit_and_each_comes_back(
-    gain: float, noise: float, op_limit: float, room: float, responded: bool
+@given(st.floats(-2.0, 2.0), st.floats(0.0, 1.0), st.floats(0.1, 30.0), st.floats(0.1, 50.0))
+def test_the_first_round_passes_no_limit_and_comes_back(
+    gain: float, noise: float, op_limit: float, room: float
 ) -> None:
     limits = (100.0 - room, 100.0 + 2.0 * room)
-    facts = dataclasses.replace(
-        FACTS, gain=gain or None, noise=noise, op_limit=op_limit, pv_limit=limits
+    plan = first_round(
+        dataclasses.replace(
+            FACTS, gain=gain or None, noise=noise, op_limit=op_limit, pv_limit=limits
+        )
     )
-    plan: Plan | None = first_round(facts)
-    for _ in range(4):
-        if plan is None:
-            break
-        assert plan.levels[-1] == facts.op
-        assert np.isclose(ways(plan).sum(), 0.0)  # a level is left where it was
-        assert plan.reach <= op_limit * (1.0 + 1e-9)
-        assert plan.pv_move is None or plan.pv_move <= room * (1.0 + 1e-9)
-        plan = further_round(facts, seen(plan.reach, responded, gain))
+    assert plan.levels[-1] == FACTS.op
+    assert np.isclose(ways(plan).sum(), 0.0)  # a level is left where it was
+    assert plan.reach <= op_limit * (1.0 + 1e-9)
+    assert plan.pv_move is None or plan.pv_move <= room * (1.0 + 1e-9)
 
 
-def test_where_pv_does_not_answer_the_limits_end_the_test() -> None:
-    assert further_round(FACTS, seen(FACTS.widest, responded=False)) is None
-    wider = further_round(FACTS, seen(2.5, responded=False))
+def test_where_pv_does_not_answer_the_pairs_widen_until_the_limits_end_the_test(
+    unanswered: Judgement,
+) -> None:
+    wider = further_round(FACTS, unanswered)
     assert wider is not None
-    assert ways(wider)[0] == pytest.approx(6.25)
+    assert ways(wider)[0] == pytest.approx(7.5)
+    assert further_round(dataclasses.replace(FACTS, op_limit=3.0), unanswered) is None
 
 
-def test_where_pv_answers_the_gain_is_that_of_the_test() -> None:
-    again = further_round(FACTS, seen(2.5, responded=True, gain=-4.0))
-    assert again is not None
-    assert np.allclose(ways(again), [1.0, -1.0, 2.0, -2.0, 0.0])  # PV may go by 8
+def test_a_further_round_keeps_pv_within_its_limits(answered: Judgement) -> None:
+    free = further_round(FACTS, answered, sizing=True)
+    assert free is not None
+    close = dataclasses.replace(FACTS, pv_limit=(98.5, 101.5))
+    bound = further_round(close, answered, sizing=True)
+    assert bound is None or bound.reach <= min(free.reach, 4.0)
+
+
+def test_the_forecast_of_an_ideal_valve_goes_with_op(answered: Judgement) -> None:
+    ahead = Forecast.of(answered, (51.0, 49.0))
+    assert ahead.pv[0, 0] > ahead.pv[0, 1]
+    assert ahead.weights.sum() == pytest.approx(1.0, abs=0.01)
+    assert ahead.beyond(-1e9, 1e9) == 0.0
+    assert ahead.beyond(0.0, 1.0) == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_mapping_has_the_keys_of_the_contract() -> None:

@@ -75,7 +75,7 @@ def test_a_bad_pv_ends_it_and_op_goes_back(tested: Run) -> None:
 
 def test_pv_at_its_limit_ends_it(tested: Run) -> None:
     tested.go(1, pv=80.0)
-    assert tested.told.startswith("valve test: PV 80 is outside")
+    assert tested.told.startswith("valve test: PV 80 goes beyond")
     assert tested.op[-1] == tested.op[30]
 
 
