@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     with bar("judging"):
         said = answer(record, before, limits)
     hand_over(options.json, said.to_json(), lambda: _told(said.judgement, said.plan, options))
-    _write(said.plan, options.out)
+    _write(said.plan, options.out, said.judgement.trial.steps.levels[1:].tolist())
     return 0
 
 
@@ -107,13 +108,16 @@ def _before(record: Record, limits: Limits) -> Facts:
     return facts_before(record, found, limits)
 
 
-def _write(plan: Plan | None, target: str | None) -> None:
+def _write(plan: Plan | None, target: str | None, made: Sequence[float] = ()) -> None:
+    """Write the moves of a round behind those that were made: a test is one record."""
     if target is None or plan is None:
         return
     with storing(target), Path(target).open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(("after", "OP"))
-        rows.writerows((i * plan.facts.hold, level) for i, level in enumerate(plan.levels))
+        rows.writerows(
+            (i * plan.facts.hold, level) for i, level in enumerate((*made, *plan.levels))
+        )
 
 
 def _show(plan: Plan, before: str | None) -> None:

@@ -106,6 +106,36 @@ def test_the_mode_set_again_begins_another(tested: Run) -> None:
     assert tested.live.mode is ControlMode.VALVE_TEST
 
 
+FAULTS = {
+    "NaN": lambda run: run.go(1, pv=float("nan")),
+    "late": lambda run: run.live.pass_over(np.array([np.nan])),
+    "set-point": lambda run: run.go(1, sp=SP + 2.0),
+    "take-over": lambda run: run.live.applied(np.array([run.op[-1] + 3.0]), ours=False),
+    "PV": lambda run: run.go(1, pv=80.0),
+}
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.trial) for seed in range(2, 50))]
+)
+def test_a_fault_at_any_time_leaves_the_former_controller_without_a_bump(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    run = Run(seed=seed)
+    run.go(31 + int(random.integers(1, 60)))
+    name = str(random.choice(list(FAULTS)))
+    assert run.live.mode is ControlMode.VALVE_TEST
+    moves = np.abs(np.array(run.op[30:]) - run.op[30])
+    assert moves.max() <= SETTINGS.valve_test_op
+    before = run.op[-1] + (3.0 if name == "take-over" else 0.0)
+    FAULTS[name](run)
+    if name in ("NaN", "PV"):  # OP goes back first
+        before = run.op[-1]
+    if name != "set-point":
+        run.go(1)
+    assert run.live.mode is ControlMode.UNAWARE
+    assert abs(run.op[-1] - before) <= 0.9 + 1e-9
+
+
 @pytest.mark.trial
 def test_a_sticky_valve_is_found_and_the_former_controller_goes_on() -> None:
     run, again = Run(), Run()
