@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINES = 79_865
+LINES = 79_871
 LINES_OF_STUDIES = 24_174
 NUMERIC_CONSTANTS = 1_012
 
