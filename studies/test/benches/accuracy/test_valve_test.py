@@ -24,10 +24,10 @@ def ended(**changes: Any) -> Ended:
         "probability": 0.99,
         "interval": (1.0, 3.0),
         "moves": 6,
-        "rounds": 1,
         "duration": 12.0,
         "beyond": 0.0,
         "seconds": 0.5,
+        "ended": "",
     }
     return Ended(**(values | changes))
 
