@@ -44,6 +44,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "plant": ("truth", "survey"),
     "exports": ("seeds", "jobs"),
     "own": ("seeds", "jobs"),
+    "valve-test": ("seeds", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
@@ -55,9 +56,9 @@ def add(commands: Any) -> None:
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
         "loops that share nothing with it), how often identification is (field), whether "
-        "what gain promises comes about (gain), what the list of a survey is worth (plant), "
-        "whether exports are read as they were written (exports), and what each controller makes "
-        "of plants that it was not tuned for (own).",
+        "what gain promises comes about (gain), how tests in manual end (valve-test), what the "
+        "list of a survey is worth (plant), whether exports are read as they were written "
+        "(exports), and what each controller makes of plants that it was not tuned for (own).",
     )
     parser.add_argument(
         "name",
@@ -243,6 +244,12 @@ def _own(options: argparse.Namespace, machine: str) -> int:
     return bench_own_plant.run(options, machine)
 
 
+def _valve_test(options: argparse.Namespace, machine: str) -> int:
+    from stiction_studies.benches.accuracy import valve_test as bench_valve_test
+
+    return bench_valve_test.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -256,5 +263,6 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "plant": bench_plant.run,
     "exports": _exports,
     "own": _own,
+    "valve-test": _valve_test,
     "world": bench_world.run,
 }
