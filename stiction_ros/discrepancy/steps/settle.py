@@ -9,12 +9,10 @@ from collections.abc import Mapping, Sequence
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.decision.decide import FRICTION, confirmed
 from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together
-from stiction_ros.discrepancy.steps.again import told_again
-from stiction_ros.discrepancy.steps.friction import friction_beside_others, friction_told_again
 from stiction_ros.discrepancy.steps.look import look_on
 from stiction_ros.discrepancy.steps.mending import mended, singles
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import best_whole, suspicious
+from stiction_ros.discrepancy.steps.wholes import best_whole
 from stiction_ros.effects import Backlash, about
 
 APART = 5.0  # samples between a step and its opposite that are outliers together
@@ -70,22 +68,10 @@ def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
 
 
 def settle(task: Task, state: State) -> State:
-    """Keep the best whole explanation, the given process mended where that explains more.
-
-    Which friction it is was told beside nothing; where more than the declared noise is left, it is
-    told again before any effect is given up.
-    """
-    if len(state.added) > 1 and suspicious(state.base):
-        state = friction_beside_others(task, state)
+    """Keep the best whole explanation, the given process mended where that explains more."""
     state = best_of_wholes(task, state)
     other = mended(task, state)
-    if other is not None:
-        state = best_of_wholes(task, look_on(task, other))
-    if len(state.added) > 1 or state.changes:
-        state = friction_told_again(task, state)
-    if len(state.added) > 1:
-        state = told_again(task, state)
-    return state
+    return state if other is None else best_of_wholes(task, look_on(task, other))
 
 
 def best_of_wholes(task: Task, state: State) -> State:
