@@ -57,8 +57,6 @@ class Law:
         range: the lowest and the highest figures.
         block: its states by its figures.
         behaviour: by its figures, too.
-        when: by what share its states are moved from each sample to the next, shape (N,); None
-            where all samples are alike.
     """
 
     place: str
@@ -66,7 +64,6 @@ class Law:
     range: tuple[FloatArray, FloatArray]
     block: Callable[[FloatArray], Block]
     behaviour: Callable[[FloatArray], Behaviour]
-    when: FloatArray | None = None
 
 
 def white_block(variance: float) -> Block:

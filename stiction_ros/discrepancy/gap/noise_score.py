@@ -33,18 +33,10 @@ class Shown:
     begins: BoolArray
 
 
-def shown_of(base: Baseline, output: int, more: FloatArray | None = None) -> Shown:
-    """Return what is judged of an output.
-
-    Args:
-        base: the model with its effects.
-        output: its index.
-        more: further columns that every fit projects out, shape (N, q).
-    """
+def shown_of(base: Baseline, output: int) -> Shown:
+    """Return what is judged of an output of a model with its effects."""
     runs = base.run.runs
     values = np.column_stack([base.run.gap[:, output], base.columns[output]])
-    if more is not None:
-        values = np.column_stack([values, more])
     begins = np.zeros(len(runs), dtype=bool)
     begins[[rows.start for rows in runs.slices]] = True
     return Shown(np.ascontiguousarray(values.T), runs.usable[output], begins)
@@ -86,12 +78,9 @@ def score_of(
         return math.inf, 0.0, 0.0, 1.0
     block = law.block(x)
     unit = max(own.r, float(np.trace(own.q)), _TINY)
-    nothing = np.zeros_like(block.q)
     white, variances = innovations(
         block_diag(own.a, block.a),
-        block_diag(own.q, nothing) / unit,
-        block_diag(np.zeros_like(own.q), block.q) / unit,
-        np.ones(len(shown.seen)) if law.when is None else law.when,
+        block_diag(own.q, block.q) / unit,
         np.concatenate([own.c, block.c]),
         max(own.r, FLOOR * unit) / unit,
         block_diag(own.start, block.start) / unit,
