@@ -9,8 +9,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.noise_laws import Law, declared_block, laws_of, white_block
-from stiction_ros.discrepancy.gap.noise_score import best_figures, score_of, shown_of
+from stiction_ros.discrepancy.gap.noise_laws import (
+    Law,
+    best_figures,
+    declared_block,
+    laws_of,
+    score_of,
+    shown_of,
+    white_block,
+)
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import ENLARGED
 from stiction_ros.effects import (
