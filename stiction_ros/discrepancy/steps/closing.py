@@ -43,7 +43,8 @@ from stiction_ros.discrepancy.gap.noise_effects import NO_LAW, NoiseEffect, nois
 from stiction_ros.discrepancy.likelihood.declared_noise import declared_noise
 from stiction_ros.discrepancy.process.free_search import with_free_process
 from stiction_ros.discrepancy.process.refit import with_noise_of
-from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained, settle
+from stiction_ros.discrepancy.steps.look import MOVED_AWAY, explained
+from stiction_ros.discrepancy.steps.settle import settle
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.discrepancy.steps.wholes import whole, with_laws
 from stiction_ros.effects import FloatArray, from_mapping

@@ -11,7 +11,6 @@ from stiction_ros.discrepancy.candidate.valve import departures
 from stiction_ros.discrepancy.decision.decide import (
     Decision,
     GapVerdict,
-    confirmed,
     decide,
     thinned_away,
 )
@@ -40,12 +39,9 @@ from stiction_ros.discrepancy.simulation.free_run import FreeRun
 from stiction_ros.discrepancy.steps.mending import (
     changed_again,
     made_room,
-    mended,
     process_first,
-    singles,
 )
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import best_whole
 from stiction_ros.loop import LoopModel
 
 SCORED = 0.8  # of the time of a look
@@ -253,17 +249,3 @@ def _with_process(model: LoopModel, other: LoopModel) -> LoopModel:
     document = model.to_mapping()
     document["process"] = other.to_mapping()["process"]
     return LoopModel.from_mapping(document, model.name)
-
-
-def settle(task: Task, state: State) -> State:
-    """Keep the best whole explanation, the given process mended where that explains more."""
-    state = best_of_wholes(task, state)
-    other = mended(task, state)
-    return state if other is None else best_of_wholes(task, look_on(task, other))
-
-
-def best_of_wholes(task: Task, state: State) -> State:
-    """Keep the best whole explanation: a part of what was found, or one effect alone."""
-    alone = [each for each in singles(state) if confirmed(each.fit)]
-    best = best_whole(state.bare, task.runs, state.added, alone, task.options.margin)
-    return dataclasses.replace(state, added=best.effects, base=best.base)

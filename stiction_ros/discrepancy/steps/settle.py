@@ -1,0 +1,115 @@
+"""After the looks: whole explanations compared, and each effect told again beside the others."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from stiction_ros.discrepancy.decision.decide import FRICTION, confirmed, large_enough
+from stiction_ros.discrepancy.decision.extend import (
+    AddedEffect,
+    refit_together,
+    told_already,
+)
+from stiction_ros.discrepancy.decision.measured_stem import not_contradicted
+from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.steps.look import look_on, scored_by
+from stiction_ros.discrepancy.steps.mending import mended, singles
+from stiction_ros.discrepancy.steps.state import State, Task
+from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, whole
+from stiction_ros.effects import about
+
+NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
+RIVALS = 2  # that are tried in the place of an effect
+
+
+def settle(task: Task, state: State) -> State:
+    """Keep the best whole explanation, the given process mended where that explains more."""
+    state = best_of_wholes(task, state)
+    other = mended(task, state)
+    if other is not None:
+        state = best_of_wholes(task, look_on(task, other))
+    return told_again(task, state) if len(state.added) > 1 else state
+
+
+def best_of_wholes(task: Task, state: State) -> State:
+    """Keep the best whole explanation: a part of what was found, or one effect alone."""
+    alone = [each for each in singles(state) if confirmed(each.fit)]
+    best = best_whole(state.bare, task.runs, state.added, alone, task.options.margin)
+    return dataclasses.replace(state, added=best.effects, base=best.base)
+
+
+def told_again(task: Task, state: State) -> State:
+    """Tell each of several effects again: its nearest rivals in its place, all fitted together.
+
+    What was told first was told beside something that was not yet in the model, and the figures
+    of the others were fitted beside it. The whole that explains most holds; those within the
+    margin are in doubt.
+    """
+    for k in range(len(state.added)):
+        state = _told(task, state, k)
+    return state
+
+
+def _told(task: Task, state: State, k: int) -> State:
+    own, margin = state.added[k], task.options.margin
+    tried = [(own, state)]
+    twins, rivals = _rivals(task, state, k)
+    for rival in rivals:
+        behaviour = rival.behaviour(state.base.run)
+        if behaviour is None:
+            continue
+        other = AddedEffect(rival, behaviour, rival.candidate.twins)
+        added = (*state.added[:k], other, *state.added[k + 1 :])
+        refitted = refit_together(state.bare, task.runs, added)
+        tried.append((other, state.with_added(task.runs, refitted)))
+    scores = [0.0]
+    if len(tried) > 1:
+        scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
+    least = min(scores)
+    best, kept = tried[scores.index(least)]
+    near = [
+        key
+        for (each, _), score in zip(tried, scores, strict=True)
+        if each is not best and score < least + margin
+        for key in each.fit.candidate.keys
+    ]
+    alternatives = tuple(dict.fromkeys([*_inseparable(best, twins), *near]))
+    told = dataclasses.replace(kept.added[k], alternatives=alternatives)
+    return dataclasses.replace(kept, added=(*kept.added[:k], told, *kept.added[k + 1 :]))
+
+
+def _inseparable(effect: AddedEffect, twins: Keys) -> list[tuple[str, str]]:
+    """Return what no fit tells from an effect: its twins, and the other kind of a friction."""
+    friction = about(effect.effect).family == FRICTION
+    return [
+        key
+        for key in effect.alternatives
+        if key in (*effect.fit.candidate.twins, *twins)
+        or (friction and about(key[1]).family == FRICTION)
+    ]
+
+
+def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]:
+    """Return what is an effect's twin, and what explains nearly as much in its place.
+
+    Both are asked beside the others as they are.
+    """
+    own = state.added[k].fit.candidate
+    others = state.with_added(task.runs, state.others(k))
+    scored = scored_by(task, others, task.options.most_effects)
+    fits = not_contradicted(scored.scores.base.run, scored.scores.fits)
+    mine = max((f.evidence for f in fits if f.candidate.key == own.key), default=0.0)
+    twins = next((f.candidate.twins for f in fits if f.candidate.key == own.key), ())
+    known = {own.key, *(each.fit.candidate.key for each in others.added)}
+    alike = [
+        f
+        for f in sorted(fits, key=lambda f: -f.evidence)
+        if f.candidate.inside
+        and f.candidate.key not in known
+        and f.evidence > max(mine - NEAR, 0.0)
+        and confirmed(f)
+        and large_enough(f)
+        and not told_already(others.added, f)
+        and not (own.about.family == f.candidate.about.family == FRICTION)
+    ]
+    return twins, alike[:RIVALS]
