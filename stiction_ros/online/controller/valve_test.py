@@ -7,6 +7,7 @@ from concurrent.futures import Future
 
 import numpy as np
 
+from stiction_ros.identification.evidence.sensor_hold import held_rows
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
 from stiction_ros.identification.valve_test.plan import (
     CLEAR,
@@ -17,6 +18,7 @@ from stiction_ros.identification.valve_test.plan import (
     further_round,
     stays,
 )
+from stiction_ros.identification.valve_test.steps import SHORTEST
 from stiction_ros.online.handover.background import Background
 
 RESTS = 5  # holds that are waited for at most until PV rests
@@ -102,7 +104,8 @@ class ValveTest:
 
     def _go_on(self) -> None:
         """Judge what was answered, and move on where the judgement is there and leaves it open."""
-        if self._made > 1:
+        measured = len(self._pv) - int(held_rows(np.array(self._pv)).sum())
+        if self._made > 1 and measured > SHORTEST + self._made:
             if self._work is None:
                 signals = np.array(self._op), np.array(self._pv)
                 known = self.facts.gain, self.judgement
@@ -121,8 +124,10 @@ class ValveTest:
                     plan = further_round(self.facts, self.judgement, self.judgement.sure)
                 self._levels = [] if plan is None else list(plan.levels[:-1])
         if not self._levels:
-            assert self.judgement is not None
-            self.stop(self.judgement.sentence)
+            told = self.judgement
+            self.stop(
+                "PV shows hardly any value that is measured" if told is None else told.sentence
+            )
             return
         if not self._made:
             if len(self._op) < RESTS * self.hold and not self._rests():

@@ -247,16 +247,16 @@ def _published_fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, Publi
 
 
 def _models(messages: Iterable[BagMessage]) -> Iterator[PublishedModel]:
-    ops = 0
+    ops: set[int] = set()  # stamps: a sample that was shown again was answered again
     for message in messages:
         name = last_part(message.topic)[1]
         if message.type == JOINT_STATE and name == "op":
-            ops += 1
+            ops.add(stamp_ns(message.message))
         elif message.type == STRING and name == "loop_model":
             text = str(message.message.data)
             document = mapping_of(text)
             valid_from = document.get("valid_from", 0)
-            yield PublishedModel(text, valid_from if isinstance(valid_from, int) else 0, ops)
+            yield PublishedModel(text, valid_from if isinstance(valid_from, int) else 0, len(ops))
 
 
 def _configs(messages: Iterable[BagMessage], space: str, notes: list[str]) -> dict[str, NodeConfig]:

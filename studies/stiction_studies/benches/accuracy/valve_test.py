@@ -125,7 +125,8 @@ def judge(seed: int) -> Ended:
     clean = case.pv(np.append(op, np.full(late, op[-1])))[1]
     away = np.maximum(clean - facts.pv_limit[1], facts.pv_limit[0] - clean)
     found, moves = test.judgement, test.moves
-    assert found is not None
+    if found is None:
+        raise RuntimeError(f"the test of seed {seed} came to no judgement: {test.over}")
     return Ended(
         seed=seed,
         kind=case.kind.value,
