@@ -116,9 +116,9 @@ def _row(plant: OwnPlant, seed: int, mode: str) -> OwnRow:
     controller.start(truth.stem_start, truth.pv_start)
     applied = truth.stem_start
 
-    def step(measured: Measurement, sp: FloatArray) -> FloatArray:
+    def step(measurement: Measurement, sp: FloatArray) -> FloatArray:
         nonlocal applied
-        applied = controller.step(measured.pv, sp, measured.dv, applied).op
+        applied = controller.step(measurement.pv, sp, measurement.dv, applied).op
         return applied
 
     run = simulate_closed_loop(truth, step, schedule, SAMPLES, seed)
