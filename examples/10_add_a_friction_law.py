@@ -7,7 +7,7 @@ here, calls ``effects.register``. Parameters and ``step`` are all that it needs.
 out is said, never guessed:
 
 - ``simulate_grid``: whole grids at once. Without it every row is stepped, slowly.
-- ``switching``: its patterns. Without it identify searches on grids and certifies nothing.
+- ``switching``: its patterns. Without it the method ``exact`` refuses the law.
 - ``jump_form``: its moves between rests. Without it no controller plans for it, and says why.
 - ``axes``: on what ``stiction gap`` searches it. Without it gap lists it as not considered.
 """
@@ -58,7 +58,7 @@ def main(samples: int = 2000) -> None:
     sticky = model.with_valve_effects({"V1": (LopsidedStiction(4.0, 1.5, 1.4),)})
     moves = sr.SetPoints.load(sr.find_config("flow.set_points.yaml"), model.outputs)
     record = sr.simulate(sticky, moves, samples=samples)
-    found = sr.identify(record, sr.IdentificationOptions("exact", law="lopsided"))
+    found = sr.identify(record, sr.IdentificationOptions(law="lopsided"))
     law, design = found.valves[0].behaviour(), sr.ControlSettings().design(model)
     print(found.valves[0].verdict, law, *found.notes, sep="\n")
     try:

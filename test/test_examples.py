@@ -68,7 +68,6 @@ SMALL: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         {"samples": 700},
         (
             r"^sticky\n.*static_friction=(3\.[89]|4\.[01]).*closing=1\.[34]",
-            r"no switching pattern was enumerated",
             r"stiction \(lopsided\) has no jump form",
         ),
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -198,6 +199,9 @@ def _print(document: Mapping[str, Any], found: Identification) -> None:
     for j, valve in enumerate(found.valves):
         said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
         console.print(f"{valve.name}: {' '.join(filter(None, said))}")
+    if any(valve.verdict == "undecided" for valve in found.valves):
+        planned = shlex.join(["stiction", "valve-test", "plan", document["record"]])
+        console.print(f"A test in manual that would decide: {planned}")
     for note in found.notes:
         console.print(f"note: {note}")
 

@@ -26,6 +26,7 @@ COMMANDS = {
     "gap": "which effect a simulation lacks",
     "report": "a page of a record or of a recorded run",
     "gain": "what service or retuning would bring",
+    "valve-test": "a test in manual: its moves, its verdict",
     "experiment": "simulate moves of OP that show friction",
     "simulate": "run a loop model under its own controller",
     "fit-linear": "fit a linear model for a controller",
@@ -45,7 +46,7 @@ DESCRIPTION = "Find, measure and control valves that stick."
 
 GROUPS = {
     "find: what is wrong with this loop": ("identify", "gap", "report"),
-    "decide: what to do about it": ("gain", "experiment", "simulate"),
+    "decide: what to do about it": ("gain", "valve-test", "experiment", "simulate"),
     "act: control a valve that sticks": ("fit-linear", "replay"),
     "live: loops on ROS 2 and their bags": ("demo", "listen", "convert", "repair"),
     "plant: all loops and their control system": (

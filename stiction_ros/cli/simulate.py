@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import shlex
 import sys
 from pathlib import Path
@@ -12,7 +13,9 @@ import numpy as np
 
 from stiction_ros.cli.shared.progress import bar
 from stiction_ros.config_files import find_config
+from stiction_ros.errors import foreign
 from stiction_ros.loop import LoopModel, SetPoints, simulate
+from stiction_ros.loop.excitation import simulate_open_loop
 from stiction_ros.records.record import Record
 
 SAMPLES, SEED = 2000, 1
@@ -23,11 +26,15 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "simulate",
         description="Run a loop model in closed loop under the controller that it records "
-        "(controller: {kind: pi, …}) and write OP, PV, SP and the true stem position.",
+        "(controller: {kind: pi, …}), or in manual by a table of moves, and write OP, PV, SP and "
+        "the true stem position.",
     )
     parser.add_argument("loop", metavar="LOOP", help="loop model, F.loop.yaml")
     parser.add_argument(
         "--set-points", metavar="F", help="schedule of set-points (default: the operating point)"
+    )
+    parser.add_argument(
+        "--moves", metavar="F.csv", help="in manual, by the moves that stiction valve-test writes"
     )
     parser.add_argument(
         "--samples", type=int, default=SAMPLES, metavar="N", help=f"number of samples ({SAMPLES})"
@@ -51,6 +58,11 @@ def run(options: argparse.Namespace) -> int:
     if options.set_points is not None:
         schedule = SetPoints.load(find_config(options.set_points), model.outputs)
     out = Path(path.name.split(".")[0] + ".csv" if options.out is None else options.out)
+    if options.moves is not None:
+        write(by_hand(model, options.moves, options.seed), out)
+        words = ["stiction", "valve-test", "judge", str(out)]
+        print(f"{out}: a test in manual; judge it by", shlex.join(words), sep="\n", file=sys.stderr)
+        return 0
     with bar(f"simulating {model.name}") as show:
         record = simulate(
             model,
@@ -63,6 +75,27 @@ def run(options: argparse.Namespace) -> int:
     told = f"{out}: {len(record)} samples of {record.sample_time:g} s; {moves(record)}; read it by"
     print(told, shlex.join(["stiction", "identify", str(out)]), sep="\n", file=sys.stderr)
     return 0
+
+
+def by_hand(model: LoopModel, moves: str, seed: int) -> Record:
+    """Return the record of a loop of one valve in manual.
+
+    OP rests where the moves end for as long as the first of them is held, and then makes them.
+
+    Args:
+        model: of the loop.
+        moves: CSV file with the columns ``after``, s since the first move, and ``OP``, %.
+        seed: of the noise.
+
+    Raises:
+        InputError: the file is no such table, or the loop has several valves.
+    """
+    with foreign(moves), Path(moves).open(encoding="utf-8", newline="") as file:
+        rows = [(float(row["after"]), float(row["OP"])) for row in csv.DictReader(file)]
+        after, op = np.array(rows).T
+        holds = np.round(np.diff(after, append=2.0 * after[-1] - after[-2]) / model.sample_time)
+        path = np.repeat(np.append(op[-1], op), np.append(holds[0], holds).astype(int))
+    return simulate_open_loop(model, path[:, None], seed).record
 
 
 def write(record: Record, out: Path) -> None:

@@ -23,6 +23,7 @@ class ControlMode(enum.StrEnum):
     EMBEDDING = "embedding"
     INVERSION = "inversion"
     HOLD = "hold"
+    VALVE_TEST = "valve_test"
 
 
 class StepStatus(enum.StrEnum):

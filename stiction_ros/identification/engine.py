@@ -11,7 +11,6 @@ import numpy as np
 
 from stiction_ros.identification.closed_loop.closed_loop import close_loop
 from stiction_ros.identification.closed_loop.explanation import explained
-from stiction_ros.identification.exact.further_fit import begun, settled, with_further_estimates
 from stiction_ros.identification.exact.long_records import carried_over, liveliest_part
 from stiction_ros.identification.exact.search import SearchOutcome, improve, search
 from stiction_ros.identification.identification_options import IdentificationOptions
@@ -37,7 +36,7 @@ from stiction_ros.identification.result.identification import (
 )
 from stiction_ros.identification.result.stability import Stability, halves
 from stiction_ros.identification.side_by_side import at_once, together
-from stiction_ros.identification.switching.patterns import has_cells
+from stiction_ros.identification.switching.patterns import require_cells
 from stiction_ros.records.record import Record
 
 Progress = Callable[[float], None]
@@ -58,26 +57,23 @@ def identify_exact(
         progress: called with the share done, 0 to 1.
 
     Raises:
-        InputError: a record that no model can be fitted to, or an unknown law.
+        InputError: a record that no model can be fitted to, an unknown law, or one whose switching
+            patterns cannot be enumerated.
     """
     begun = time.perf_counter()
     options = options or IdentificationOptions()
     report = progress or (lambda share: None)
     data = prepare(record, options)
     report(0.02)
-    part = liveliest_part(data) if has_cells(data.law) else data
-    part, orders, linear, outcome, table = choose(part, options)
-    data = dataclasses.replace(data, further=part.further)
-    model = outcome.model
+    require_cells(data.law)
+    part = liveliest_part(data)
+    orders, outcome, table = choose(part, options)
     report(0.4)
-    if part is not data:
-        linear = linear_model(data, orders)
-        model = carried_over(data, linear, model, orders)
+    linear = linear_model(data, orders)  # of all, where a part was searched
+    model = carried_over(data, linear, outcome.model, orders)
     report(0.5)
-    data, model = settled(data, model, orders)
     model, delays = settle_delays(data, model, orders)
     valves, final = judged_valves(record, data, model, linear, orders, options)
-    valves = with_further_estimates(data, final, orders, valves, options.confidence)
     report(1.0)
     told = (*ambiguities(record, delays, outcome.rivals), *certificates(valves))
     plain = conclude(record, data, Findings(final, valves, table, told), 0.0)
@@ -107,7 +103,7 @@ def judged_valves(
         intervals = friction_intervals(data, model, orders, j, options.confidence) if j else first
         model = intervals.model
         span = float(np.ptp(data.u[j]))
-        figures = evidence(data, model, rivals[j], j, span)
+        figures = evidence(model, rivals[j], j, span)
         figures["deadband_loss"] = intervals.deadband_loss
         doubted = figures["delta_bic"] <= options.bic_margin
         static = (0.0, intervals.static[1]) if doubted else intervals.static
@@ -129,18 +125,14 @@ def judged_valves(
 
 def choose(
     data: Data, options: IdentificationOptions
-) -> tuple[Data, Orders, Model, SearchOutcome, tuple[OrderRow, ...]]:
-    """Return data, orders, friction-free model, the one with friction and all orders tried.
-
-    The data hold the law's further parameters where they begin.
-    """
+) -> tuple[Orders, SearchOutcome, tuple[OrderRow, ...]]:
+    """Return orders, the model with friction and all orders tried."""
     orders_list = windows(options)
     start = orders_list[len(orders_list) // 2]
     linear = linear_model(data, start)
-    data = begun(data, linear, start)
     found = search(data, linear, start)
     if len(orders_list) == 1:
-        return data, start, linear, found, (order_row(start, found.model),)
+        return start, found, (order_row(start, found.model),)
     models = together(*(partial(linear_model, data, n, found.model) for n in orders_list))
     rivals = list(zip(orders_list, models, strict=True))
     table = tuple(order_row(*rival) for rival in rivals)
@@ -150,7 +142,7 @@ def choose(
         found = search(data, linear, orders, growing=False)
         best = improve(data, best, orders)
     better = min(best, found.model, key=lambda candidate: candidate.loss)
-    return data, orders, linear, dataclasses.replace(found, model=better), table
+    return orders, dataclasses.replace(found, model=better), table
 
 
 def order_row(orders: Orders, model: Model) -> OrderRow:

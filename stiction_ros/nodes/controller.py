@@ -20,20 +20,24 @@ from stiction_ros.nodes.shared.messages import SECOND, diagnosis, joint_state, t
 from stiction_ros.nodes.shared.peers import publishers_of
 from stiction_ros.nodes.shared.runner import run
 from stiction_ros.nodes.topics.controller_inputs import ControllerInputs
-from stiction_ros.online.controller.live import LiveController
+from stiction_ros.nodes.topics.estimates import tested_message
 from stiction_ros.online.controller.rehearsal import rehearse
+from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.handover.background import AtOnce, Beside
 from stiction_ros.online.input.port import InputPort
 from stiction_ros.online.input.port_health import PortHealth, keys
 from stiction_ros.online.input.samples import PortRules, Sample
 from stiction_ros.online.node_settings import ControllerNodeSettings
+from stiction_ros.texts import json_text
 
 QUICKEST, SLOWEST = 0.02, 0.25  # s between two looks for samples that are due
+LEARNS = ("auto", "valve_test")
+"""Modes in which the controller waits for the fits of the estimator."""
 GRAPH_PERIOD = 1.0  # s between two looks at who commands
 
 
 class ControllerNode(ControllerInputs):
-    """Thin shell around :class:`stiction_ros.online.controller.live.LiveController`."""
+    """Thin shell around :class:`stiction_ros.online.controller.testing.ValveTestingController`."""
 
     settings: ControllerNodeSettings
 
@@ -52,7 +56,7 @@ class ControllerNode(ControllerInputs):
         self.model = LoopModel.load(find_config(settings.model))
         lockstep = settings.pace == "lockstep"
         self.background = AtOnce() if lockstep else Beside()
-        self.live = LiveController(settings, self.model, self.background)
+        self.live = ValveTestingController(settings, self.model, self.background)
         if not lockstep:
             rehearse(settings, self.model)
         self._plan_names = (*self.model.outputs, *self.model.valve_names)
@@ -81,6 +85,7 @@ class ControllerNode(ControllerInputs):
         self._op = self.outlet(JointState, "op", SIGNAL_QOS, others)
         self._prediction = self.outlet(JointTrajectory, "prediction", SIGNAL_QOS)
         self._mode = self.outlet(String, "mode", LATCHED_QOS)
+        self._stiction = self.outlet(JointState, "stiction", SIGNAL_QOS)
         self.listen()
 
     def configuration(self) -> dict[str, Any]:
@@ -237,16 +242,27 @@ class ControllerNode(ControllerInputs):
             self.log.info(f"sample {change.sample}: {change.mode}, {change.reason}")
             told = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
             self.report([("mode", change.mode.value, [*told, *self.live.known_friction()])])
+            if change is self.live.tested:
+                self._tell_test()
         self._told = len(self.live.changes)
         for sample, reason in self.live.doubts[self._doubts :]:
             self.log.warning(f"sample {sample}: offered model not taken, {reason}")
         self._doubts = len(self.live.doubts)
 
+    def _tell_test(self) -> None:
+        """Publish the verdict of the test that has ended, if it came to one."""
+        test = self.live.test
+        if test is None or test.judgement is None:
+            return
+        self._stiction.publish(tested_message(self.stamp, test.facts.valve, test.judgement))
+        told = json_text(test.judgement.to_dict(), indent=None)
+        self.report([("valve_test", test.judgement.sentence, [("judgement", told)])])
+
     # ---- lockstep --------------------------------------------------------------------------
 
     def _fit_is_there(self) -> bool:
         """Return whether the fit that takes effect at the present sample has come."""
-        if self.settings.pace != "lockstep" or self.settings.mode != "auto":
+        if self.settings.pace != "lockstep" or self.settings.mode not in LEARNS:
             return True
         end = self.settings.awaited(self.port.next)
         if end is None:

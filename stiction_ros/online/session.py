@@ -27,8 +27,9 @@ from stiction_ros.loop import (
 )
 from stiction_ros.loop.valve_changes import valve_changes_text
 from stiction_ros.loop.yaml_reading import Section, load_yaml
-from stiction_ros.online.controller.live import LiveController, ModeChange
+from stiction_ros.online.controller.live import ModeChange
 from stiction_ros.online.controller.settings import LiveControllerSettings
+from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.estimator.live import EstimatorSettings, FitUpdate, LiveEstimator, fit
 from stiction_ros.online.input.signal_check import SignalCheck
 from stiction_ros.online.monitor.gap_finding import GapFinding
@@ -228,7 +229,7 @@ class _Loop:
     """Controller and estimator behind the plain face that a simulated loop calls."""
 
     def __init__(self, scenario: Scenario, plant: LoopModel, identify: bool) -> None:
-        self.controller = LiveController(scenario.controller, scenario.process)
+        self.controller = ValveTestingController(scenario.controller, scenario.process)
         self._check = SignalCheck(scenario.process.instruments)
         self.estimator: LiveEstimator | None = None
         if identify:

@@ -89,7 +89,7 @@ class SearchLog:
         return dataclasses.asdict(self)
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
 class PaperIdentification(Identification):
     """What one of the paper's methods makes of a record.
 
@@ -97,11 +97,10 @@ class PaperIdentification(Identification):
         search: what the method tried and its squared error.
     """
 
-    search: SearchLog | None = None
+    search: SearchLog
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping of ``identify --json`` but for ``record``."""
         document = super().to_dict()
-        if self.search is not None:
-            document["model"]["search"] = self.search.to_dict()
+        document["model"]["search"] = self.search.to_dict()
         return document

@@ -51,6 +51,8 @@ class Entry:
         travel_per_hour, reversals_per_hour: of the stem, as recorded.
         gain: measures now and by option, as ``stiction gain`` gives them.
         probability: of friction in the valve, 0 to 1; None where a method does not tell.
+        test: what the first round of a valve test would take where the valve is undecided:
+            ``duration``, s, and ``pv_move``, how far PV is expected to move.
         evidence: figures behind the verdict by name, as in ``identify --json``.
         cost_per_hour: what the cycle costs, where a cost was given.
         rank: place in the list, from 1.
@@ -82,6 +84,7 @@ class Entry:
     gain: Mapping[str, Any] | None = None
     probability: float | None = None
     evidence: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    test: Mapping[str, float | None] | None = None
     cost_per_hour: float | None = None
     rank: int | None = None
     group: int | None = None

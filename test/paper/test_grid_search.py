@@ -29,7 +29,6 @@ def test_truth_on_the_grid_is_found(law: str) -> None:
     assert (valve.static_friction, valve.dynamic_friction) == (5.0, 2.0)
     assert found.outputs[0].delay == {"V1": 5}
     assert valve.verdict is VerdictKind.UNDECIDED
-    assert found.search is not None
     assert found.search.points == count_points(record, options) == len(seen) == 28
     assert found.search.delays_tried == 3
     assert found.search.objective == pytest.approx(found.search.squared_error, rel=1e-6)
@@ -48,7 +47,6 @@ def test_two_valves_are_searched_at_once() -> None:
         friction_limit=8.5,
     )
     found = identify(record, options)
-    assert found.search is not None
     assert found.search.points == 6 * 6
     assert found.valves[0].static_friction == 8.0
     assert found.valves[1].static_friction == 0.0

@@ -76,7 +76,6 @@ def test_squared_error_is_that_of_he_s_law(found: Identification) -> None:
 
 def test_every_accepted_end_keeps_the_constraints(found: Identification) -> None:
     record = short()
-    assert found.search is not None
     ends = [start for start in found.search.starts if start.accepted]
     assert {start.kind for start in ends} >= {"restart"}
     least = ALPHA * record.op.var()
@@ -88,7 +87,6 @@ def test_every_accepted_end_keeps_the_constraints(found: Identification) -> None
 
 
 def test_the_best_accepted_end_wins(found: Identification) -> None:
-    assert found.search is not None
     best = min(start.objective for start in found.search.starts if start.accepted)
     assert found.search.objective == pytest.approx(best, rel=1e-6)
 
@@ -98,15 +96,12 @@ def test_the_best_accepted_end_wins(found: Identification) -> None:
 def test_as_many_runs_of_ipopt_as_the_paper_makes(method: str) -> None:
     options = dataclasses.replace(OPTIONS, method=method, delay=(4, 6), starts=2)
     found = identify(short(), options)
-    assert found.search is not None
     assert found.search.solves == 2 * 3
     assert {start.delays for start in found.search.starts} == {((4,),), ((5,),), ((6,),)}
 
 
 def test_the_printed_method_is_no_better_than_the_one_at_its_best(found: Identification) -> None:
     printed = identify(short(), dataclasses.replace(OPTIONS, method="nlp_printed"))
-    assert printed.search is not None
-    assert found.search is not None
     assert found.search.squared_error <= printed.search.squared_error
 
 
@@ -181,7 +176,6 @@ def test_no_stable_process_is_a_status() -> None:
     found = identify(record, OPTIONS)
     assert found.status is FitStatus.NO_MODEL
     assert "stable" in found.reason
-    assert found.search is not None
     assert not any(start.stable for start in found.search.starts)
 
 

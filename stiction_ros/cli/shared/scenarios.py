@@ -16,6 +16,8 @@ from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
 
 SCENARIOS = ("tank", "siso")
+"""Those that are run where none is named."""
+ALL = (*SCENARIOS, "siso_test")
 STARTED = ("recorder", "estimator", "controller", "plant")
 """The nodes of a loop, in the order in which they are started."""
 
@@ -28,11 +30,11 @@ def find(name: str) -> Path:
     """
     if name.endswith((".yaml", ".yml")):
         return find_config(name)
-    if name in SCENARIOS:
+    if name in ALL:
         return find_config(f"{name}.scenario.yaml")
     raise InputError(
         f"unknown scenario {name!r}",
-        fix=f"use {' or '.join(SCENARIOS)}, or the path of a *.scenario.yaml file",
+        fix=f"use {', '.join(ALL)}, or the path of a *.scenario.yaml file",
     )
 
 

@@ -218,21 +218,3 @@ def without_its_jump(intervals: Intervals, effect: AddedEffect) -> Intervals:
         "f_s": (min(static[0], half), static[1]),
         "f_d": (dynamic[0], max(dynamic[1], half)),
     }
-
-
-def behind_slope(intervals: Intervals, slope: float) -> Intervals:
-    """Return the intervals of a load, wide enough for either side of a curve's own slope.
-
-    A gain beside the curve of a valve mends the law by which its slope goes with its bend. What
-    enters beside the stem does not pass the curve: whether it passes that gain is not told.
-
-    Args:
-        intervals: behind the gain.
-        slope: the gain, 1 where none was changed.
-    """
-    found = dict(intervals)
-    for key in SIZES:
-        if key in found:
-            low, high = found[key]
-            found[key] = (min(low, slope * low), max(high, slope * high))
-    return found

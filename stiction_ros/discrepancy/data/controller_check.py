@@ -9,8 +9,13 @@ import math
 import numpy as np
 
 from stiction_ros.discrepancy.data.gate import DataFinding, quantum_of
-from stiction_ros.discrepancy.data.op_steps import OpSteps, errors_of, law_terms, other_tuning
-from stiction_ros.discrepancy.data.scans import Scans, rather_twice, scanned_twice
+from stiction_ros.discrepancy.data.scans import (
+    Scans,
+    errors_of,
+    law_terms,
+    rather_twice,
+    scanned_twice,
+)
 from stiction_ros.discrepancy.data.set_point import NORMAL_OF_MEDIAN, told_set_points
 from stiction_ros.discrepancy.likelihood.seen_noise import Unseen
 from stiction_ros.discrepancy.simulation.free_run import Runs
@@ -28,9 +33,6 @@ FINE = 0.02  # of the span of OP: values that are chosen are rounder than what r
 FINEST = 1e-4  # of the span of OP: what is finer says nothing
 DIGITS = 1e-7  # of the span of OP, that its digits may leave
 NEARLY_ALL = 0.9  # of the samples: where OP rests more often, no scan lies between them
-FITTED, LASTING = 0.03, 0.98
-"""Of the steps of OP, by which a law with a fitted tuning tells it wrongly, and how much of that is
-left in the next sample."""
 HALF = 0.5  # of a sample, for which an OP between two samples is held
 MATTERS = 0.05  # of gain and integral time: nearer ones are the same tuning
 
@@ -60,10 +62,7 @@ class ControllerCheck:
         clock_known: whether the record's clock of PV against OP is shown to be right.
         scans: of a controller that scans twice in a sample of the record; None of one that does
             not, or whose OP between the samples is not told.
-        finer: the OP that its law gives within the steps of the recorded one, %, shape (N, 1); None
-            where OP is not rounded, or no law tells it.
-        unsure: how far OP is off that was told by a law whose SP was not recorded, or whose tuning
-            was not.
+        unsure: how far OP is off that was told by a law whose SP was not recorded.
         between: whether OP may be another between the samples, as far as rounded values tell.
     """
 
@@ -72,15 +71,12 @@ class ControllerCheck:
     left: float
     clock_known: bool
     scans: Scans | None = None
-    finer: FloatArray | None = None
     unsure: Unseen | None = None
     between: bool = False
 
     def op(self, runs: Runs) -> FloatArray:
         """Return the OP of the records as the law tells it, %, shape (N, m)."""
-        if self.scans is not None:
-            return self.scans.op
-        return runs.op if self.finer is None else self.finer
+        return runs.op if self.scans is None else self.scans.op
 
 
 NOT_ASKED = ControllerCheck(ControllerStatus.NOT_ASKED, None, 1.0, False)
@@ -94,15 +90,12 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
     chose are what they are, unless they lie finer than anybody chooses them. A controller that
     scans again between two samples holds another OP for half of them, which lies off the mean of
     its neighbours as far as a recorded one does off that of its own; that is asked only where no
-    PI law gives the recorded OP, or SP is not recorded. Where a law tells a rounded OP finer,
-    nothing acts beside it.
+    PI law gives the recorded OP, or SP is not recorded.
 
     Args:
         runs: the records.
         check: of the controller.
     """
-    if check.finer is not None and not check.between:
-        return tuple(() if check.unsure is None else (check.unsure,) for _ in runs.op.T)
     untold = any(record.sp is None for record in runs.records)
     given = check.status in (ControllerStatus.NOT_ASKED, ControllerStatus.OTHER) and not untold
     asked = not given and check.left > EXACT and check.scans is None
@@ -113,8 +106,7 @@ def unseen_of(runs: Runs, check: ControllerCheck) -> tuple[tuple[Unseen, ...], .
         often = float(np.mean(moves != 0.0))
         quantum = quantum_of(op) if often > MANY else _chosen(op)
         keep = 1.0 - often if often <= MANY else 0.0
-        rounded = quantum > 0.0 and check.finer is None
-        beside = [Unseen(quantum**2 / 12.0, keep)] if rounded else []
+        beside = [Unseen(quantum**2 / 12.0, keep)] if quantum > 0.0 else []
         beside += [] if check.unsure is None else [check.unsure]
         if asked and often > NEARLY_ALL:
             bends = np.concatenate([0.5 * np.diff(op[rows], 2) for rows in runs.slices])
@@ -140,7 +132,7 @@ def _chosen(values: FloatArray) -> float:
 
 
 def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
-    """Compare OP with a PI law, and tell a rounded OP finer by it.
+    """Compare OP with a PI law.
 
     Where no SP is recorded it is the one that a law tells, if that law gives OP.
     """
@@ -149,23 +141,7 @@ def check_controller(model: LoopModel, runs: Runs) -> ControllerCheck:
         return NOT_ASKED
     if any(record.sp is None for record in runs.records):
         return _told(model, runs)
-    return _refuted(model, runs) or _asked(model, runs)
-
-
-def _refuted(model: LoopModel, runs: Runs) -> ControllerCheck | None:
-    """Return that another tuning gives a rounded OP, and the recorded one cannot; or None."""
-    recorded = model.controller
-    if recorded is None or runs.lattices[0] > 0.0 or quantum_of(runs.op[:, 0]) <= 0.0:
-        return None
-    found = other_tuning(OpSteps.of(model, runs), recorded)
-    if found is None:
-        return None
-    own, left = (_left(model, runs, each) for each in (recorded, found))
-    law = _Law(found.gain, found.integral_time, left, len(runs.op))
-    if _alike(recorded, law):
-        return None
-    finding = _finding("tuning", Tuning(law.gain, law.integral_time), own, None, law)
-    return ControllerCheck(ControllerStatus.OTHER, finding, left, True)
+    return _asked(model, runs)
 
 
 def _told(model: LoopModel, runs: Runs) -> ControllerCheck:
@@ -196,14 +172,8 @@ def _asked(model: LoopModel, runs: Runs) -> ControllerCheck:
     quantum = quantum_of(runs.op[:, 0])
     if not same or quantum <= 0.0:
         return check
-    if model.controller is not None:
-        if rather_twice(model, runs, model.controller):
-            return dataclasses.replace(check, between=True)
-        return dataclasses.replace(check, finer=OpSteps.of(model, runs).finer(model.controller))
-    law = _fit(model, runs, 0)
-    finer = OpSteps.of(model, runs).finer(PiTuning(law.gain, law.integral_time))
-    unsure = None if finer is None else Unseen((FITTED * quantum) ** 2, LASTING)
-    return dataclasses.replace(check, finer=finer, unsure=unsure, between=True)
+    known = model.controller
+    return dataclasses.replace(check, between=known is None or rather_twice(model, runs, known))
 
 
 def _compared(model: LoopModel, runs: Runs) -> ControllerCheck:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction_ros.discrepancy.data.op_steps import errors_of
 from stiction_ros.discrepancy.simulation.free_run import Runs
 from stiction_ros.effects.behaviour import BoolArray, FloatArray
 from stiction_ros.loop import LoopModel, PiTuning
@@ -177,3 +176,18 @@ class _Part:
         mean = self.op.copy()
         mean[:-1] = 0.5 * (self.op[:-1] + np.clip(later, *limits))
         return mean
+
+
+def errors_of(model: LoopModel, runs: Runs, shift: int = 0) -> list[FloatArray]:
+    """Return SP − PV of each record, shape (n − shift,), where PV is ``shift`` samples late."""
+    found = []
+    for record, rows in zip(runs.records, runs.slices, strict=True):
+        assert record.sp is not None
+        late = runs.pv[rows, 0][shift:]
+        found.append(record.sp[: len(late), record.outputs.index(model.outputs[0])] - late)
+    return found
+
+
+def law_terms(error: FloatArray, sample_time: float) -> FloatArray:
+    """Return (e_k − e_{k−1}, T_s e_k) from the second sample on, shape (n, 2)."""
+    return np.column_stack([np.diff(error), sample_time * error[1:]])

@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from stiction_ros.discrepancy.likelihood.grouped import best_noise
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
     NoiseFit,
+    best_noise,
     given_noise,
     noise_forms,
     projector,

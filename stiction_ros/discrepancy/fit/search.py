@@ -13,10 +13,10 @@ from stiction_ros.discrepancy.candidate.base import Candidate, Response
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.misfit import misfit, settled
 from stiction_ros.discrepancy.likelihood.declared_noise import behind_lag
-from stiction_ros.discrepancy.likelihood.grouped import best_noise
 from stiction_ros.discrepancy.likelihood.noise import (
     Blocks,
     NoiseFit,
+    best_noise,
     noise_forms,
     shared_factors,
 )

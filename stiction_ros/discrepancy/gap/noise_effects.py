@@ -9,9 +9,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.gap.noise_laws import Law, declared_block, laws_of, white_block
-from stiction_ros.discrepancy.gap.noise_score import best_figures, score_of, shown_of
-from stiction_ros.discrepancy.gap.of_the_stem import SAME, of_the_stem, with_a_stem
+from stiction_ros.discrepancy.gap.noise_laws import (
+    Law,
+    best_figures,
+    declared_block,
+    laws_of,
+    score_of,
+    shown_of,
+    white_block,
+)
 from stiction_ros.discrepancy.likelihood.declared_noise import DeclaredNoise
 from stiction_ros.discrepancy.likelihood.noise import ENLARGED
 from stiction_ros.effects import (
@@ -64,56 +70,25 @@ def noise_effects(
         least: what a law has to gain a row in −2 log likelihood.
 
     Returns:
-        The laws that beat the declared noise, with its rounding, and have no relation to what a
-        stem does; the best first, and those that are near it.
+        The laws that beat the declared noise, with its rounding; the best first, and those that are
+        near it.
     """
     found = _at_their_best(base, output, declared)
     enough = _without(base, output, declared) - least * int(base.blocks[output].train.sum())
-    better = [each.effect for each in found if each.effect.score < enough]
+    better = [each for each in found if each.score < enough]
     lasts = float(base.run.runs.time.max())
-    kept: list[NoiseEffect] = []
-    for each in sorted(_without_walks(better, lasts), key=lambda each: each.score):
-        if kept and each.score > kept[0].score + NO_LAW:
-            break
-        at_its_best = next(other for other in found if other.effect is each)
-        if not at_its_best.of_a_stem(base, output, declared):
-            kept.append(each)
-    return kept
+    near = sorted(_without_walks(better, lasts), key=lambda each: each.score)
+    return [each for each in near if each.score <= near[0].score + NO_LAW]
 
 
-@dataclasses.dataclass(frozen=True)
-class _Fitted:
-    """A law at its best.
-
-    Attributes:
-        effect: as it is told.
-        law, figures: it, and its likeliest figures.
-    """
-
-    effect: NoiseEffect
-    law: Law
-    figures: FloatArray
-
-    def of_a_stem(self, base: Baseline, output: int, declared: DeclaredNoise) -> bool:
-        """Tell whether what it takes for noise comes from a stem; kept."""
-        name = ("of a stem", output, id(self))
-        if name not in base.known:
-            own, laws = declared_block(base, output, declared), laws_of(base, output, declared)
-            figure = math.log(max(base.noise[output].rows, 2))
-            moved = with_a_stem(base, output, laws, own) + figure + ENLARGED
-            follows = of_the_stem(base, output, self.law, own, self.figures)
-            base.known[name] = follows or self.effect.score > moved - SAME
-        return bool(base.known[name])
-
-
-def _at_their_best(base: Baseline, output: int, declared: DeclaredNoise) -> list[_Fitted]:
+def _at_their_best(base: Baseline, output: int, declared: DeclaredNoise) -> list[NoiseEffect]:
     """Return the laws that have figures, kept."""
     name = ("noise effects", output, declared.std, declared.ar.tobytes())
     if name not in base.known:
         laws = laws_of(base, output, declared)
         fitted = [_fitted(base, output, declared, law) for law in laws]
         base.known[name] = [each for each in fitted if each is not None]
-    found: list[_Fitted] = base.known[name]
+    found: list[NoiseEffect] = base.known[name]
     return found
 
 
@@ -149,7 +124,7 @@ def named_laws(found: Sequence[NoiseEffect], margin: float) -> tuple[NoiseEffect
     return tuple(each for each in found if each.score < found[0].score + margin)
 
 
-def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: Law) -> _Fitted | None:
+def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: Law) -> NoiseEffect | None:
     own, shown = declared_block(base, output, declared), shown_of(base, output)
     blocks = base.blocks[output]
 
@@ -180,8 +155,7 @@ def _fitted(base: Baseline, output: int, declared: DeclaredNoise, law: Law) -> _
         )
         for key, attribute in keys
     }
-    effect = NoiseEffect(law.place, behaviours[0], intervals, whole + held + price, std)
-    return _Fitted(effect, law, found)
+    return NoiseEffect(law.place, behaviours[0], intervals, whole + held + price, std)
 
 
 def _ends(

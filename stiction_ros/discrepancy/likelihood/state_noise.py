@@ -51,8 +51,6 @@ def steady_gain(
 def innovations(
     a: FloatArray,
     q: FloatArray,
-    driven: FloatArray,
-    when: FloatArray,
     c: FloatArray,
     r: float,
     start: FloatArray,
@@ -68,8 +66,6 @@ def innovations(
 
     Args:
         a, q: of the states, shape (n, n).
-        driven: what ``when`` adds to q, shape (n, n).
-        when: share of it from each sample to the next, shape (N,).
         c: of the one output, shape (n,).
         r: its variance.
         start: covariance of the states at the first sample of a record, shape (n, n).
@@ -89,7 +85,7 @@ def innovations(
             states[:] = 0.0
             p[:] = start
             steady = False
-        if not (steady and seen[k] and when[k] == when[k - 1]):
+        if not (steady and seen[k]):
             before, total = total, r
             for i in range(size):
                 shown[i] = 0.0
@@ -110,7 +106,7 @@ def innovations(
                         moved[i, j] += a[i, m] * p[m, j]
             for i in range(size):
                 for j in range(i, size):
-                    value = q[i, j] + when[k] * driven[i, j] - gain[i] * gain[j] * total
+                    value = q[i, j] - gain[i] * gain[j] * total
                     for m in range(size):
                         value += moved[i, m] * a[j, m]
                     steady = steady and abs(value - p[i, j]) <= STEADY * (1.0 + abs(value))

@@ -11,9 +11,8 @@ import numpy as np
 from stiction_ros.discrepancy.candidate.base import figures_of
 from stiction_ros.discrepancy.candidate.valve import ValveCandidate
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.region import SMOOTH
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.fit.uncertainty import Intervals
+from stiction_ros.discrepancy.fit.uncertainty import SMOOTH, Intervals
 from stiction_ros.discrepancy.likelihood.noise import NoiseFit
 from stiction_ros.discrepancy.process.free_equation import Equation, Fitted, best_fit, filtered_fits
 from stiction_ros.discrepancy.process.refit import equations_of, problems_of

@@ -10,7 +10,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.answer.found_effects import (
     FoundEffect,
-    behind_slope,
     holds_nothing_out,
     moved_by,
     of_data,
@@ -237,18 +236,9 @@ def _intervals(
             base, effect.fit, task.options.resamples, task.random, share, beside
         )
     found = without_its_jump(found, effect)
-    if effect.place.startswith("load"):
-        found = behind_slope(found, _slope(state))
     if not task.options.free_process:
         return found
     return with_free_process(found, base, effect.fit, task.longest)
-
-
-def _slope(state: State) -> float:
-    """Return the gain that stands beside the curve of a valve; 1 where there is no curve."""
-    curved = any(each.fit.candidate.curved for each in state.added)
-    gains = [each.value for each in state.changes if each.what == "gain"]
-    return gains[0] if curved and len(gains) == 1 else 1.0
 
 
 def _share(task: Task, state: State, k: int) -> Callable[[float], None]:

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from stiction_ros.discrepancy.answer.results import Look
 from stiction_ros.discrepancy.candidate.base import Candidate
-from stiction_ros.discrepancy.decision.decide import Decision, GapVerdict, decide, thinned_away
+from stiction_ros.discrepancy.candidate.valve import departures
+from stiction_ros.discrepancy.decision.decide import (
+    Decision,
+    GapVerdict,
+    decide,
+    thinned_away,
+)
 from stiction_ros.discrepancy.decision.extend import (
     AddedEffect,
     Extension,
@@ -25,15 +31,21 @@ from stiction_ros.discrepancy.decision.scores import (
     score_candidates,
     testable_effects,
 )
+from stiction_ros.discrepancy.fit.search import CandidateFit
 from stiction_ros.discrepancy.fit.uncertainty import chance_threshold, stored_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.free_process import in_doubt_of_place, score_with_free_process
-from stiction_ros.discrepancy.steps.friction import rests_left
-from stiction_ros.discrepancy.steps.mending import changed_again, made_room, process_first
+from stiction_ros.discrepancy.simulation.free_run import FreeRun
+from stiction_ros.discrepancy.steps.mending import (
+    changed_again,
+    made_room,
+    process_first,
+)
 from stiction_ros.discrepancy.steps.state import State, Task
 from stiction_ros.loop import LoopModel
 
 SCORED = 0.8  # of the time of a look
+MANY = 0.2  # of the values, that were held or interpolated
 MOST_THINNED = 0.95  # of the values
 MOVED_AWAY = "the free run of the held-out rows moves away from PV"
 """Why an effect is taken back that the looks had kept."""
@@ -185,6 +197,16 @@ def decided(task: Task, state: State, scored: Scored) -> Decision:
     if task.options.free_process:
         decision = in_doubt_of_place(base, decision)
     return told_by_stem(base.run, decision, allowed)
+
+
+def rests_left(run: FreeRun) -> Callable[[CandidateFit], int]:
+    """Return what counts how often the stem of a fit leaves a rest, as far as PV shows it.
+
+    Where many values were thinned out, PV does not show how a stem leaves its rest.
+    """
+    if max(run.runs.thinned) > MANY:
+        return lambda fit: 0
+    return lambda fit: departures(run, fit.candidate, fit.point)
 
 
 def _extended(

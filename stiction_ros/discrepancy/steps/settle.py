@@ -1,99 +1,115 @@
-"""After the looks: whole explanations compared, few effects before many."""
+"""After the looks: whole explanations compared, and each effect told again beside the others."""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
-from collections.abc import Mapping, Sequence
 
-from stiction_ros.discrepancy.candidate.base import figures_of
-from stiction_ros.discrepancy.decision.decide import FRICTION, confirmed
-from stiction_ros.discrepancy.decision.extend import AddedEffect, refit_together
-from stiction_ros.discrepancy.steps.again import told_again
-from stiction_ros.discrepancy.steps.friction import friction_beside_others, friction_told_again
-from stiction_ros.discrepancy.steps.look import look_on
+from stiction_ros.discrepancy.decision.decide import FRICTION, confirmed, large_enough
+from stiction_ros.discrepancy.decision.extend import (
+    AddedEffect,
+    refit_together,
+    told_already,
+)
+from stiction_ros.discrepancy.decision.measured_stem import not_contradicted
+from stiction_ros.discrepancy.fit.search import CandidateFit
+from stiction_ros.discrepancy.steps.look import look_on, scored_by
 from stiction_ros.discrepancy.steps.mending import mended, singles
 from stiction_ros.discrepancy.steps.state import State, Task
-from stiction_ros.discrepancy.steps.wholes import best_whole, suspicious
-from stiction_ros.effects import Backlash, about
+from stiction_ros.discrepancy.steps.wholes import Keys, best_whole, whole
+from stiction_ros.effects import about
 
-APART = 5.0  # samples between a step and its opposite that are outliers together
-CANCEL = 0.25  # of the larger one, that such two may leave
-UNTOLD = 0.15  # of the band of a friction, by which a stem rests elsewhere than its law says
-
-
-def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
-    """Return effects without steps that another one takes back.
-
-    A few samples later, both are rows that stand apart from all others. Beside a friction, both
-    no larger than its band, they are a stem that slipped elsewhere, or not at all, and slipped
-    again; one that is a small part of its band is what no law tells of where a stem rests.
-
-    Args:
-        effects: those of an explanation.
-        sample_time: of the records, s.
-    """
-    steps = [each for each in effects if each.fit.candidate.dated and len(each.fit.factors) == 1]
-    bands = {each.place: band_of(each) for each in effects if about(each.effect).family == FRICTION}
-    gone = [step for step in steps if _size(step) <= UNTOLD * _band(step, bands)]
-    for one, other in itertools.combinations(steps, 2):
-        if one.fit.candidate.key != other.fit.candidate.key or _is_in(one, gone):
-            continue
-        apart = abs(float(one.fit.point[0] - other.fit.point[0]))
-        total = float(one.fit.factors[0] + other.fit.factors[0])
-        largest = max(_size(one), _size(other))
-        near = apart <= APART * sample_time or largest <= _band(one, bands)
-        if near and not _is_in(other, gone) and abs(total) <= CANCEL * largest:
-            gone += [one, other]
-    return tuple(each for each in effects if not _is_in(each, gone))
-
-
-def band_of(friction: AddedEffect) -> float:
-    """Return how far apart a stem may rest under the same OP, %."""
-    figures = figures_of(friction.behaviour)
-    if friction.effect == Backlash.effect:
-        return figures["band"]
-    return figures["f_s"] + figures["f_d"]
-
-
-def _size(step: AddedEffect) -> float:
-    return abs(float(step.fit.factors[0]))
-
-
-def _band(step: AddedEffect, bands: Mapping[str, float]) -> float:
-    """Return the band of the friction of the valve at which a load steps; 0 where there is none."""
-    return bands.get(step.place.replace("load:", "valve:"), 0.0)
-
-
-def _is_in(effect: AddedEffect, others: Sequence[AddedEffect]) -> bool:
-    return any(effect is each for each in others)
+NEAR = 40.0  # evidence, by which a rival may be behind beside figures that were fitted without it
+RIVALS = 2  # that are tried in the place of an effect
 
 
 def settle(task: Task, state: State) -> State:
-    """Keep the best whole explanation, the given process mended where that explains more.
-
-    Which friction it is was told beside nothing; where more than the declared noise is left, it is
-    told again before any effect is given up.
-    """
-    if len(state.added) > 1 and suspicious(state.base):
-        state = friction_beside_others(task, state)
+    """Keep the best whole explanation, the given process mended where that explains more."""
     state = best_of_wholes(task, state)
     other = mended(task, state)
     if other is not None:
         state = best_of_wholes(task, look_on(task, other))
-    if len(state.added) > 1 or state.changes:
-        state = friction_told_again(task, state)
-    if len(state.added) > 1:
-        state = told_again(task, state)
-    return state
+    return told_again(task, state) if len(state.added) > 1 else state
 
 
 def best_of_wholes(task: Task, state: State) -> State:
     """Keep the best whole explanation: a part of what was found, or one effect alone."""
     alone = [each for each in singles(state) if confirmed(each.fit)]
     best = best_whole(state.bare, task.runs, state.added, alone, task.options.margin)
-    state = dataclasses.replace(state, added=best.effects, base=best.base)
-    kept = without_outliers(state.added, task.runs.sample_time)
-    if len(kept) == len(state.added):
-        return state
-    return state.with_added(task.runs, refit_together(state.bare, task.runs, kept))
+    return dataclasses.replace(state, added=best.effects, base=best.base)
+
+
+def told_again(task: Task, state: State) -> State:
+    """Tell each of several effects again: its nearest rivals in its place, all fitted together.
+
+    What was told first was told beside something that was not yet in the model, and the figures
+    of the others were fitted beside it. The whole that explains most holds; those within the
+    margin are in doubt.
+    """
+    for k in range(len(state.added)):
+        state = _told(task, state, k)
+    return state
+
+
+def _told(task: Task, state: State, k: int) -> State:
+    own, margin = state.added[k], task.options.margin
+    tried = [(own, state)]
+    twins, rivals = _rivals(task, state, k)
+    for rival in rivals:
+        behaviour = rival.behaviour(state.base.run)
+        if behaviour is None:
+            continue
+        other = AddedEffect(rival, behaviour, rival.candidate.twins)
+        added = (*state.added[:k], other, *state.added[k + 1 :])
+        refitted = refit_together(state.bare, task.runs, added)
+        tried.append((other, state.with_added(task.runs, refitted)))
+    scores = [0.0]
+    if len(tried) > 1:
+        scores = [whole(each.bare, task.runs, each.added).score for _, each in tried]
+    least = min(scores)
+    best, kept = tried[scores.index(least)]
+    near = [
+        key
+        for (each, _), score in zip(tried, scores, strict=True)
+        if each is not best and score < least + margin
+        for key in each.fit.candidate.keys
+    ]
+    alternatives = tuple(dict.fromkeys([*_inseparable(best, twins), *near]))
+    told = dataclasses.replace(kept.added[k], alternatives=alternatives)
+    return dataclasses.replace(kept, added=(*kept.added[:k], told, *kept.added[k + 1 :]))
+
+
+def _inseparable(effect: AddedEffect, twins: Keys) -> list[tuple[str, str]]:
+    """Return what no fit tells from an effect: its twins, and the other kind of a friction."""
+    friction = about(effect.effect).family == FRICTION
+    return [
+        key
+        for key in effect.alternatives
+        if key in (*effect.fit.candidate.twins, *twins)
+        or (friction and about(key[1]).family == FRICTION)
+    ]
+
+
+def _rivals(task: Task, state: State, k: int) -> tuple[Keys, list[CandidateFit]]:
+    """Return what is an effect's twin, and what explains nearly as much in its place.
+
+    Both are asked beside the others as they are.
+    """
+    own = state.added[k].fit.candidate
+    others = state.with_added(task.runs, state.others(k))
+    scored = scored_by(task, others, task.options.most_effects)
+    fits = not_contradicted(scored.scores.base.run, scored.scores.fits)
+    mine = max((f.evidence for f in fits if f.candidate.key == own.key), default=0.0)
+    twins = next((f.candidate.twins for f in fits if f.candidate.key == own.key), ())
+    known = {own.key, *(each.fit.candidate.key for each in others.added)}
+    alike = [
+        f
+        for f in sorted(fits, key=lambda f: -f.evidence)
+        if f.candidate.inside
+        and f.candidate.key not in known
+        and f.evidence > max(mine - NEAR, 0.0)
+        and confirmed(f)
+        and large_enough(f)
+        and not told_already(others.added, f)
+        and not (own.about.family == f.candidate.about.family == FRICTION)
+    ]
+    return twins, alike[:RIVALS]

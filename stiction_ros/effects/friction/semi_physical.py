@@ -10,7 +10,6 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory, parameter
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
 from stiction_ros.effects.friction.stiction import JumpForm
-from stiction_ros.effects.friction.switching import SlipPolygons, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +46,6 @@ class SemiPhysicalStiction(FrictionPair):
 
     law: ClassVar[str | None] = "semi_physical"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = SlipPolygons()
     held: ClassVar[tuple[str, ...]] = ("k",)  # as published; every slip hangs on its last digits
 
     overshoot: float = parameter("k", "1", "overshoot factor K", low=1.0, high=2.0, default=1.99)

@@ -99,8 +99,8 @@ class Stiction(Behaviour):
     """What holds for every friction law that does not say otherwise.
 
     Attributes:
-        switching: how its switching patterns are listed, so that a search can be exact; None
-            for a law that is searched on grids alone, which certifies nothing.
+        switching: how its switching patterns are listed, so that a search can be exact; the
+            exact search refuses a law with None, the default search takes it.
         not_identified: why it is not identified, one clause; empty when it is.
         held: keys of further parameters that stay at their defaults, which is said: constants of
             the law. All others are identified.

@@ -1,6 +1,6 @@
 """How the switching patterns of a friction law are listed, so that a search can be exact.
 
-A law that says nothing of them is searched on grids, and nothing is certified.
+The exact search refuses a law that says nothing of them; the default search takes any law.
 """
 
 from __future__ import annotations
@@ -26,9 +26,4 @@ class MovingCells:
     rules: type[MovingRules]
 
 
-@dataclasses.dataclass(frozen=True)
-class SlipPolygons:
-    """A slip that goes on by a factor, the law's third parameter: polygons of f_S and f_D."""
-
-
-Switching = SlipCells | MovingCells | SlipPolygons
+Switching = SlipCells | MovingCells

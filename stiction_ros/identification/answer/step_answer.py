@@ -52,12 +52,33 @@ class StepAnswer:
         wait = model.delay[valve] + 1
         count = max(samples // 2, wait + 2)
         values = step_response(model.a, model.b[valve], model.delay[valve], count)
+        return cls._of(model.name, values, wait, model.noise_std, sample_time)
+
+    @classmethod
+    def of_values(
+        cls, output: str, values: FloatArray, noise: float, sample_time: float
+    ) -> StepAnswer:
+        """Return the answer that has these values.
+
+        Args:
+            output: tag.
+            values: PV after each sample, engineering units per %, shape (H,).
+            noise: standard deviation of what one sample of PV brings that is new, same units.
+            sample_time: s.
+        """
+        wait = int(np.argmax(values != 0.0))
+        return cls._of(output, values, wait, noise, sample_time)
+
+    @classmethod
+    def _of(
+        cls, output: str, values: FloatArray, wait: int, noise: float, sample_time: float
+    ) -> StepAnswer:
         reached, before = (np.abs(part).max() for part in (values, values[: len(values) // 2 + 1]))
         lag = None
         if reached <= GROWS * before:
             risen = np.flatnonzero(np.abs(values[wait:]) >= RISEN * reached)
             lag = float(risen[0] * sample_time)
-        return cls(model.name, wait * sample_time, lag, values, model.noise_std, sample_time)
+        return cls(output, wait * sample_time, lag, values, noise, sample_time)
 
     def after(self, seconds: float) -> float:
         """Return |PV| a time after the step, engineering units per %."""

@@ -13,7 +13,6 @@ from stiction_ros.identification.evidence.candidate import Candidate, Judge, ide
 from stiction_ros.identification.evidence.fit_problem import Problem
 from stiction_ros.identification.evidence.output_fit import white
 from stiction_ros.identification.evidence.search import DRIFT, Found, search
-from stiction_ros.identification.exact.further_fit import EQUAL, widened
 from stiction_ros.identification.friction.further import (
     FurtherSearch,
     Settled,
@@ -22,6 +21,8 @@ from stiction_ros.identification.friction.further import (
 )
 from stiction_ros.identification.result.identification import ValveEstimate
 
+EQUAL = 10.0
+"""Loss by which other values than those they begin at must be better before the search."""
 FURTHER_LAW_ROUNDS = 2
 
 
@@ -71,6 +72,34 @@ def with_further(
     rows = _nearby(problem, best, j).accepted(slack)
     rows = np.column_stack([span * rows[:, :2], rows[:, 2:-1], span * rows[:, -1]])
     return widened(valve, values, rows)
+
+
+def widened(valve: ValveEstimate, further: dict[str, float], rows: FloatArray) -> ValveEstimate:
+    """Return an estimate with further parameters, its intervals those of all accepted rows.
+
+    Args:
+        valve: as found with them held.
+        further: their values.
+        rows: (f_S, f_D, further …, start) that the record does not reject, shape (G, 3 + n).
+    """
+    low, high = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
+    ends = {
+        key: (min(low[2 + k], value), max(high[2 + k], value))
+        for k, (key, value) in enumerate(further.items())
+        if high[2 + k] > low[2 + k]
+    }
+    static, dynamic, band = valve.static_interval, valve.dynamic_interval, valve.band_interval
+    if band is not None:
+        sums = rows[:, :2].sum(axis=1)
+        band = (min(band[0], float(sums.min())), max(band[1], float(sums.max())))
+    return dataclasses.replace(
+        valve,
+        further=further,
+        further_intervals=ends,
+        static_interval=(min(static[0], low[0]), max(static[1], high[0])),
+        dynamic_interval=(min(dynamic[0], low[1]), max(dynamic[1], high[1])),
+        band_interval=band,
+    )
 
 
 def _nearby(problem: Problem, best: Candidate, valve: int) -> Settled:

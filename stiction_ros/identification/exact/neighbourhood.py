@@ -8,7 +8,6 @@ D/A at hand (:mod:`.pattern_search`).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,14 +20,8 @@ from stiction_ros.identification.switching.patterns import (
     Cells,
     beginning_of,
     cells_at,
-    has_cells,
 )
-from stiction_ros.identification.switching.rectangles import (
-    EDGES,
-    gain_meets,
-    overlapping,
-    remainders,
-)
+from stiction_ros.identification.switching.rectangles import overlapping, remainders
 from stiction_ros.identification.switching.scan import PatternScan
 
 MOST_CELLS = 3000
@@ -71,7 +64,6 @@ def neighbourhood(
     friction: FloatArray,
     threshold: float,
     most: int,
-    known: Sequence[PatternMap] = (),
     before: PatternMap | None = None,
 ) -> PatternMap:
     """Enumerate round (f_S, f_D), outwards until all patterns at the edge are rejected.
@@ -79,8 +71,6 @@ def neighbourhood(
     Args:
         threshold: excess of the loss over the best from which a pattern is rejected.
         most: largest number of cells.
-        known: closed neighbourhoods of the same beginning; an edge that meets one of them
-            stays where it is.
         before: the closed neighbourhood that holds (f_S, f_D), under another criterion; if its
             beginning is the same, its cells are evaluated again and not listed again.
     """
@@ -100,12 +90,8 @@ def neighbourhood(
     scan, closed = search.evaluate(Cells.joined(cells)), False
     for _ in range(GROWTHS):
         wider = _grown(scan, rectangle, threshold + MARGIN, search.limit)
-        met = [
-            any(gain_meets(rectangle, wider, edge, k.rectangle) for k in known) for edge in EDGES
-        ]
-        wider = np.where(met, rectangle, wider)
         if (wider == rectangle).all():
-            closed = not any(met)
+            closed = True
             break
         strips = remainders(wider[None, :], rectangle[None, :])
         more = search.enumerate(begin, strips, most - len(scan.loss))
@@ -143,15 +129,13 @@ def refine(
     """Return the model with the best pattern of its neighbourhood, and that neighbourhood.
 
     Repeated with the prefilter of the better model until nothing changes. The map is None
-    for a valve without friction, one that never slips and a law without cells.
+    for a valve without friction and one that never slips.
 
     Args:
         threshold: excess of the loss over the best from which a pattern is rejected.
         wander: how many samples delays may change in one round.
     """
     reachable = None
-    if not has_cells(data.law):
-        return model, None
     for _ in range(NEIGHBOURHOOD_ROUNDS):
         if model.friction[valve, 0] <= 0.0:
             return model, None

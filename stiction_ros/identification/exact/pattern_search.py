@@ -67,13 +67,12 @@ class PatternSearch:
         self.u, self.law = data.u[valve], data.law
         free = None if begin is None else (np.arange(len(self.u)) < begin.first).astype(float)
         self.limit = float(data.limit[valve])
-        self.ranges, self.begin, self.criterion = ranges, begin, criterion
+        self.ranges, self.begin = ranges, begin
         self.scans = output_scans(data, model, orders, valve, criterion, ranges, free)
 
     def scan(self, grid: FloatArray, starts: FloatArray | float) -> ValveScan:
         """Scan rows (f_S, f_D), shape (G, 2), by the same criterion, see :func:`scan_valve`."""
-        by = [(self.criterion, self.scans)]
-        return scan_stems(self.data, self.valve, grid, starts, by, self.ranges)[0]
+        return scan_stems(self.data, self.valve, grid, starts, [self.scans], self.ranges)[0]
 
     def evaluate(self, cells: Cells) -> PatternScan:
         """Return the loss of every cell at its best f_D.
@@ -142,20 +141,18 @@ class PatternSearch:
         level, _, loss, _ = self._minimised(dataclasses.replace(cells.steps, values=values), ranges)
         return level, loss
 
-    def minimised(
-        self, bases: FloatArray, signs: FloatArray, ranges: FloatArray
+    def _minimised(
+        self, patterns: StepSignals, ranges: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Minimise over the level x in base − x · sign, per pattern inside its range.
+
+        Args:
+            patterns: base and sign as two channels.
+            ranges: of the level, shape (G, 2).
 
         Returns:
             Best level (G,), second derivative (G,), loss (G,), delays (G, p).
         """
-        return self._minimised(StepSignals.of(bases, signs), ranges)
-
-    def _minimised(
-        self, patterns: StepSignals, ranges: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Minimise as :meth:`minimised` does, of base and sign as two channels."""
         middle = patterns.size // 2
         if patterns.size * patterns.count < WORTHWHILE:
             return self._minimised_part(patterns, ranges)
@@ -177,8 +174,7 @@ class PatternSearch:
         for i, (scan, energy) in enumerate(zip(self.scans, energies, strict=True)):
             lags = energy.rights.shape[2]
             products[:, i, :, :, :lags], rights[:, i, :, :lags] = energy.products, energy.rights
-            counted = 0 if self.criterion is Criterion.SQUARED_ERROR else scan.count
-            scales[i] = scan.rest_energy, counted, energy.delays
+            scales[i] = scan.rest_energy, scan.count, energy.delays
         levels, second, loss, delays = best_levels(products, rights, scales, ranges)
         return levels, second, loss, delays + np.array([low for low, _ in self.ranges])
 

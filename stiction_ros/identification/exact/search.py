@@ -18,15 +18,13 @@ import numpy as np
 from stiction_ros.effects import HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.exact.growing_patterns import LONGEST, growing_patterns
-from stiction_ros.identification.exact.growing_swarm import growing_swarm
-from stiction_ros.identification.exact.neighbourhood import REJECTED, SAMPLES
+from stiction_ros.identification.exact.neighbourhood import REJECTED, SAMPLES, refine
 from stiction_ros.identification.exact.pattern_search import (
     PatternSearch,
     best_in_cells,
     nearby_delays,
     points_of,
 )
-from stiction_ros.identification.exact.polygon_search import refine_near
 from stiction_ros.identification.friction.grid import (
     coarse_grid,
     cross_grid,
@@ -45,7 +43,6 @@ from stiction_ros.identification.problem.models import (
 )
 from stiction_ros.identification.problem.output_error import Orders
 from stiction_ros.identification.side_by_side import together
-from stiction_ros.identification.switching.patterns import has_cells
 
 STEPS = 80
 WORK = 24_000_000
@@ -146,10 +143,6 @@ def first_search(data: Data, orders: Orders, first: FirstScan, growing: bool) ->
         growing: take a short record in piece by piece as well, under He's law.
     """
     model, valve, limit = first.model, first.valve, float(data.limit[first.valve])
-    if not has_cells(data.law):
-        grown = growing_swarm(data, model, orders, valve)
-        if grown is not None and grown.loss < model.loss:
-            return grown
     piece_by_piece: list[Callable[[], Model]] = []
     if growing and data.law is HeStiction and data.y.shape[1] <= LONGEST:
         piece_by_piece = [partial(growing_patterns, data, model, orders, valve)]
@@ -211,7 +204,7 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
     if model.friction[valve, 0] == 0.0:
         return model
     limit = float(data.limit[valve])
-    best, _ = refine_near(data, model, orders, valve, REJECTED)
+    best, _ = refine(data, model, orders, valve, REJECTED)
     for _ in range(SWEEPS):
         before, friction = best.loss, best.friction[valve]
         jumps, reverses = neighbouring_lines(data, best, orders, valve)
@@ -225,18 +218,16 @@ def improve_valve(data: Data, model: Model, orders: Orders, valve: int) -> Model
         if best.loss > before - LEAST_GAIN:
             break
         best = comb(data, best, orders, valve)
-        best, _ = refine_near(data, best, orders, valve, REJECTED)
+        best, _ = refine(data, best, orders, valve, REJECTED)
     return best
 
 
 def neighbouring_lines(
     data: Data, model: Model, orders: Orders, valve: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return J and S of the model and, where the law has cells, just beyond its cell."""
+    """Return J and S of the model and just beyond its cell."""
     friction = model.friction[valve]
     (jump, reverse), limit = points_of(friction[None, :])[0], float(data.limit[valve])
-    if not has_cells(data.law):
-        return np.array([jump]), np.array([reverse])
     search = PatternSearch(data, model, orders, valve, nearby_delays(data, model, valve))
     _, cells = best_in_cells(search, friction[None, :], float(model.start[valve]))
     jl, jh, sl, sh = np.clip(cells.bounds[0], 0.0, 2.0 * limit)
@@ -295,8 +286,7 @@ def zoom(
     if not len(parents):
         return nothing
     patterns = PatternSearch(data, model, orders, valve, ranges, criterion=criterion)
-    if has_cells(data.law):
-        parents, _ = best_in_cells(patterns, parents, start)
+    parents, _ = best_in_cells(patterns, parents, start)
     step = APART * limit
     while step > FINEST * limit:
         step /= 3.0
@@ -305,11 +295,9 @@ def zoom(
         chosen = scan.best(PARENTS, data.min_moves, 1.5 * step)
         if not chosen:
             return nothing
-        parents, delays = grid[chosen], scan.delays[chosen]
-        if has_cells(data.law):
-            parents, cells = best_in_cells(patterns, parents, start)
-            order = np.argsort(cells.loss, kind="stable")
-            parents, delays = parents[order], cells.delays[order]
+        parents, cells = best_in_cells(patterns, grid[chosen], start)
+        order = np.argsort(cells.loss, kind="stable")
+        parents, delays = parents[order], cells.delays[order]
     return parents, delays
 
 

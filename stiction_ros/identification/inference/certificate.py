@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stiction_ros.identification.friction.grid import find_law
 from stiction_ros.identification.result.identification import ValveEstimate
-from stiction_ros.identification.switching.patterns import has_cells
 
 
 def certificates(valves: Sequence[ValveEstimate]) -> tuple[str, ...]:
@@ -17,13 +15,10 @@ def certificates(valves: Sequence[ValveEstimate]) -> tuple[str, ...]:
 def _certificate(valve: ValveEstimate) -> str:
     patterns = int(valve.evidence["patterns"])
     head = f"friction of {valve.name} (law {valve.law})"
-    for key, value in valve.further.items():
-        head += f" at {key} {value:.4g}" + ("" if key in valve.further_intervals else ", held")
     if not patterns:
         return f"{head}: searched on grids only, no switching pattern was enumerated"
-    kind = "" if has_cells(find_law(valve.law)) else " for one stem position at the start"
     if valve.evidence["patterns_closed"]:
         reach = "exact among them, all at their edge are rejected"
     else:
         reach = "exact among them, but not all at their edge are rejected"
-    return f"{head}: {patterns} switching patterns enumerated round it{kind}; {reach}"
+    return f"{head}: {patterns} switching patterns enumerated round it; {reach}"

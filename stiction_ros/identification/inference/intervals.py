@@ -9,16 +9,14 @@ from numpy.typing import NDArray
 
 from stiction_ros.deferred import chi2_quantile
 from stiction_ros.effects.behaviour import FloatArray
-from stiction_ros.identification.exact.growing_swarm import swarm_round
-from stiction_ros.identification.exact.neighbourhood import PatternMap
+from stiction_ros.identification.exact.neighbourhood import refine
 from stiction_ros.identification.exact.pattern_search import (
     PatternSearch,
     best_in_cells,
     nearby_delays,
     points_of,
 )
-from stiction_ros.identification.exact.polygon_search import PolygonMap, refine_near
-from stiction_ros.identification.friction.grid import coarse_grid, finer_grid
+from stiction_ros.identification.friction.grid import coarse_grid
 from stiction_ros.identification.problem.models import (
     Data,
     Model,
@@ -27,7 +25,6 @@ from stiction_ros.identification.problem.models import (
     with_valve,
 )
 from stiction_ros.identification.problem.output_error import Orders
-from stiction_ros.identification.switching.patterns import has_cells
 from stiction_ros.identification.switching.scan import PatternScan
 
 # f_S, f_D and one more for the choice among very many patterns.
@@ -49,7 +46,7 @@ class FrictionIntervals:
         dynamic_estimate: f_D of the best fit, %.
         deadband_loss: how much worse the best f_D = f_S is, in units of −2 log likelihood.
         patterns: number of switching patterns enumerated round the best one; 0 when the
-            law has none or the valve does not slip.
+            valve does not slip.
         closed: whether that enumeration reached rejected patterns on every side.
         model: the model with the best pattern.
         profile: rows (f_S, least loss above the best) over all patterns tried, %.
@@ -72,12 +69,8 @@ def friction_intervals(
     """Return the intervals of one valve round the model's friction, at the model's delays."""
     limit = float(data.limit[valve])
     threshold = chi2_quantile(confidence, FREEDOM)
-    near: PatternMap | PolygonMap | None
-    model, near = refine_near(data, model, orders, valve, threshold, wander=0)
-    if has_cells(data.law):
-        scan = _far_patterns(data, model, orders, valve)
-    else:
-        scan = _grid_points(data, model, orders, valve)
+    model, near = refine(data, model, orders, valve, threshold, wander=0)
+    scan = _far_patterns(data, model, orders, valve)
     if near is not None:
         scan = PatternScan.joined([scan, near.scan])
     start = float(model.start[valve])
@@ -111,21 +104,6 @@ def _far_patterns(data: Data, model: Model, orders: Orders, valve: int) -> Patte
     coarse = search.scan(coarse_grid(limit), start)
     chosen = coarse.grid[np.argsort(coarse.loss, kind="stable")[:FAR]]
     return best_in_cells(search, np.vstack([chosen, _deadbands(limit)]), start)[1]
-
-
-def _grid_points(data: Data, model: Model, orders: Orders, valve: int) -> PatternScan:
-    """Return grids over the triangle and a swarm round the model; points, not cells."""
-    limit = float(data.limit[valve])
-    grids, step = [coarse_grid(limit), _deadbands(limit)], limit / 30.0
-    for _ in range(8):
-        grids.append(finer_grid(model.friction[valve][None, :], step, limit))
-        step /= 3.0
-    grid = np.vstack(grids)
-    rows = np.column_stack([grid, np.full(len(grid), model.start[valve])])
-    rows = np.vstack([rows, swarm_round(model, valve, limit)])
-    ranges = nearby_delays(data, model, valve, 0)
-    scan = scan_valve(data, model, orders, valve, rows[:, :2], rows[:, 2], ranges=ranges)
-    return point_patterns(scan)
 
 
 def _deadbands(limit: float) -> FloatArray:

@@ -4,8 +4,6 @@ Evidence, all under the noise model:
 
 - ``delta_bic``: BIC of the best friction-free rival (orders n_a, n_a + 1, n_a + 2, own delays)
   minus BIC of the model with friction.
-- ``variance_ratio``: innovation variance without friction over that with friction.
-- ``free_run_ratio``: free-run error without friction over that with friction.
 - ``half_1``, ``half_2``: −2 log likelihood gained by friction in either half of the record.
 - ``share``: f_S over the OP span; ``moves``: number of stem moves.
 - ``deadband_loss``: −2 log likelihood lost by J = 0.
@@ -23,7 +21,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification.identification_options import IdentificationOptions
-from stiction_ros.identification.problem.models import Data, Model
+from stiction_ros.identification.problem.models import Model
 from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.identification.result.stability import Interval
 
@@ -35,9 +33,7 @@ SMALL_JUMP = 0.25
 controller's own kicks tells f_S + f_D alone, and any jump may go with it."""
 
 
-def evidence(
-    data: Data, sticky: Model, rivals: list[Model], valve: int, span: float
-) -> dict[str, float]:
+def evidence(sticky: Model, rivals: list[Model], valve: int, span: float) -> dict[str, float]:
     """Return the named figures for one valve.
 
     Args:
@@ -52,13 +48,10 @@ def evidence(
     halves = half_gains((one.innovations, other.innovations) for one, other in pairs)
     return {
         "delta_bic": float(rival.bic - sticky.bic - friction_parameters),
-        "variance_ratio": float(np.exp((rival.loss - sticky.loss) / count)),
-        "free_run_ratio": free_run_energy(data, rival) / free_run_energy(data, sticky),
         "half_1": halves[0],
         "half_2": halves[1],
         "share": float(sticky.friction[valve, 0] / span),
         "moves": float(np.count_nonzero(np.diff(sticky.stems[valve]))),
-        "rival_order": float(rival.fits[0].orders.output),
     }
 
 
@@ -84,15 +77,6 @@ def half_gains(innovations: Iterable[tuple[FloatArray, FloatArray]]) -> tuple[fl
 
 def _mean_square(values: FloatArray) -> float:
     return max(float(values @ values), 1e-300) / len(values)
-
-
-def free_run_energy(data: Data, model: Model) -> float:
-    """Return the sum of squared free-run errors over all (scaled) outputs."""
-    total = 0.0
-    for y, fit in zip(data.y, model.fits, strict=True):
-        error = y[len(y) - len(fit.free_run) :] - fit.free_run
-        total += float(error @ error)
-    return max(total, 1e-300)
 
 
 def judge(

@@ -26,7 +26,7 @@ def _loss(
 
     Args:
         products, rights: as :func:`pattern_energy`, one row per output.
-        scales: rows (energy of the rest, number of samples or 0 for plain SE, delays).
+        scales: rows (energy of the rest, number of samples, delays).
     """
     total = 0.0
     for p in range(len(products)):
@@ -35,7 +35,7 @@ def _loss(
         pattern_energy(products[p], rights[p], level, rest, room, energy)
         best = int(energy.argmin())
         delays[p] = best
-        total += count * np.log(energy[best] / count) if count > 0.0 else energy[best]
+        total += count * np.log(energy[best] / count)
     return total
 
 
@@ -47,7 +47,7 @@ def best_levels(
 
     Args:
         products, rights: as :func:`pattern_energy`, shape (G, p, …).
-        scales: rows (energy of the rest, number of samples or 0 for plain SE, delays) per output.
+        scales: rows (energy of the rest, number of samples, delays) per output.
         ranges: of the level, shape (G, 2).
 
     Returns:

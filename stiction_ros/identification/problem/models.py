@@ -30,26 +30,16 @@ AllDelays = tuple[tuple[int, ...], ...]
 
 
 class Criterion(enum.Enum):
-    """Prefilter of a scan, which error of the current model counts, and how outputs add up.
-
-    The first three add up n log(SE / n), ``SQUARED_ERROR`` the plain SE of one step, (12a).
-    """
+    """Prefilter of a scan: which error of the current model counts."""
 
     ONE_STEP = enum.auto()
     FREE_RUN = enum.auto()
     INNOVATIONS = enum.auto()
-    SQUARED_ERROR = enum.auto()
 
     @property
     def filtered(self) -> bool:
         """Whether the data are filtered by the model's 1/A."""
-        return self in (Criterion.FREE_RUN, Criterion.INNOVATIONS)
-
-    def loss(self, energy: FloatArray, count: int) -> FloatArray:
-        """Return what one output adds to the loss, from its SE over ``count`` samples."""
-        if self is Criterion.SQUARED_ERROR:
-            return energy
-        return np.asarray(count * np.log(energy / count))
+        return self is not Criterion.ONE_STEP
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,7 +198,7 @@ def scan_criteria(
 ) -> list[ValveScan]:
     """Scan by several criteria, as :func:`scan_valve`, each stem simulated once."""
     ranges = ranges or data.delays
-    scans = [(c, output_scans(data, model, orders, valve, c, ranges)) for c in criteria]
+    scans = [output_scans(data, model, orders, valve, c, ranges) for c in criteria]
     return scan_stems(data, valve, grid, starts, scans, ranges)
 
 
@@ -217,7 +207,7 @@ def scan_stems(
     valve: int,
     grid: FloatArray,
     starts: FloatArray | float,
-    scans: Sequence[tuple[Criterion, list[OutputScan]]],
+    scans: Sequence[list[OutputScan]],
     ranges: DelayRanges,
 ) -> list[ValveScan]:
     """Scan as :func:`scan_criteria` by criteria that stand, with one scan per output each."""
@@ -230,11 +220,11 @@ def scan_stems(
     def scanned(rows: slice) -> None:
         stems = stem_steps(data.law, grid[rows], u, start[rows], data.further_of(valve))
         moves[rows] = stems.moves
-        for c, (criterion, outputs) in enumerate(scans):
+        for c, outputs in enumerate(scans):
             for i, scan in enumerate(outputs):
                 energy, delays = scan.least_energy(stems)
                 best[c, rows, i] = delays + ranges[i][0]
-                loss[c, rows] += criterion.loss(energy, scan.count)
+                loss[c, rows] += scan.count * np.log(energy / scan.count)
 
     shared = len(grid) * len(u) >= WORTHWHILE
     batch = min(BATCH, (len(grid) + 1) // 2) if shared else BATCH

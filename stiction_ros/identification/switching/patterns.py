@@ -25,7 +25,9 @@ import numpy as np
 from stiction_ros.effects import FrictionLaw, HeStiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.effects.friction.moving_rules import MovingRules
-from stiction_ros.effects.friction.switching import MovingCells, SlipCells
+from stiction_ros.effects.friction.switching import MovingCells
+from stiction_ros.errors import InputError
+from stiction_ros.identification.friction.further import first_values
 from stiction_ros.identification.kernels.step import he_pattern_steps
 from stiction_ros.identification.switching.step_signals import StepSignals
 
@@ -76,16 +78,6 @@ class Cells:
         return Cells(self.bounds[first], self.steps.chosen(first))
 
     @property
-    def bases(self) -> FloatArray:
-        """OP at the last slip, before the first slip the stem's level, shape (N, G)."""
-        return self.steps.dense(0)
-
-    @property
-    def signs(self) -> FloatArray:
-        """Direction of the last slip, 0 before the first, shape (N, G)."""
-        return self.steps.dense(1)
-
-    @property
     def dynamic(self) -> FloatArray:
         """Ranges of f_D = (S − J) / 2 inside the cells, shape (G, 2)."""
         low = 0.5 * (self.bounds[:, 2] - self.bounds[:, 1])
@@ -93,9 +85,18 @@ class Cells:
         return np.stack([np.maximum(low, 0.0), high], axis=1)
 
 
-def has_cells(law: type[FrictionLaw]) -> bool:
-    """Return whether the switching patterns of a law can be enumerated."""
-    return isinstance(law.switching, SlipCells | MovingCells)
+def require_cells(law: type[FrictionLaw]) -> None:
+    """Refuse a law whose switching patterns are not those of f_S and f_D alone.
+
+    Raises:
+        InputError: such a law.
+    """
+    if law.switching is None or first_values(law):
+        raise InputError(
+            f"the exact search cannot enumerate the switching patterns of law {law.law!r}",
+            where="law",
+            fix="use the method evidence, which identifies every law",
+        )
 
 
 def moving_rules(law: type[FrictionLaw], u: FloatArray) -> MovingRules | None:

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from stiction_ros.effects.behaviour import FloatArray
 
-EDGES = range(4)
-
 
 def area(rectangles: FloatArray) -> float:
     """Return the area of all rectangles."""
@@ -46,11 +44,3 @@ def overlapping(rectangles: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
     jl, jh, sl, sh = rectangles.T
     meets = (jl < other[1]) & (jh > other[0]) & (sl < other[3]) & (sh > other[2])
     return np.asarray(meets)
-
-
-def gain_meets(rectangle: FloatArray, wider: FloatArray, edge: int, other: FloatArray) -> bool:
-    """Return whether what a rectangle gains at one edge, if anything, meets another one."""
-    strip = rectangle.copy()
-    strip[edge], strip[edge ^ 1] = wider[edge], rectangle[edge]
-    gained = (strip[[0, 2]] < strip[[1, 3]]).all()
-    return bool(gained and overlapping(strip[None, :], other)[0])

@@ -82,14 +82,6 @@ class StepSignals:
         changed[self.offsets] = 0
         return np.diff(np.cumsum(changed)[self.offsets])
 
-    def dense(self, channel: int) -> FloatArray:
-        """Return all samples of one channel, shape (N, G)."""
-        rows = []
-        for low, high in zip(self.offsets[:-1], self.offsets[1:], strict=True):
-            lengths = np.diff(np.append(self.places[low:high], self.count))
-            rows.append(np.repeat(self.values[low:high, channel], lengths))
-        return np.array(rows).reshape(self.size, self.count).T
-
 
 def stem_steps(
     law: type[FrictionLaw],
@@ -98,7 +90,7 @@ def stem_steps(
     start: FloatArray | float,
     further: Sequence[float] = (),
 ) -> StepSignals:
-    """Return stems for rows (f_S, f_D, …) and OP u, shape (N,), as :func:`simulate` does."""
+    """Return stems for rows (f_S, f_D) and OP u, shape (N,), as :func:`simulate` does."""
     if law is not HeStiction:
         return StepSignals.of(simulate(law, grid, u, start, further))
     starts = np.broadcast_to(np.asarray(start, dtype=float), (len(grid),)).copy()

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
+from stiction_ros.control import ControlMode
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
@@ -21,7 +22,7 @@ from stiction_ros.nodes.shared.managed import LATCHED_READER_QOS, READER_QOS, Ma
 from stiction_ros.nodes.shared.messages import rows_of, to_ns, values_of
 from stiction_ros.nodes.shared.peers import PLANTS
 from stiction_ros.nodes.shared.typed import quality
-from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.handover.background import Background
 from stiction_ros.online.handover.offered_model import read_offer
 from stiction_ros.online.input.port import InputPort
@@ -37,7 +38,7 @@ class ControllerInputs(ManagedNode):
 
     settings: ControllerNodeSettings
     model: LoopModel
-    live: LiveController
+    live: ValveTestingController
     port: InputPort
     background: Background
     listening: bool  # whether a PV is for this node: it is active
@@ -119,6 +120,8 @@ class ControllerInputs(ManagedNode):
         self.port.add_preview(preview)
 
     def _on_stiction(self, message: JointState) -> None:
+        if message.header.frame_id == ControlMode.VALVE_TEST:
+            return  # it is its own
         if self.settings.pace == "lockstep":  # who waits for nobody need not remember
             self.fits[to_ns(message.header.stamp)] = message.header.frame_id
         self._go_in_lockstep()

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from sensor_msgs.msg import JointState
 
+from stiction_ros.control import ControlMode
 from stiction_ros.identification import Identification
 from stiction_ros.nodes.shared.messages import joint_state
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.texts import json_text
 
+if TYPE_CHECKING:
+    from stiction_ros.identification.valve_test.judgement import Judgement
+
+Row = tuple[str, float, tuple[float, float]]
 Keys = list[tuple[str, object]]
 
 
@@ -24,10 +31,29 @@ def friction_message(stamp: int, token: str, found: Identification | None) -> Jo
     for valve in () if found is None else found.valves:
         rows.append((f"{valve.name}.f_s", valve.static_friction, valve.static_interval))
         rows.append((f"{valve.name}.f_d", valve.dynamic_friction, valve.dynamic_interval))
+    return _friction(stamp, token, rows)
+
+
+def tested_message(stamp: int, valve: str, found: Judgement) -> JointState:
+    """Return what a valve test says of the friction of its valve.
+
+    Args:
+        stamp: end of the test, ns.
+        valve: tag.
+        found: the verdict.
+    """
+    rows = [
+        (f"{valve}.f_s", found.f_s, found.f_s_interval),
+        (f"{valve}.f_d", found.f_d, found.f_d_interval),
+    ]
+    return _friction(stamp, ControlMode.VALVE_TEST, rows)
+
+
+def _friction(stamp: int, by: str, rows: list[Row]) -> JointState:
     message = joint_state(stamp, [name for name, _, _ in rows], [value for _, value, _ in rows])
     message.velocity = [interval[0] for _, _, interval in rows]
     message.effort = [interval[1] for _, _, interval in rows]
-    message.header.frame_id = token
+    message.header.frame_id = by
     return message
 
 

@@ -25,7 +25,8 @@ def controller_of(
         valves: names of the m valves, in their order.
         design: of the loop.
         model: what is known of the valves.
-        mode: that is asked for; ``auto`` embeds where a valve sticks.
+        mode: that is asked for; ``auto`` embeds where a valve sticks, as ``valve_test`` does before
+            and after its test.
         raised: frictions that the slip check has raised, per valve, in place of those of ``model``.
 
     Raises:
@@ -34,7 +35,7 @@ def controller_of(
     frictions = raised or frictions_of(model, valves)
     spreads = None if raised else spreads_of(model, valves)
     sticky = any(friction is not None for friction in frictions)
-    if mode == AUTO:
+    if mode in (AUTO, ControlMode.VALVE_TEST):
         chosen = ControlMode.EMBEDDING if sticky else ControlMode.UNAWARE
     else:
         chosen = ControlMode(mode)

@@ -15,12 +15,27 @@ AUTO = "auto"
 
 
 @dataclasses.dataclass(frozen=True)
-class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule):
+class ValveTestRule:
+    """When a valve test begins in a running loop, and how far it may go."""
+
+    valve_test_at: int = setting(
+        0, "sample from which a valve test runs in mode valve_test, once", low=0
+    )
+    valve_test_op: float = setting(10.0, "how far OP may go in a valve test, %", low=0.1)
+    valve_test_pv: float = setting(
+        0.0,
+        "how far PV may go from its set-point in a valve test, its unit; 0: as OP brings it",
+        low=0.0,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class LiveControllerSettings(ControlSettings, FitSchedule, WatchRule, OfferRule, ValveTestRule):
     """Everything that can be set on the controller of a running loop."""
 
     mode: str = setting(
         AUTO,
-        "auto: the estimator swaps it; otherwise fixed",
+        "auto: the estimator swaps it; valve_test: the same with one test in manual; else fixed",
         choices=(AUTO, *(mode.value for mode in ControlMode)),
     )
     adopt_process: bool = setting(False, "also take the process from the estimator's loop model")

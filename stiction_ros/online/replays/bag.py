@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stiction_ros.control import ControlMode
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.records.bag.messages import BagMessage, last_part, read_messages, stamp_ns
@@ -235,6 +236,8 @@ def _published_fits(messages: Iterable[BagMessage]) -> Iterator[tuple[int, Publi
         if message.type != JOINT_STATE or last_part(message.topic)[1] != "stiction":
             continue
         state = message.message
+        if state.header.frame_id == ControlMode.VALVE_TEST:
+            continue  # no fit
         columns = (state.name, state.position, state.velocity, state.effort)
         rows = {
             str(name): (float(value), float(low), float(high))

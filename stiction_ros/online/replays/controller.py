@@ -11,6 +11,7 @@ from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.loop import LoopModel
 from stiction_ros.online.controller.live import LiveController
+from stiction_ros.online.controller.testing import ValveTestingController
 from stiction_ros.online.input.applied_op import Given
 from stiction_ros.online.input.port import LONGEST_GAP
 from stiction_ros.online.input.samples import Sample
@@ -78,7 +79,7 @@ def replay_controller(
     Raises:
         InputError: settings that do not fit the model.
     """
-    live = LiveController(settings, model)
+    live = ValveTestingController(settings, model)
     recorded = _recorded_op(bag, model)
     step = round(model.sample_time * SECOND)
     notes: list[str] = []

@@ -155,7 +155,7 @@ def _gaps(found: Discrepancy) -> str:
         )
     head = ("output", "free run before", "after", "noise", "one step before", "after", "noise")
     closed = f"<p>{100.0 * found.closed:.0f} % of the free-run excess over the noise is gone "
-    return table(head, rows) + closed + "on samples that no figure was fitted to.</p>"
+    return table(head, rows) + closed + "on samples that were not used for the fit.</p>"
 
 
 def _look(found: Discrepancy, look: Look, k: int) -> list[str]:

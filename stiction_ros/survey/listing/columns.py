@@ -20,6 +20,7 @@ from stiction_ros.survey.pages.words import (
     period,
 )
 
+TEST = "worth a test"
 TREND = "friction before and now"
 
 HINTS = {
@@ -30,6 +31,8 @@ HINTS = {
     "OP lost": "share of OP's movement that does not reach the stem: the band f_S + f_D",
     "friction f_S": "static friction in % of travel, or in the units of an OP that has its own",
     "probability": "of friction in the valve",
+    TEST: "what a test in manual would take, where the record does not decide: its time, and how "
+    "far PV is expected to move (stiction valve-test plan)",
     "period": "of the cycle of PV − SP",
     "amplitude, PV units": "of the cycle of PV − SP",
     HEADS["service"]: "change of the mean |PV − SP| by a service of the valve, simulated: −75 % "
@@ -46,6 +49,7 @@ HINTS = {
 NONE = {
     "cycles by": "It was not found what makes the loop cycle.",
     "probability": "This method computes no probability.",
+    TEST: "No test is needed.",
     "period": "The loop does not cycle.",
     "amplitude, PV units": "The loop does not cycle.",
     "cost per hour": "No cost was given for this loop.",
@@ -106,6 +110,7 @@ class Columns:
             ("s", "OP lost"),
             ("s", "friction f_S"),
             ("", "probability"),
+            ("s", TEST),
             ("s", "period"),
             ("", "amplitude, PV units"),
             *(("", head) for head in HEADS.values() if self.gains),
@@ -126,6 +131,7 @@ class Columns:
             (percent(entry.band_share) if entry.found else "", entry.band_share),
             (_friction(entry), entry.f_s if entry.found else None),
             (percent(entry.probability), entry.probability),
+            _test(entry),
             _figure(None if cycle is None else cycle.period, period),
             _figure(None if cycle is None else cycle.amplitude, figure),
             *(_saved(entry, what) for what in HEADS if self.gains),
@@ -161,6 +167,13 @@ def _friction(entry: Entry) -> str:
         return ""
     between, shown = interval(entry.f_s_interval), op_figure(entry.f_s, entry.op_unit)
     return f'<span title="{text(between)}">{text(shown)}</span>'
+
+
+def _test(entry: Entry) -> Cell:
+    if entry.test is None:
+        return "", None
+    time, move = entry.test["duration"], entry.test["pv_move"]
+    return text(f"{period(time)}{'' if move is None else f', PV ±{figure(move)}'}"), time
 
 
 def _saved(entry: Entry, what: str) -> Cell:

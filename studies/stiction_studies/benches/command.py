@@ -22,7 +22,6 @@ from stiction_studies.benches import against
 from stiction_studies.benches.accuracy import field as bench_field
 from stiction_studies.benches.accuracy import gap as bench_gap
 from stiction_studies.benches.accuracy import plant as bench_plant
-from stiction_studies.benches.accuracy import stability as bench_stability
 from stiction_studies.benches.accuracy import world as bench_world
 from stiction_studies.benches.speed.row import Row
 from stiction_studies.commands import choices
@@ -43,9 +42,9 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "field": ("seeds", "method", "jobs", "oracle"),
     "gain": ("seeds", "jobs"),
     "plant": ("truth", "survey"),
-    "stability": ("seeds", "method", "data", "jobs"),
     "exports": ("seeds", "jobs"),
     "own": ("seeds", "jobs"),
+    "valve-test": ("seeds", "jobs"),
 }
 COLUMNS = ("case", "subject", "ms", "p99", "baseline", "ms", "baseline / subject")
 
@@ -56,9 +55,9 @@ def add(commands: Any) -> None:
         "bench",
         description="Measure speed against a baseline in the same run (graph, identification, "
         "control, record), or count how often the discrepancy workflow is right (gap; world: in "
-        "loops that share nothing with it), how often identification is (field), whether its "
-        "answers hold still (stability), whether what gain promises comes about (gain), what "
-        "the list of a survey is worth (plant), whether exports are read as they were written "
+        "loops that share nothing with it), how often identification is (field), whether "
+        "what gain promises comes about (gain), how tests in manual end (valve-test), what the "
+        "list of a survey is worth (plant), whether exports are read as they were written "
         "(exports), and what each controller makes of plants that it was not tuned for (own).",
     )
     parser.add_argument(
@@ -89,7 +88,6 @@ def add(commands: Any) -> None:
     bench_gap.add_options(parser)
     bench_world.add_options(parser)
     bench_field.add_options(parser)
-    bench_stability.add_options(parser)
     bench_plant.add_options(parser)
     turns = parser.add_argument_group("another version, side by side")
     turns.add_argument(
@@ -246,6 +244,12 @@ def _own(options: argparse.Namespace, machine: str) -> int:
     return bench_own_plant.run(options, machine)
 
 
+def _valve_test(options: argparse.Namespace, machine: str) -> int:
+    from stiction_studies.benches.accuracy import valve_test as bench_valve_test
+
+    return bench_valve_test.run(options, machine)
+
+
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
     "graph": _graph,
     "identification": _identification,
@@ -257,8 +261,8 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
     "gain": _gain,
     "plant": bench_plant.run,
-    "stability": bench_stability.run,
     "exports": _exports,
     "own": _own,
+    "valve-test": _valve_test,
     "world": bench_world.run,
 }

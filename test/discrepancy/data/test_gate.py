@@ -203,20 +203,12 @@ def test_rounding_leaves_what_rounding_leaves(step: float, told: bool) -> None:
 
 
 @pytest.mark.parametrize("step", [0.05, 0.2])
-@pytest.mark.parametrize("gain", [0.8, 0.5])
-def test_steps_of_op_tell_whether_the_tuning_is_the_recorded_one(gain: float, step: float) -> None:
-    """At the coarser step rounding leaves more of OP's moves than the other gain does."""
+def test_a_rounded_op_refutes_no_recorded_tuning(step: float) -> None:
     model = loop()
-    moved = record(dataclasses.replace(model, controller=PiTuning(gain, 12.0)), moves=False)
+    moved = record(dataclasses.replace(model, controller=PiTuning(0.8, 12.0)), moves=False)
     coarse = dataclasses.replace(moved, op=step * np.rint(moved.op / step))
     check = check_controller(model, join_records(model, [coarse]))
-    if gain == 0.8:
-        assert check.status is ControllerStatus.SAME
-        return
-    assert check.finding is not None
-    assert isinstance(check.finding.behaviour, Tuning)
-    assert check.finding.behaviour.gain == pytest.approx(gain, rel=0.02)
-    assert check.finding.behaviour.integral_time == pytest.approx(12.0, rel=0.05)
+    assert check.status is ControllerStatus.SAME
 
 
 @pytest.mark.parametrize("known", [True, False])

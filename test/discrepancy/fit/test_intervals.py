@@ -10,9 +10,14 @@ from gap_loops import loop, record
 from stiction_ros.discrepancy.candidate.wave import DisturbanceCandidate
 from stiction_ros.discrepancy.candidate.waves import SineWave, StepWave
 from stiction_ros.discrepancy.fit.baseline import Baseline
-from stiction_ros.discrepancy.fit.region import SMOOTH, STEPPED, Region
 from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
-from stiction_ros.discrepancy.fit.uncertainty import bootstrap_intervals, likelihood_intervals
+from stiction_ros.discrepancy.fit.uncertainty import (
+    SMOOTH,
+    STEPPED,
+    Region,
+    bootstrap_intervals,
+    likelihood_intervals,
+)
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects import FloatArray
 

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.discrepancy import GapOptions, find_discrepancy
-from stiction_ros.discrepancy.likelihood.grouped import grouped
-from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise
+from stiction_ros.discrepancy.likelihood.noise import Blocks, given_noise, grouped
 from stiction_ros.effects import Quantisation
 
 COUNT = 1500

@@ -12,9 +12,8 @@ STEP, WHITE = 0.3, 0.5  # variances of a walk and of the measurements
 
 
 def filtered(values: np.ndarray, seen: np.ndarray, begins: np.ndarray) -> tuple[np.ndarray, ...]:
-    half, one = 0.5 * STEP * np.ones((1, 1)), np.ones((1, 1))
-    always = np.ones(COUNT)
-    return innovations(one, half, half, always, np.ones(1), WHITE, 0.0 * one, values, seen, begins)
+    one = np.ones((1, 1))
+    return innovations(one, STEP * one, np.ones(1), WHITE, 0.0 * one, values, seen, begins)
 
 
 def first_row() -> np.ndarray:
@@ -51,23 +50,3 @@ def test_what_a_column_adds_is_added_to_what_is_missed() -> None:
     both = np.vstack([values, values.sum(axis=0)])
     white, _ = filtered(both, np.ones(COUNT, dtype=bool), first_row())
     assert white[2] == pytest.approx(white[0] + white[1])
-
-
-def test_states_are_driven_when_it_is_said() -> None:
-    one, values = np.ones((1, 1)), np.zeros((1, COUNT))
-    when = np.zeros(COUNT)
-    when[9] = 1.0
-    _, variances = innovations(
-        one,
-        0.0 * one,
-        STEP * one,
-        when,
-        np.ones(1),
-        WHITE,
-        0.0 * one,
-        values,
-        np.ones(COUNT, dtype=bool),
-        first_row(),
-    )
-    assert variances[:10] == pytest.approx(WHITE)
-    assert variances[10] == pytest.approx(WHITE + STEP)

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
 from stiction_ros.discrepancy.process.free_equation import Equation
-from stiction_ros.discrepancy.process.held import held, later, slower, zeros_of
-from stiction_ros.discrepancy.process.slower import Changeable
+from stiction_ros.discrepancy.process.slower import Changeable, held, later, slower, zeros_of
 from stiction_ros.effects import FloatArray
 
 LAGS = st.floats(1.5, 30.0)

@@ -9,7 +9,7 @@ import pytest
 
 from stiction_ros.identification import VerdictKind
 from stiction_ros.identification.closed_loop.repeated_runs import tried_frictions
-from stiction_ros.identification.exact.further_fit import widened
+from stiction_ros.identification.evidence.further import widened
 from stiction_ros.identification.result.identification import ValveEstimate
 
 VALVE = ValveEstimate(

@@ -7,6 +7,7 @@ import pytest
 import simulated_loops as loops
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from samples import stems
 
 from stiction_ros.identification import IdentificationOptions
 from stiction_ros.identification.exact.growing_patterns import first_slips
@@ -124,7 +125,7 @@ def test_no_point_of_the_rectangle_beats_its_cells(
     assert found is not None
     cells = cells_at(search.u, search.begin, np.array([[jump, reverse]]))
     f_d = 0.5 * (reverse - jump)
-    stem = cells.bases - f_d * cells.signs
+    stem = stems(cells, f_d)
     scan = search.scans[0]
     point = scan.count * float(np.log(scan.energy(StepSignals.of(stem)).min() / scan.count))
     assert search.evaluate(found).loss.min() <= point + 1e-6

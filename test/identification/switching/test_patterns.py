@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from samples import bases, stems
 
 from stiction_ros.effects import FloatArray, HeStiction
 from stiction_ros.identification.switching.patterns import (
@@ -32,9 +33,9 @@ def test_pattern_gives_the_stem_of_the_law(
     u, dynamic = random_walk(seed), share * static
     point = np.array([[static - dynamic, static + dynamic]])
     cells = resting_cells(u, np.full(3, level), np.repeat(point, 3, axis=0))
-    stems = cells.bases - dynamic * cells.signs
-    assert stems.shape == (len(u), 3)
-    assert np.abs(stems.T - simulated(u, static, dynamic, level)).max() < 1e-9
+    found = stems(cells, dynamic)
+    assert found.shape == (len(u), 3)
+    assert np.abs(found.T - simulated(u, static, dynamic, level)).max() < 1e-9
 
 
 @settings(max_examples=60, deadline=None)
@@ -50,13 +51,13 @@ def test_friction_inside_a_cell_has_its_pattern_and_none_outside(
     assert sl <= jump + more <= sh
     high = np.minimum([jh, sh], [jump + 1.0, jump + more + 1.0])
     inner = np.array([jl, sl]) + place * (high - [jl, sl])
-    assert (cells_at(u, begin, inner[None, :]).bases == cell.bases).all()
+    assert (bases(cells_at(u, begin, inner[None, :])) == bases(cell)).all()
     for outer in ([jl - 1e-6, inner[1]], [inner[0], sl - 1e-6]):
         if min(outer) > 0.0:
-            assert (cells_at(u, begin, np.array([outer])).bases != cell.bases).any()
+            assert (bases(cells_at(u, begin, np.array([outer]))) != bases(cell)).any()
     for outer in ([jh + 1e-6, inner[1]], [inner[0], sh + 1e-6]):
         if np.isfinite(outer).all():
-            assert (cells_at(u, begin, np.array([outer])).bases != cell.bases).any()
+            assert (bases(cells_at(u, begin, np.array([outer]))) != bases(cell)).any()
 
 
 @given(seed=seeds, static=st.floats(0.5, 5.0))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from samples import dense
 
 from stiction_ros.effects import HeStiction, KanoStiction
 from stiction_ros.identification.friction.grid import simulate
@@ -22,7 +23,7 @@ def test_moves_give_the_stem_of_the_law(
     u = np.random.default_rng(seed).standard_normal(samples).cumsum()
     steps = stem_steps(law, GRID, u, start)
     stems = simulate(law, GRID, u, start)
-    assert (steps.dense(0) == stems).all()
+    assert (dense(steps, 0) == stems).all()
     assert (steps.moves == np.count_nonzero(np.diff(stems, axis=0), axis=0)).all()
 
 
@@ -33,8 +34,8 @@ def test_dense_signals_come_back(seed: int, samples: int, size: int) -> None:
     one, two = generator.integers(0, 2, (2, samples, size)).astype(float)
     steps = StepSignals.of(one, two)
     assert (steps.size, steps.count) == (size, samples)
-    assert (steps.dense(0) == one).all()
-    assert (steps.dense(1) == two).all()
+    assert (dense(steps, 0) == one).all()
+    assert (dense(steps, 1) == two).all()
     assert (steps.moves == np.count_nonzero(np.diff(one, axis=0), axis=0)).all()
 
 
@@ -46,13 +47,13 @@ def test_joined_signals_are_those_of_the_parts(
     generator = np.random.default_rng(seed)
     parts = [generator.integers(0, 2, (samples, size)).astype(float) for size in sizes]
     joined = StepSignals.joined([StepSignals.of(part) for part in parts])
-    assert (joined.dense(0) == np.hstack(parts)).all()
+    assert (dense(joined, 0) == np.hstack(parts)).all()
 
 
 @given(seed=st.integers(0, 10_000), samples=st.integers(1, 40), chosen=st.lists(st.integers(0, 4)))
 @settings(deadline=None)
 def test_chosen_signals_are_those_asked_for(seed: int, samples: int, chosen: list[int]) -> None:
-    dense = np.random.default_rng(seed).integers(0, 2, (samples, 5)).astype(float)
-    steps = StepSignals.of(dense, 2.0 * dense).chosen(np.array(chosen, dtype=np.int64))
-    assert (steps.dense(0) == dense[:, chosen]).all()
-    assert (steps.dense(1) == 2.0 * dense[:, chosen]).all()
+    every = np.random.default_rng(seed).integers(0, 2, (samples, 5)).astype(float)
+    steps = StepSignals.of(every, 2.0 * every).chosen(np.array(chosen, dtype=np.int64))
+    assert (dense(steps, 0) == every[:, chosen]).all()
+    assert (dense(steps, 1) == 2.0 * every[:, chosen]).all()

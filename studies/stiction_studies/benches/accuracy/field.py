@@ -271,10 +271,12 @@ def table_row(name: str, rows: Sequence[Judged]) -> dict[str, Any]:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that this benchmark shares with ``stability``."""
+    """Add the options of this benchmark."""
     from stiction_studies.seeds import seed_range
 
-    group = parser.add_argument_group("field and stability; --seeds also for gain, --jobs for all")
+    group = parser.add_argument_group(
+        "field; --seeds also for gain, exports and own, --jobs for all"
+    )
     group.add_argument(
         "--seeds",
         type=seed_range,

@@ -1,4 +1,4 @@
-"""``stiction bench control``: one control step against do-mpc, IPOPT and the paper's programme.
+"""``stiction bench control``: one control step against IPOPT and the paper's programme.
 
 Problems are taken from the recorded limit cycle of a loop; all methods of a row solve the same.
 """
@@ -34,7 +34,6 @@ from stiction_ros.paper.controllers.weights import (
     augmented_weights,
 )
 from stiction_ros.records import Record
-from stiction_studies.benches.speed import do_mpc as bench_do_mpc
 from stiction_studies.benches.speed.row import Row, row
 from stiction_studies.examples import coupled_loop
 
@@ -53,7 +52,7 @@ class ControlPlan:
     """What a run of the benchmark works through.
 
     Attributes:
-        problems: of the loop of Example 2, for the quadratic programmes and do-mpc.
+        problems: of the loop of Example 2, for the quadratic programmes.
         programmes: of them, for the paper's embedding.
         growth: problems per point of growing horizons and valves.
         horizons: N_H that are tried, samples.
@@ -158,36 +157,15 @@ def tank(seed: int) -> Loop:
 
 
 def _unaware_rows(loop: Loop, count: int) -> list[Row]:
-    """Compare the plan alone, and a whole step, with what the others need for a plan."""
+    """Compare a plan with that of IPOPT."""
     design = loop.design()
     problems = loop.problems(count, aware=False)
-    whole = _whole_steps(design, loop.record)
     quadratic = UnawareMpc(design.model, design.unaware, design.limits)
     fast, plans = _timed(lambda at: _plan(quadratic, at), problems)
     ours = [_first_op(plan) for plan in plans]
     case = f"tank, N_H = {design.unaware.horizon}"
     times, theirs = _timed(_plain_ipopt(design), problems)
-    rows = [row(case, (SU, IPOPT), fast, times, _agreement(ours, theirs, times))]
-    package = bench_do_mpc.load()
-    if package is None:
-        rows[0] = dataclasses.replace(
-            rows[0],
-            note=f"{rows[0].note}; do-mpc is not installed and left out: {bench_do_mpc.INSTALL}",
-        )
-        return rows
-    other = bench_do_mpc.DoMpc(package, design.model, design.unaware, design.limits.stem)
-    times, theirs = _timed(other, problems)
-    # Before and after the baseline, as the speed of a machine drifts.
-    fast = np.append(fast, _timed(lambda at: _plan(quadratic, at), problems)[0])
-    whole = np.append(whole, _whole_steps(design, loop.record))
-    name = f"do-mpc {package.__version__}, make_step"
-    note = _agreement(ours, theirs, times)
-    more = f"{note}; observer and target are counted on this side only"
-    return [
-        row(case, (SU, name), fast, times, note),
-        row(case, ("SU, whole step", name), whole, times, more),
-        *rows,
-    ]
+    return [row(case, (SU, IPOPT), fast, times, _agreement(ours, theirs, times))]
 
 
 def _pair(loop: Loop, count: int, horizon: int) -> list[Row]:
@@ -264,20 +242,6 @@ def _plain_ipopt(design: ControlDesign) -> Callable[[PlanProblem], FloatArray]:
         return np.full(m, np.nan) if found.op is None else found.op[0]
 
     return solve
-
-
-def _whole_steps(design: ControlDesign, record: Record) -> FloatArray:
-    """Return ms per step of an unaware controller that follows ``record``."""
-    assert record.sp is not None
-    controller = MpcController(design, ControlMode.UNAWARE)
-    nothing = np.zeros(design.model.e.shape[1])
-    controller.start(record.op[0], record.pv[0])
-    times = np.empty(len(record) - 1)
-    for k in range(1, len(record)):
-        begin = time.perf_counter()
-        controller.step(record.pv[k], record.sp[k], nothing, record.op[k - 1])
-        times[k - 1] = 1e3 * (time.perf_counter() - begin)
-    return times[SETTLE:]
 
 
 def _timed(

@@ -207,7 +207,6 @@ def fight(plan: Plan, duel: Duel, begin: Callable[[str], Progress]) -> list[Row]
     limits = ", ".join(f"{limit:.3g}" for limit in friction_limits(record, nlp_options))
     assert isinstance(nlp.found, PaperIdentification)
     log = nlp.found.search
-    assert log is not None
     end = f"f_max {limits} %, SE with n_a = n_b = {duel.order}"
     points = count_points(record, grid_options)
     fine = count_points(record, dataclasses.replace(grid_options, grid_step=EQUAL))
@@ -296,11 +295,10 @@ def timed(
     while True:
         begun = time.perf_counter()
         share = _part(progress, len(times), repeat)
-        found: Identification
-        if isinstance(options, PaperOptions):
-            found = identify_as_paper(example.record, options, share)
-        else:
+        if isinstance(options, IdentificationOptions):
             found = identify(example.record, options, share)
+        else:
+            found = identify_as_paper(example.record, options, share)
         seconds = time.perf_counter() - begun
         times.append(seconds * 1e3)
         if len(times) == repeat or seconds > PATIENCE:

@@ -48,7 +48,6 @@ def _identified(seed: int, law: str, method: str) -> Row:
     found = identify(example.record, options)
     seconds = time.perf_counter() - begun
     valve, delay = found.valves[0], next(iter(found.outputs[0].delay.values()))
-    assert found.search is not None
     return Row(
         f"{law}, {method}",
         "can be applied",

@@ -13,7 +13,6 @@ from stiction_ros.paper.programme.nlp import WIDTH
 from stiction_ros.paper.programme.programme_data import ProgrammeData
 from stiction_ros.paper.programme.reduced_programme import ReducedProgramme
 from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
-from stiction_ros.signals.arx_fit import Delays
 from stiction_studies.examples import Example
 from stiction_studies.paper.exhibit import Exhibit, Row
 from stiction_studies.paper.settings import printed_example
@@ -47,7 +46,7 @@ class _Well:
         self.orders = check_record(record, options)
         self.limits = friction_limits(record, options)
         self.truth = np.array([example.friction(valve) for valve in record.valves])
-        self.delays: Delays = tuple(
+        self.delays = tuple(
             tuple(example.delay(output, valve) for valve in record.valves)
             for output in record.outputs
         )

@@ -1,4 +1,4 @@
-"""`stiction bench field` and `stiction bench stability`: their counting, options and variants."""
+"""`stiction bench field`: its counting and options."""
 
 from __future__ import annotations
 
@@ -10,21 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stiction_ros import identification
 from stiction_ros.cli.main import main
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Record
 from stiction_studies.benches.accuracy import field as bench_field
 from stiction_studies.benches.accuracy.answer import Answer, answer_of
 from stiction_studies.benches.accuracy.field import Judged, shares, splits
-from stiction_studies.benches.accuracy.stability import (
-    BASE,
-    VARIANTS,
-    Held,
-    Source,
-    sources,
-    varied,
-)
 
 
 def said(verdict: str = "sticky", **changes: Any) -> Answer:
@@ -155,79 +146,3 @@ def test_field_writes_rates_rows_and_loops(
         document["rows"][0]
     )
     assert [loop["seed"] for loop in document["loops"]] == [3, 4, 5]
-
-
-def record_of(count: int = 400) -> Record:
-    random = np.random.default_rng(0)
-    op = 50.0 + np.cumsum(random.standard_normal((count, 1)), axis=0)
-    return Record("r", 2.0, ("V",), ("P",), op, 2.0 * op, sp=2.0 * op, start=7.0)
-
-
-def test_variants_change_what_they_say() -> None:
-    record = record_of()
-    by_name = {variant.name: variant.applied(record) for variant in VARIANTS}
-    assert len(by_name) == len(VARIANTS)
-    assert len(by_name["without the first 30"]) == 370
-    assert np.array_equal(by_name["without the last 10"].op, record.op[:390])
-    assert np.array_equal(by_name["second half"].pv, record.pv[200:])
-    assert by_name["OP × 20 + 50"].op == pytest.approx(20.0 * record.op + 50.0)
-    changed = by_name["PV × 0.001 + 7"]
-    assert changed.sp is not None
-    assert changed.sp == pytest.approx(changed.pv)
-    assert by_name["time × 60"].sample_time == 120.0
-
-
-def test_frictions_come_back_in_the_record_s_own_unit(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Found:
-        def to_dict(self) -> dict[str, Any]:
-            valve = {"verdict": "sticky", "f_s_interval": [20.0, 40.0], "f_d_interval": [0.0, 2.0]}
-            return {"valves": [valve], "outputs": [{}]}
-
-    monkeypatch.setattr(identification, "identify", lambda record, options: Found())
-    variant = next(variant for variant in VARIANTS if variant.op[0] == 20.0)
-    assert varied("exact", record_of(), variant).f_s == (1.0, 2.0)
-    assert varied("exact", record_of(), variant).band == (1.0, 2.1)
-
-
-def held(**verdicts: Answer) -> Held:
-    answers = {variant.name: said() for variant in VARIANTS}
-    names = {variant.name.replace(" ", "_"): variant.name for variant in VARIANTS}
-    answers |= {names[key]: answer for key, answer in verdicts.items()}
-    return Held(Source("r", label=True), answers)
-
-
-def test_turns_and_units_are_counted() -> None:
-    assert not held().turned
-    assert not held(first_half=said("undecided")).turned
-    assert held(first_half=said("healthy")).turned
-    assert not held(first_half=said("healthy")).units_count
-    assert held(**{"time_×_60": said("undecided")}).units_count
-    assert held().contradicted is False
-
-
-def test_intervals_that_do_not_meet_are_named() -> None:
-    row = held(second_half=said(f_s=(3.0, 4.0)))
-    apart = [name for name, met in row.overlaps("f_s", True) if not met]
-    assert apart == [f"{BASE.name} | second half", "first half | second half"]
-    assert all(met for _, met in row.overlaps("band", True))
-
-
-def test_a_folder_gives_its_records_and_labels(tmp_path: Path) -> None:
-    (tmp_path / "a").mkdir()
-    (tmp_path / "a" / "index.csv").write_text("loop,sticky\nX1,1\nX2,0\n")
-    for name in ("X1", "X2", "X3"):
-        (tmp_path / "a" / f"{name}.csv").write_text("t,OP,PV\n0,1,2\n1,2,3\n")
-    (tmp_path / "act.csv").write_text("t,CV_pct,X_pct,F_t_h,LEVEL_pct\n0,1,2,3,4\n1,2,3,4,5\n")
-    found = sources((3, 4), tmp_path)
-    assert [source.label for source in found] == [True, False, None, False, False, None, None]
-    assert found[3].read().outputs == ("PV1",)
-    assert [source.seed for source in found[-2:]] == [3, 4]
-
-
-def test_a_folder_that_is_not_there_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["bench", "stability", "--data", str(tmp_path / "none")]) == 2
-    assert "is no folder" in capsys.readouterr().err
-    assert main(["bench", "stability", "--data", str(tmp_path)]) == 2
-    assert main(["bench", "field", "--data", str(tmp_path)]) == 2

@@ -11,7 +11,6 @@ import pytest
 
 from stiction_ros.cli.main import main
 from stiction_studies.benches.speed import control as bench_control
-from stiction_studies.benches.speed import do_mpc as bench_do_mpc
 from stiction_studies.benches.speed.control import FULL, ControlPlan, Loop, sticky_valves, tank
 
 TINY = ControlPlan(problems=4, programmes=2, growth=2, horizons=(5,), valves=(1, 2))
@@ -19,11 +18,10 @@ TINY = ControlPlan(problems=4, programmes=2, growth=2, horizons=(5,), valves=(1,
 
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """What the command writes where do-mpc is missing."""
+    """What the command writes."""
     path: Path = tmp_path_factory.mktemp("bench") / "rows.json"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bench_control, "QUICK", TINY)
-        patch.setattr(bench_do_mpc, "load", lambda: None)
         assert main(["bench", "control", "--quick", "--seed", "3", "--json", str(path)]) == 0
     document = json.loads(path.read_text(encoding="utf-8"))
     assert document["name"] == "control"
@@ -50,10 +48,6 @@ def test_ratio_is_baseline_over_subject(rows: list[dict[str, Any]]) -> None:
         assert row["p99_ms"] >= row["subject_ms"] > 0.0
 
 
-def test_a_missing_do_mpc_is_told_with_the_way_to_install_it(rows: list[dict[str, Any]]) -> None:
-    assert rows[0]["note"].endswith("not installed and left out: pip install do-mpc")
-
-
 def test_the_full_run_covers_what_was_asked() -> None:
     assert FULL.horizons == (10, 20, 50, 100, 200)
     assert FULL.valves == (1, 2, 3)
@@ -74,15 +68,6 @@ def unaware_ops(loop: Loop) -> list[Any]:
 def test_ipopt_solves_the_same_problem(loop: Loop) -> None:
     solver = bench_control._plain_ipopt(loop.design())
     theirs = [solver(at) for at in loop.problems(5, aware=False)]
-    assert np.array(theirs) == pytest.approx(np.array(unaware_ops(loop)), abs=1e-5)
-
-
-def test_do_mpc_solves_the_same_problem(loop: Loop) -> None:
-    pytest.importorskip("do_mpc")
-    package, design = bench_do_mpc.load(), loop.design()
-    assert package is not None
-    other = bench_do_mpc.DoMpc(package, design.model, design.unaware, design.limits.stem)
-    theirs = [other(at) for at in loop.problems(5, aware=False)]
     assert np.array(theirs) == pytest.approx(np.array(unaware_ops(loop)), abs=1e-5)
 
 

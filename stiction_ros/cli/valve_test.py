@@ -1,0 +1,146 @@
+"""``stiction valve-test``: a test of a valve in manual, planned and judged."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stiction_ros.cli.shared.as_json import hand_over
+from stiction_ros.cli.shared.intake_options import (
+    add_columns,
+    add_intake,
+    intake_options,
+    opened,
+    show_loops,
+    tell,
+)
+from stiction_ros.cli.shared.progress import bar
+from stiction_ros.errors import InputError, storing
+from stiction_ros.records.parts import longest_part
+from stiction_ros.texts import spoken
+
+if TYPE_CHECKING:
+    from stiction_ros.identification.valve_test.facts import Limits
+    from stiction_ros.identification.valve_test.judgement import Judgement
+    from stiction_ros.identification.valve_test.plan import Facts, Plan
+    from stiction_ros.records.record import Record
+
+NEXT = "stiction valve-test judge TEST"
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "valve-test",
+        description="plan: from a record of the loop as it runs, the moves of OP in manual that "
+        "would decide whether the valve sticks, as a procedure to follow by hand. judge: from the "
+        "record of these moves, the verdict, or the next moves.",
+    )
+    parser.add_argument("what", choices=("plan", "judge"), help="what to do")
+    parser.add_argument("record", metavar="RECORD|TEST", help="CSV file, other export, or bag")
+    add_columns(parser)
+    add_intake(parser)
+    parser.add_argument(
+        "--before", metavar="RECORD", help="judge: the record that the test was planned from"
+    )
+    parser.add_argument(
+        "--op-limit", type=float, metavar="X", help="how far OP may go from where it is, %%"
+    )
+    parser.add_argument(
+        "--pv-limit", type=float, metavar="X", help="how far PV may go, in its own unit"
+    )
+    parser.add_argument("--json", metavar="F", help="write the result as JSON; - for stdout")
+    parser.add_argument("--out", metavar="F.csv", help="write the moves: seconds and OP")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.dry_run:
+        return show_loops([Path(options.record)], intake_options(options))
+    limits = _limits(options)
+    loop = opened(options)
+    tell(loop)
+    if options.what == "plan":
+        from stiction_ros.identification.valve_test.plan import first_round
+
+        facts = _before(longest_part(loop.parts), limits)
+        plan = first_round(facts)
+        hand_over(options.json, plan.to_dict(), lambda: _show(plan, str(options.record)))
+        _write(plan, options.out)
+        return 0
+    from stiction_ros.identification.valve_test.answer import answer
+
+    before: Facts | None = None
+    if options.before is not None:
+        given = argparse.Namespace(**(vars(options) | {"record": options.before}))
+        before = _before(longest_part(opened(given).parts), limits)
+    record = max(loop.parts, key=len)
+    with bar("judging"):
+        said = answer(record, before, limits)
+    hand_over(options.json, said.to_dict(), lambda: _told(said.judgement, said.plan, options))
+    _write(said.plan, options.out, said.judgement.trial.steps.levels[1:].tolist())
+    return 0
+
+
+def _limits(options: argparse.Namespace) -> Limits:
+    from stiction_ros.identification.valve_test.facts import Limits
+
+    for name in ("op_limit", "pv_limit"):
+        value = getattr(options, name)
+        if value is not None and not 0.0 < value < 1e300:
+            raise InputError(
+                f"{value:g} is no distance", where=f"--{name.replace('_', '-')}", fix="use above 0"
+            )
+    return Limits(options.op_limit, options.pv_limit)
+
+
+def _before(record: Record, limits: Limits) -> Facts:
+    """Return what a record of the loop as it runs tells."""
+    from stiction_ros.identification import identify
+    from stiction_ros.identification.valve_test.facts import facts_before
+
+    with bar("identifying") as show:
+        found = identify(record, None, show)
+    return facts_before(record, found, limits)
+
+
+def _write(plan: Plan | None, target: str | None, made: Sequence[float] = ()) -> None:
+    """Write the moves of a round behind those that were made: a test is one record."""
+    if target is None or plan is None:
+        return
+    with storing(target), Path(target).open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(("after", "OP"))
+        rows.writerows(
+            (i * plan.facts.hold, level) for i, level in enumerate((*made, *plan.levels))
+        )
+
+
+def _show(plan: Plan, before: str | None) -> None:
+    """Print a round as a procedure that an operator follows by hand."""
+    facts, hold = plan.facts, spoken(plan.facts.hold)
+    low, high = facts.pv_limit
+    print(f"Valve test of {facts.valve}, {len(plan.levels)} moves, {spoken(plan.duration)}")
+    print(f"  1. Put the loop in manual at OP {facts.op:.4g} % and wait until PV rests.")
+    print(f"  2. Begin to record OP and PV; wait for another {hold}.")
+    for i, level in enumerate(plan.levels):
+        print(f"  {i + 3}. Set OP to {level:.4g} % and wait for {hold}.")
+    print(f"  {len(plan.levels) + 3}. Stop recording, and put the loop back as it was.")
+    print(f"Set OP back to {facts.op:.4g} % at once and stop if PV leaves {low:.4g} to {high:.4g}.")
+    if plan.pv_move is None:
+        print("How far PV will move is not known: make sure that it may.")
+    else:
+        print(f"PV is expected to move by up to {plan.pv_move:.3g}.")
+    print(f"Then: {NEXT}{'' if before is None else f' --before {before}'}")
+
+
+def _told(judgement: Judgement, plan: Plan | None, options: argparse.Namespace) -> None:
+    """Print the verdict, and the next round where it is still open."""
+    print(judgement.sentence)
+    if plan is not None:
+        print("The next moves follow on those that are recorded; give both in one record.")
+        _show(plan, options.before)

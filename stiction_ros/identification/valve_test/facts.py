@@ -1,0 +1,159 @@
+"""What a record of a loop, or of a test, tells for the next round of the test."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from stiction_ros.errors import InputError
+from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.identification.evidence.sensor_hold import held_rows
+from stiction_ros.identification.result.identification import Identification
+from stiction_ros.identification.valve_test.frictions import SMALLEST
+from stiction_ros.identification.valve_test.judgement import Judgement, judged
+from stiction_ros.identification.valve_test.plan import CLEAR, WIDENS, Facts
+from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
+from stiction_ros.records.quality import Quality
+from stiction_ros.records.record import Record
+
+LAGS = 1.8
+"""Lags of a hold: PV then shows five sixths of its answer, the model tells the rest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Limits:
+    """How far a test may go from where it begins; None where that is not said.
+
+    Attributes:
+        op: %.
+        pv: engineering units.
+    """
+
+    op: float | None = None
+    pv: float | None = None
+
+    def of(self, facts: Facts) -> Facts:
+        """Return facts with these limits in place of theirs."""
+        op = facts.op_limit if self.op is None else self.op
+        reach = facts.pv_limit
+        if self.pv is not None:
+            reach = facts.pv - self.pv, facts.pv + self.pv
+        return dataclasses.replace(facts, op_limit=op, pv_limit=reach)
+
+
+def facts_before(record: Record, found: Identification, limits: Limits) -> Facts:
+    """Return what a routine record of a loop tells.
+
+    OP may go by twice the largest f_S that the record does not reject, PV as far as that moves it.
+
+    Args:
+        record: of one valve and one output.
+        found: what identification made of it.
+        limits: of the test.
+
+    Raises:
+        InputError: several valves or outputs.
+    """
+    _of_one_loop(record)
+    valve, step = found.valves[0], record.sample_time
+    answer = StepAnswer.of(found.outputs[0], valve.name, len(record), step)
+    facts = facts_of_answer(answer, valve.name, float(record.op[-1, 0]), 0.0)
+    pv = float(record.pv[-round(facts.hold / step) :, 0].mean())
+    reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
+    room = max(float(np.abs(record.pv[:, 0] - pv).max()), reach * abs(facts.gain or 0.0))
+    facts = dataclasses.replace(facts, pv=pv, op_limit=reach, pv_limit=(pv - room, pv + room))
+    return limits.of(facts)
+
+
+def facts_of_answer(answer: StepAnswer, valve: str, op: float, pv: float) -> Facts:
+    """Return what the answer to a step tells, without limits.
+
+    A move is held for the dead time and :data:`LAGS` lags; where PV does not settle until the
+    smallest pair of moves shows, but for no longer than half of the answer that is known.
+
+    Args:
+        answer: of PV to 1 % of stem.
+        valve: tag.
+        op, pv: where the test begins, % and engineering units.
+    """
+    step, known = answer.sample_time, len(answer.values)
+    least, longest = SHORTEST + 1, max(known // 2, SHORTEST + 1)
+    if answer.lag is not None:
+        samples = (answer.dead_time + LAGS * answer.lag) / step
+    else:
+        slope = abs(float(answer.values[-1])) / known
+        samples = 0.5 * CLEAR * answer.noise / max(SMALLEST * slope, 1e-300)
+        samples = min(answer.dead_time / step + max(samples, least), longest)
+    count = max(math.ceil(samples - 1e-9), least)
+    gain: float | None = None
+    if np.isfinite(answer.values).all() and np.abs(answer.values).max() > 0.0:
+        gain = float(answer.values[min(count, known - 1)]) or None
+    noise = answer.noise / math.sqrt(count)
+    everywhere = (-math.inf, math.inf)
+    return Facts(valve, op, pv, gain, noise, answer.dead_time, count * step, math.inf, everywhere)
+
+
+def facts_of_test(record: Record, judgement: Judgement, limits: Limits) -> Facts:
+    """Return what a test tells where nothing was known before it.
+
+    OP and PV may go by :data:`WIDENS` squared times as far as they went.
+    """
+    trial = judgement.trial
+    levels, pv = trial.steps.levels, float(trial.pv[: int(trial.steps.rows[0])].mean())
+    room = WIDENS**2 * float(np.abs(trial.pv - pv).max())
+    facts = Facts(
+        valve=record.valves[0],
+        op=float(levels[0]),
+        pv=pv,
+        gain=None,
+        noise=0.0,
+        dead=0.0,
+        hold=trial.hold * record.sample_time,
+        op_limit=WIDENS**2 * trial.steps.reach,
+        pv_limit=(pv - room, pv + room),
+    )
+    return limits.of(facts)
+
+
+def judged_record(record: Record, gain: float | None = None) -> Judgement:
+    """Return the verdict on a record of a test: of what is marked as manual, if anything is.
+
+    Args:
+        record: of one valve and one output.
+        gain: what 1 % of the stem makes of PV within a hold, where that was known before.
+
+    Raises:
+        InputError: several valves or outputs, or OP does not move as by hand.
+    """
+    _of_one_loop(record)
+    wanted = (Quality.GOOD, Quality.HELD)
+    if (record.quality == Quality.MANUAL).any():
+        wanted = (Quality.MANUAL, Quality.HELD)
+    rows = max(record.usable_rows(wanted), key=lambda each: each[1] - each[0], default=(0, 0))
+    part = record.part(*rows)
+    steps = Steps.of(part.op[:, 0])
+    if why := steps.refusal():
+        raise InputError(
+            f"is no test in manual: {why}",
+            where=record.name,
+            fix="record OP moved by hand, or judge the loop by stiction identify",
+        )
+    measured = len(part) - int(held_rows(part.pv[:, 0]).sum())
+    if measured <= SHORTEST + len(steps.rows):
+        raise InputError(
+            f"PV shows {measured} values that are measured, too few for its moves of OP",
+            where=record.name,
+            fix="record PV at a shorter sample time, or hold each move for longer",
+        )
+    return judged(part.op[:, 0], part.pv[:, 0], gain)
+
+
+def _of_one_loop(record: Record) -> None:
+    if len(record.valves) != 1 or len(record.outputs) != 1:
+        raise InputError(
+            f"has {len(record.valves)} valves and {len(record.outputs)} outputs",
+            where=record.name,
+            fix="name the one valve and the one output of the test by --op and --pv",
+        )

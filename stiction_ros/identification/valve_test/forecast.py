@@ -1,0 +1,102 @@
+"""What further moves of OP would make of PV, by all that a test leaves possible."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import ndtr
+
+from stiction_ros.effects.behaviour import FloatArray, IntArray
+from stiction_ros.identification.valve_test.judgement import Judgement
+from stiction_ros.identification.valve_test.likelihood import (
+    CURVATURE,
+    KNOWN,
+    OWN_ERROR,
+    Shape,
+)
+from stiction_ros.identification.valve_test.search import UNSHOWN, Explanation, Trial
+from stiction_ros.identification.valve_test.steps import Steps
+
+
+@dataclasses.dataclass(frozen=True)
+class Forecast:
+    """PV a dead time after the ends of further holds, where it has gone farthest.
+
+    Attributes:
+        pv: of an ideal valve and under each friction, shape (1 + G, J).
+        alike: the same from now on, by one gain and one process for all, which tells stems apart.
+        weights: how likely each is, shape (1 + G,).
+        spread: standard deviation of what is left open of each: where PV is, how the load walks,
+            how the gain changes with the opening, shape (J,).
+        noise: the same of the mean of PV over each hold, shape (J,).
+    """
+
+    pv: FloatArray
+    alike: FloatArray
+    weights: FloatArray
+    spread: FloatArray
+    noise: FloatArray
+
+    @classmethod
+    def of(cls, judgement: Judgement, levels: Sequence[float]) -> Forecast:
+        """Return it.
+
+        Args:
+            judgement: of the test so far.
+            levels: OP after each further move, %, shape (J,).
+        """
+        trial, friction = judgement.trial, judgement.probability
+        hold, count = round(trial.hold), len(trial.pv)
+        best, shape = judgement.sticky, Shape.of(judgement.sticky.dynamics, trial.hold)
+        rows = np.append(trial.steps.rows, count + hold * np.arange(len(levels)))
+        lead = np.asarray(levels) - trial.steps.levels[0]
+        path = np.append(trial.steps.levels, levels)
+        ends = hold * np.arange(1, len(levels) + 1)
+        cells = judgement.frictions.along(Steps(rows, path, count + int(ends[-1])))
+        ideal, sticky = (
+            _to_come(judgement.ideal, trial, rows, ends),
+            _to_come(best, trial, rows, ends),
+        )
+        stems = np.vstack([np.diff(path), cells.moves[cells.which]])
+        pv = stems @ sticky
+        gain = judgement.gain / max(float(shape.shown(trial.hold)), UNSHOWN)
+        alike = gain * pv
+        pv[0] = judgement.ideal.gains[0] * (stems[0] @ ideal)
+        pv[1:] *= best.gains[judgement.frictions.which][:, None]
+        recent = trial.pv[trial.seen][-max(hold // 4, 1) :]
+        own = judgement.gain**2 * (OWN_ERROR**2 + (CURVATURE * lead**2) ** 2)
+        walked = shape.load * (ends + shape.dead) + 1.0 / len(recent)
+        return cls(
+            recent.mean() + pv,
+            alike,
+            np.append(1.0 - friction, friction * best.cells(judgement.frictions)),
+            np.sqrt(best.noise**2 * walked + own),
+            np.sqrt(best.noise**2 * shape.unsure(trial.hold) + own),
+        )
+
+    def beyond(self, low: float, high: float) -> float:
+        """Return how likely PV is beyond a limit at one of the ends, at least."""
+        above = ndtr((self.pv - high) / self.spread) + ndtr((low - self.pv) / self.spread)
+        return float(self.weights @ above.max(axis=1))
+
+    def apart(self, sizing: bool) -> float:
+        """Return how well PV would tell the frictions, 0 to 1, from an ideal valve or each other.
+
+        One less the Bhattacharyya coefficient of two Gaussians of the same width, on average.
+        """
+        middle, frictions = self.alike[0], self.alike[1:]
+        if sizing:
+            middle = self.weights[1:] @ frictions / self.weights[1:].sum()
+        apart, straight = (frictions - middle) / self.noise, self.alike[0] / self.noise
+        energy = (apart**2).sum(axis=1)
+        energy -= (apart @ straight) ** 2 / (KNOWN**-2 + straight @ straight)  # another gain
+        return float(self.weights[1:] @ -np.expm1(-energy / 8.0))
+
+
+def _to_come(explanation: Explanation, trial: Trial, rows: IntArray, ends: IntArray) -> FloatArray:
+    """Return what PV is to show of steps from now until a dead time after each end, (M, J)."""
+    shape = Shape.of(explanation.dynamics, trial.hold)
+    since = len(trial.pv) - rows[:, None]
+    return shape.shown(since + ends + shape.dead) - shape.shown(since)

@@ -1,0 +1,199 @@
+r"""How likely PV is under each friction, for one process and one noise.
+
+.. math::
+
+    y_k = c_0 + c_1 (1 - e^{-t_k/\tau_1}) + K \sum_i (\Delta\chi_i + \delta_i) s_{k - r_i} + v_k
+
+with the step response s of two lags and a dead time, moves Δχ of the stem at the steps r_i of OP,
+and v a load that walks at random behind the first lag, first-order noise and white noise. The walk
+of the load and c_1 make a level possible, whose first lag is longer than the record. The moves are
+those of a friction law, but for δ: what the law leaves out, and a gain that changes with the
+opening. c is flat, K is known from before or has unit information (Kass and Wasserman 1995, Am.
+Stat. 90, 928), 1/σ² of the
+innovations is flat over log σ; all are integrated out, so that one number compares frictions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction_ros.effects.behaviour import BoolArray, FloatArray
+from stiction_ros.identification.valve_test.step_kernels import step_answers, white_rows
+from stiction_ros.identification.valve_test.steps import Steps
+
+OWN_ERROR = 0.05
+"""Standard deviation of what a law leaves out of a move, %: an eighth of the smallest friction."""
+KNOWN = 0.5
+"""Standard deviation of a gain that was known before the test, over it: weak, as such a gain comes
+from a record that hardly moves, or from the model of a controller."""
+ROUNDING = 1e-12  # share of PV's energy that computing leaves where nothing else does
+CURVATURE = math.log(50.0) / 200.0
+"""Half the relative change of the gain per % of travel of an equal percentage valve of rangeability
+50, the largest that is usual (IEC 60534-2-4)."""
+
+
+class Dynamics(NamedTuple):
+    """Process and noise in numbers that are searched without bounds.
+
+    Attributes:
+        lag: log of the first lag over the median hold.
+        second: log-odds of the second lag over the first, or over the hold where that is shorter.
+        dead: log-odds of the dead time over the median hold, in which PV answers each move: by a
+            dead time of a whole hold each move could be taken for the one before.
+        load: log of the variance of a step of the load over that of white noise; the load counts
+            by what it makes of PV in a hold.
+        kept: log-odds of the share that first-order noise keeps in a sample.
+        noise: log of its variance over that of white noise.
+    """
+
+    lag: float
+    second: float
+    dead: float
+    load: float
+    kept: float
+    noise: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Shape:
+    """Process and noise in samples.
+
+    Attributes:
+        first, second, dead: lags and dead time, samples.
+        load: variance of a step of the load.
+        noise: share kept in a sample, and variance.
+    """
+
+    first: float
+    second: float
+    dead: float
+    load: float
+    noise: FloatArray
+
+    @classmethod
+    def of(cls, dynamics: Dynamics, hold: float) -> Shape:
+        """Return them for a median hold of ``hold`` samples."""
+        first = hold * math.exp(dynamics.lag)
+        late = max(first / hold, 1.0)
+        return cls(
+            first,
+            0.999 * _share(dynamics.second) * min(first, hold),
+            hold * _share(dynamics.dead),
+            math.exp(dynamics.load) * late**2,
+            np.array([_share(dynamics.kept), math.exp(dynamics.noise)]),
+        )
+
+    def shown(self, samples: Any) -> FloatArray:
+        """Return how much of a step PV shows after some samples, but for the second lag."""
+        return np.asarray(-np.expm1(-np.maximum(samples - self.dead, 0.0) / self.first))
+
+    def unsure(self, samples: float) -> float:
+        """Return the variance of the mean of PV over some samples, load and noise together."""
+        kept, variance = self.noise
+        held = min((1.0 + kept) / (1.0 - kept) / samples, 1.0)
+        return float(1.0 / samples + variance * held + self.load * samples)
+
+
+def log_sum(logs: FloatArray) -> float:
+    """Return log Σ exp of some numbers."""
+    most = float(logs.max())
+    return most + math.log(float(np.exp(logs - most).sum()))
+
+
+def _share(odds: float) -> float:
+    return 1.0 / (1.0 + math.exp(-odds))
+
+
+@dataclasses.dataclass(frozen=True)
+class Answered:
+    """PV and the answers to steps under one process and one noise, made white.
+
+    Attributes:
+        gram: of the answers, shape (M, M).
+        beside: of the answers with PV, shape (M,).
+        energy: of PV.
+        count: samples that count, less those that the two levels take up.
+        constant: what is added to every log likelihood.
+        bend: change of the square of OP, from where it began, at each step, %², shape (M,).
+    """
+
+    gram: FloatArray
+    beside: FloatArray
+    energy: float
+    count: int
+    constant: float
+    bend: FloatArray
+
+    @classmethod
+    def of(cls, pv: FloatArray, seen: BoolArray, steps: Steps, shape: Shape) -> Answered:
+        """Return them.
+
+        Args:
+            pv: shape (N,).
+            seen: samples that were measured, shape (N,).
+            steps: of OP.
+            shape: process and noise.
+        """
+        answers = step_answers(steps.rows, len(pv), shape.first, shape.second, shape.dead)
+        fading = -np.expm1(-np.arange(len(pv)) / shape.first)
+        middle = pv - pv[seen].mean()
+        columns = np.column_stack([answers, np.ones(len(pv)), fading / fading[-1], middle])
+        white, logarithms = white_rows(columns, seen, shape.first, shape.load, shape.noise)
+        gram, count = white.T @ white, len(steps.rows)
+        levels, others = slice(count, count + 2), np.append(np.arange(count), count + 2)
+        within, across = gram[levels, levels], gram[levels][:, others]
+        rest = gram[np.ix_(others, others)] - across.T @ np.linalg.solve(within, across)
+        return cls(
+            rest[:-1, :-1],
+            rest[:-1, -1],
+            float(rest[-1, -1]),
+            len(white) - 2,
+            -logarithms - 0.5 * float(np.linalg.slogdet(within)[1]),
+            np.diff((steps.levels - steps.levels[0]) ** 2),
+        )
+
+    def likelihoods(
+        self, moves: FloatArray, gain: float | None
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Return the log likelihood of moves of the stem, K, (U,) each, and σ of the best.
+
+        Args:
+            moves: at each step of OP, %, shape (U, M).
+            gain: K as it was known before; None where it was not.
+        """
+        with_pv, across = moves @ self.beside, moves @ self.gram
+        own = _sums(across, moves)
+        best = int(np.argmax(with_pv**2 / own))
+        variance = max(self.energy - with_pv[best] ** 2 / own[best], 1e-300) / self.count
+        spread = self._spread((with_pv[best] / own[best]) ** 2 / variance)
+        inner = np.linalg.inv(np.eye(len(spread)) + spread @ self.gram)
+        taken = inner @ spread
+        with_pv = with_pv - across @ (taken @ self.beside)
+        own = _sums(across, moves - across @ taken)
+        energy = self.energy - float(self.beside @ taken @ self.beside)
+        told, known = own / self.count, 0.0  # unit information
+        if gain:
+            told, known = np.full(len(own), variance / (KNOWN * gain) ** 2), gain
+        gains = (with_pv + told * known) / (own + told)
+        left = energy + told * known**2 - (with_pv + told * known) * gains
+        left = np.maximum(left, ROUNDING * self.energy)
+        half = 0.5 * self.count
+        found = -half * np.log(left) + 0.5 * np.log(told / (own + told))
+        found += 0.5 * np.linalg.slogdet(inner)[1]
+        found[~moves.any(axis=1)] = -half * math.log(self.energy)
+        noise = math.sqrt(float(left[np.argmax(found)]) / self.count)
+        return self.constant + found, gains, noise
+
+    def _spread(self, scale: float) -> FloatArray:
+        """Return the covariance of δ K / σ, shape (M, M)."""
+        own = OWN_ERROR**2 * np.eye(len(self.bend))
+        return np.asarray(scale * (own + CURVATURE**2 * np.outer(self.bend, self.bend)))
+
+
+def _sums(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the sum of the products of each two rows, above 0, shape (U,)."""
+    return np.asarray(np.maximum(np.einsum("ij,ij->i", one, other), 1e-300))

@@ -1,0 +1,174 @@
+"""The steps of OP in manual that would decide on a valve, bounded in OP and PV."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stiction_ros.identification.valve_test.forecast import Forecast
+from stiction_ros.identification.valve_test.frictions import LARGEST, SMALLEST
+from stiction_ros.identification.valve_test.judgement import DECIDED, Judgement
+from stiction_ros.texts import spoken
+
+CLEAR = 4.0
+"""Standard deviations of PV's noise that the answer to the first pair makes, where it may."""
+WIDENS = 2.5
+"""Times by which a pair is wider than the one before: five go from the smallest friction of
+interest to the largest."""
+SIZES = 12  # of pairs that a further round is chosen from
+PAIRS, LOOKS = 3, 2  # pairs of a round, and those of which PV is forecast when it begins
+ROUNDS = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Facts:
+    """What is known of a loop before a round of its test.
+
+    Attributes:
+        valve: tag.
+        op, pv: where the test begins, % and engineering units.
+        gain: what 1 % of the stem makes of PV within a hold, engineering units, sign included; None
+            where it is not known.
+        noise: standard deviation of the mean of PV over a hold, same units.
+        dead: time after which PV begins to answer, s.
+        hold: s between two moves.
+        op_limit: how far OP may go from ``op``, %.
+        pv_limit: lowest and highest PV, engineering units.
+    """
+
+    valve: str
+    op: float
+    pv: float
+    gain: float | None
+    noise: float
+    dead: float
+    hold: float
+    op_limit: float
+    pv_limit: tuple[float, float]
+
+    @property
+    def widest(self) -> float:
+        """How far OP may go from its start without PV passing its limit, %."""
+        most = min(self.op_limit, LARGEST)
+        if not self.gain:
+            return most
+        low, high = self.pv_limit
+        return min(most, max(min(high - self.pv, self.pv - low), 0.0) / abs(self.gain))
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """One round of a test.
+
+    Attributes:
+        facts: of the loop.
+        levels: OP after each move, %; the last is where it began.
+    """
+
+    facts: Facts
+    levels: tuple[float, ...]
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first move until the last has been held."""
+        return self.facts.hold * len(self.levels)
+
+    @property
+    def reach(self) -> float:
+        """How far OP goes from its start, %."""
+        return max(abs(level - self.facts.op) for level in self.levels)
+
+    @property
+    def pv_move(self) -> float | None:
+        """How far PV goes from its start with an ideal valve, engineering units."""
+        return None if self.facts.gain is None else abs(self.facts.gain) * self.reach
+
+    @property
+    def sentence(self) -> str:
+        """What is done, in one sentence."""
+        facts = self.facts
+        levels = ", ".join(f"{level:.4g}" for level in self.levels)
+        return (
+            f"In manual, move OP of {facts.valve} to {levels} %, each held for "
+            f"{spoken(facts.hold)}; return it to {facts.op:.4g} % at once where PV leaves "
+            "{:.4g} to {:.4g}.".format(*facts.pv_limit)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mapping of ``valve-test plan --json``."""
+        facts = self.facts
+        return {
+            "valve": facts.valve,
+            "start": {"op": facts.op, "pv": facts.pv},
+            "moves": [{"after": i * facts.hold, "op": op} for i, op in enumerate(self.levels)],
+            "duration": self.duration,
+            "pv_limit": list(facts.pv_limit),
+            "return_op": facts.op,
+            "expected": {"pv_move": self.pv_move, "decides_above": SMALLEST},
+            "sentence": self.sentence,
+        }
+
+
+def first_round(facts: Facts) -> Plan:
+    """Return the first round: the smallest pairs whose answer PV's noise does not hide."""
+    seen = 0.5 * CLEAR * facts.noise / abs(facts.gain) if facts.gain else 0.0
+    return _round(facts, max(SMALLEST, seen))
+
+
+def further_round(facts: Facts, judgement: Judgement, sizing: bool = False) -> Plan | None:
+    """Return the next round: the pairs that tell most, or wider ones where PV did not answer.
+
+    The first pairs of a round keep PV within its limits with probability :data:`DECIDED`, by all
+    that the test leaves possible; of rounds that tell as much it is the smallest.
+
+    Args:
+        facts: of the loop.
+        judgement: of the rounds before.
+        sizing: whether friction is known to be there, and only its size is asked for, by the
+            fewest moves: a pair at a time.
+
+    Returns:
+        None where the limits leave no such round.
+    """
+    reach, most = judgement.trial.steps.reach, min(facts.op_limit, LARGEST)
+    if judgement.responded:
+        facts = dataclasses.replace(facts, gain=judgement.gain)
+        reaches = np.geomspace(0.5 * SMALLEST, max(most, SMALLEST), SIZES)
+    else:
+        reaches = np.geomspace(WIDENS, 1.0, SIZES, endpoint=False) * reach
+    told: dict[float, Plan] = {}
+    for least in np.minimum(reaches, most).tolist():
+        plan = _round(facts, least, 1 if sizing else PAIRS)
+        if plan.levels and stays(facts, judgement, plan.levels[: 2 * LOOKS]):
+            value = _first(plan)
+            if judgement.responded:
+                value = Forecast.of(judgement, plan.levels[:-1]).apart(sizing)
+            told[value] = plan
+    enough = DECIDED * max(told, default=0.0)
+    best = min((plan for value, plan in told.items() if value >= enough), key=_first, default=None)
+    return best if best and (judgement.responded or _first(best) > reach) else None
+
+
+def stays(facts: Facts, judgement: Judgement, levels: Sequence[float]) -> bool:
+    """Return whether PV stays within its limits with probability :data:`DECIDED`.
+
+    Before PV has answered the gain bounds the round: how far a stem that is stuck jumps when it
+    breaks loose does not depend on how far OP goes beyond that.
+    """
+    if not judgement.responded:
+        return True
+    return Forecast.of(judgement, levels).beyond(*facts.pv_limit) <= 1.0 - DECIDED
+
+
+def _first(plan: Plan) -> float:
+    return plan.levels[0] - plan.facts.op
+
+
+def _round(facts: Facts, least: float, pairs: int = PAIRS) -> Plan:
+    """Return pairs of moves up and down, which leave a level where it was."""
+    reaches = sorted({min(least * WIDENS**k, facts.widest) for k in range(pairs)})
+    levels = [facts.op + sign * reach for reach in reaches for sign in (1.0, -1.0)]
+    return Plan(facts, (*levels, facts.op))

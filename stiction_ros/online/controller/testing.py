@@ -1,0 +1,183 @@
+"""The controller of a running loop that may also test its valve."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stiction_ros.control import ControlMode, StepResult, StepStatus
+from stiction_ros.effects import HeStiction
+from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.identification.answer.step_answer import StepAnswer
+from stiction_ros.loop import LoopModel
+from stiction_ros.online.controller.live import LiveController, ModeChange
+from stiction_ros.online.controller.settings import LiveControllerSettings
+from stiction_ros.online.handover.background import Background
+
+if TYPE_CHECKING:
+    from stiction_ros.online.controller.valve_test import ValveTest
+
+LONGEST = 5000  # samples of the answer of the process that are looked at
+
+
+class ValveTestingController(LiveController):
+    """A live controller whose mode ``valve_test`` moves OP by the plan of a test, once.
+
+    The controller in force goes on observing, and takes over again where the test ends: OP is back
+    where the test began, and the first move is limited as after a hold. Friction that was found is
+    offered to it as a fit of the estimator is, where it is known to :attr:`jump_margin` of f_S.
+
+    Attributes:
+        test: the one that runs or was the last; None where there was none.
+        tested: how the last one ended.
+    """
+
+    def __init__(
+        self,
+        settings: LiveControllerSettings,
+        model: LoopModel,
+        background: Background | None = None,
+    ) -> None:
+        """Build the first controller, as :class:`LiveController` does."""
+        super().__init__(settings, model, background)
+        self.test: ValveTest | None = None
+        self.tested: ModeChange | None = None
+        self._wanted = settings.mode == ControlMode.VALVE_TEST
+        self._sp: FloatArray | None = None
+
+    @property
+    def mode(self) -> ControlMode:
+        """Mode in force."""
+        return ControlMode.VALVE_TEST if self._tests else super().mode
+
+    @property
+    def _tests(self) -> bool:
+        return self.test is not None and not self.test.over
+
+    def begin(self, op: FloatArray) -> None:
+        self._stop("a run began")
+        super().begin(op)
+
+    def retune(self, settings: LiveControllerSettings) -> None:
+        before = self.settings.mode
+        super().retune(settings)
+        if settings.mode != before:
+            self._wanted = settings.mode == ControlMode.VALVE_TEST
+            self._stop("the mode was set")
+
+    def pass_over(self, pv: FloatArray, dv: FloatArray | None = None) -> None:
+        self._stop("a sample was late or bad")
+        super().pass_over(pv, dv)
+
+    def step(
+        self,
+        pv: FloatArray,
+        sp: FloatArray,
+        dv: FloatArray | None = None,
+        preview: FloatArray | None = None,
+    ) -> StepResult:
+        if self._wanted and self._sample >= self.settings.valve_test_at:
+            self._wanted = False
+            self._begin_test(pv, sp)
+        if self.test is None or self.test.over:
+            return super().step(pv, sp, dv, preview)
+        taken = self._told is not None and not self._told.ours
+        if taken:
+            self._stop("someone else has OP")
+        elif self._sp is not None and not np.array_equal(sp, self._sp):
+            self._stop("the set-point moved")
+        else:
+            result = self._moved(self.test.next_op(float(pv[0])), pv, dv)
+            if self.test.over:
+                self._finish()
+            return result
+        return super().step(pv, sp, dv, preview)
+
+    def _moved(self, op: float, pv: FloatArray, dv: FloatArray | None) -> StepResult:
+        """Return the step that moves OP, while the controller in force observes."""
+        self._settle()
+        upset = self._upset(dv)
+        self._controller.pass_over(pv, upset, self._in_force, known=self._sure)
+        moved = np.array([op])
+        self._latest = moved, np.array(pv, dtype=float), upset
+        self._watch.disturb()
+        self._sample += 1
+        nothing = np.zeros(len(pv))
+        mode = ControlMode.VALVE_TEST
+        return StepResult(StepStatus.SOLVED, "", mode, moved, None, nothing, 0.0, "valve test")
+
+    def _begin_test(self, pv: FloatArray, sp: FloatArray) -> None:
+        """Begin a test with OP in force, or say why not."""
+        self._settle()
+        if len(self.model.valves) != 1 or len(self.model.outputs) != 1:
+            self._note("no valve test: the loop has several valves or outputs", self._sample)
+            return
+        # Judging takes compiled code, which a controller that tests nothing does not wait for.
+        from stiction_ros.identification.valve_test.facts import facts_of_answer
+        from stiction_ros.online.controller.valve_test import ValveTest
+
+        step = self.model.sample_time
+        answer = self._answer(step)
+        room = self.settings.valve_test_pv
+        facts = facts_of_answer(
+            answer, self.model.valve_names[0], float(self._in_force[0]), float(sp[0])
+        )
+        reach = self.settings.valve_test_op
+        room = room or abs(facts.gain or 0.0) * reach + float(np.abs(pv - sp)[0])
+        middle = facts.pv
+        facts = dataclasses.replace(facts, op_limit=reach, pv_limit=(middle - room, middle + room))
+        margin = self.settings.jump_margin
+        self.test = ValveTest(facts, round(facts.hold / step), self._background, margin)
+        self._sp = sp
+        begun = ModeChange(
+            self._sample, ControlMode.VALVE_TEST, "a valve test begins", self._known.name
+        )
+        self.changes.append(begun)
+
+    def _answer(self, step: float) -> StepAnswer:
+        """Return the answer of the process to 1 % of stem."""
+        process, values = self._design.model, np.empty(LONGEST)
+        state = np.zeros(len(process.a))
+        for k in range(LONGEST):
+            values[k] = (process.c @ state)[0]
+            state = process.a @ state + process.b[:, 0]
+        past = self._past.history().pv[:, 0]
+        news = np.diff(past[np.isfinite(past)])
+        noise = float(np.std(news)) / np.sqrt(2.0) if len(news) else 0.0
+        return StepAnswer.of_values(self.model.outputs[0], values, noise, step)
+
+    def _stop(self, reason: str) -> None:
+        if self.test is not None and not self.test.over:
+            self.test.stop(reason)
+            self._finish()
+
+    def _finish(self) -> None:
+        """Give OP back to the controller in force, and offer it the friction that was found."""
+        assert self.test is not None
+        self._first, self._approach = True, None
+        self._watch.disturb()
+        change = ModeChange(
+            self._sample, self._controller.mode, f"valve test: {self.test.over}", self._known.name
+        )
+        self.changes.append(change)
+        self.tested = change
+        found = self.test.judgement
+        if found is None or not found.verdict.has_friction:
+            return
+        if found.known_to > self.settings.jump_margin:
+            return  # jumps would be much larger than need be; the estimator will know better
+        name = self.model.valve_names[0]
+        model = self.model.with_valve_effects(
+            {name: [HeStiction(found.f_s, min(max(found.f_d, 0.0), found.f_s))]}
+        )
+        told = {
+            "valve": name,
+            "effect": "stiction",
+            "f_s_interval": list(found.f_s_interval),
+            "f_d_interval": list(found.f_d_interval),
+            "by": "valve test",
+        }
+        model = dataclasses.replace(model, provenance=(*model.provenance, told))
+        self.offer(model, self._sample + 1)

@@ -1,0 +1,133 @@
+"""A valve test in a running loop, a sample at a time."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Future
+
+import numpy as np
+
+from stiction_ros.identification.valve_test.judgement import Judgement, judged
+from stiction_ros.identification.valve_test.plan import (
+    CLEAR,
+    PAIRS,
+    ROUNDS,
+    Facts,
+    first_round,
+    further_round,
+    stays,
+)
+from stiction_ros.online.handover.background import Background
+
+RESTS = 5  # holds that are waited for at most until PV rests
+
+
+class ValveTest:
+    """The moves of one test, decided as they are answered.
+
+    OP rests until PV does, makes the moves of the plan, and is judged after each; each further pair
+    is chosen by what was answered so far. The test ends when it is decided, friction also known to
+    ``margin``, when three rounds or the limits leave no other move, or when something happens that
+    it does not allow for. OP then goes back to where it was, unless someone else has it.
+
+    Attributes:
+        over: why it ended; empty while it runs.
+        judgement: the last one; None before the second move has been held.
+    """
+
+    def __init__(
+        self, facts: Facts, hold: int, background: Background, margin: float = math.inf
+    ) -> None:
+        """Begin with OP where it is.
+
+        Args:
+            facts: of the loop.
+            hold: samples for which each level is held.
+            background: where the judgements are made.
+            margin: of f_S, to which friction is sized.
+        """
+        self.facts, self.hold, self._background, self._margin = facts, hold, background, margin
+        self.over = ""
+        self.judgement: Judgement | None = None
+        self._level, *self._levels = (facts.op, *first_round(facts).levels[:-1])
+        self._made, self._left = 0, hold
+        self._late = max(math.ceil(facts.dead / facts.hold * hold), 1) + 1
+        self._op: list[float] = []
+        self._pv: list[float] = []
+        self._work: Future[Judgement] | None = None
+
+    @property
+    def moves(self) -> int:
+        """Moves of OP that were made."""
+        return self._made
+
+    def stop(self, reason: str) -> None:
+        """End the test."""
+        self.over = self.over or reason
+
+    def next_op(self, pv: float) -> float:
+        """Return OP, %, for the present sample.
+
+        Args:
+            pv: engineering units; NaN ends the test.
+        """
+        low, high = self.facts.pv_limit
+        if not np.isfinite(pv):
+            self.stop("PV is bad")
+        elif not low <= pv <= high or not low <= self._coming(pv) <= high:
+            self.stop(f"PV {pv:.4g} goes beyond {low:.4g} to {high:.4g}")
+        if not self.over and self._left <= 0:
+            self._go_on()
+        if self.over:
+            return self.facts.op
+        self._op.append(self._level)
+        self._pv.append(pv)
+        self._left -= 1
+        return self._level
+
+    def _coming(self, pv: float) -> float:
+        """Return PV a dead time from now, before which no move of OP can show, by its trend."""
+        late = self._late
+        recent = [*self._pv[1 - 2 * late :], pv]
+        if len(recent) < 2 * late:
+            return pv
+        now = float(np.mean(recent[late:]))
+        return now + 1.5 * (now - float(np.mean(recent[:late])))
+
+    def _rests(self) -> bool:
+        """Return whether PV is the same in both halves of the last hold, but for noise."""
+        half = self.hold // 2
+        one, other = np.mean(self._pv[-2 * half : -half]), np.mean(self._pv[-half:])
+        return abs(float(other - one)) <= CLEAR * self.facts.noise
+
+    def _go_on(self) -> None:
+        """Judge what was answered, and move on where the judgement is there and leaves it open."""
+        if self._made > 1:
+            if self._work is None:
+                signals = np.array(self._op), np.array(self._pv)
+                known = self.facts.gain, self.judgement
+                self._work = self._background.submit(judged, *signals, *known)
+            if not self._work.done():
+                return
+            self.judgement, self._work = self._work.result(), None
+            if self.judgement.sure and self.judgement.known_to <= self._margin:
+                self.stop(self.judgement.sentence)
+                return
+            if self._made % 2 == 0 and not (
+                self._levels and stays(self.facts, self.judgement, self._levels[:2])
+            ):
+                plan = None
+                if self._made < 2 * PAIRS * ROUNDS:
+                    plan = further_round(self.facts, self.judgement, self.judgement.sure)
+                self._levels = [] if plan is None else list(plan.levels[:-1])
+        if not self._levels:
+            assert self.judgement is not None
+            self.stop(self.judgement.sentence)
+            return
+        if not self._made:
+            if len(self._op) < RESTS * self.hold and not self._rests():
+                self._left = self.hold
+                return
+            del self._op[: -self.hold], self._pv[: -self.hold]
+        self._level, *self._levels = self._levels
+        self._made, self._left = self._made + 1, self.hold
