@@ -80,8 +80,8 @@ def test_a_choice_is_taken_by_its_word_or_refused_with_the_closest() -> None:
     with pytest.raises(InputError) as error:
         one_of("Embeding", ControlMode, "mode")
     assert str(error.value) == (
-        "mode: unknown value 'Embeding'; use unaware | embedding | inversion | hold; did you mean "
-        "embedding?"
+        "mode: unknown value 'Embeding'; use unaware | embedding | inversion | hold | valve_test; "
+        "did you mean embedding?"
     )
     many = [f"FIC{number}" for number in range(100)]
     for wrong, told in ((None, "FIC19 | and 80 more$"), (["FIC1"], "value ")):

@@ -112,8 +112,7 @@ def test_every_requirement_is_pinned_and_explained() -> None:
     extras = config()["options.extras_require"]
     wanted = requirements(config()["options"]["install_requires"])
     wanted |= requirements("\n".join(extras[name] for name in extras))
-    of_studies = [studies()["dependencies"], *studies()["optional-dependencies"].values()]
-    wanted |= requirements("\n".join(line for lines in of_studies for line in lines))
+    wanted |= requirements("\n".join(studies()["dependencies"]))
     wanted -= {"stiction-ros"}
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     assert all("==" in line for line in lines if line and not line.startswith("#"))
