@@ -83,8 +83,9 @@ class ControlSettings:
     )
     embedding_move_weights: tuple[float, ...] = setting(
         (0.0,),
-        "weight of each squared stem move, stiction-embedding; 0: a hundredth of that square, and "
-        "each jump costs what an offset as large as its estimate is unsure costs while it lasts",
+        "weight of each squared stem move, stiction-embedding; 0: a hundredth of that square. "
+        "Each jump then also has a price: the cost of an offset as large as the standard "
+        "deviation of its estimate",
         low=0.0,
     )
     move_worth: tuple[float, ...] = setting(
@@ -115,14 +116,14 @@ class ControlSettings:
     state_noise: float = setting(0.01, "variance of stem-like process noise, %²", low=0.0)
     disturbance_noise: tuple[float, ...] = setting(
         (0.0,),
-        "variance per sample of each output disturbance; 0: that of a load that wanders by what "
-        "0.01 % of stem does",
+        "variance per sample of each output disturbance; 0: the square of what a stem "
+        "move of 0.01 % does",
         low=0.0,
     )
     measurement_noise: tuple[float, ...] = setting(
         (0.0,),
-        "variance of the noise of each measurement; 0: that of the loop model, at least what "
-        "0.01 % of stem does",
+        "variance of the noise of each measurement; 0: that of the loop model, but not less "
+        "than the square of what a stem move of 0.01 % does",
         low=0.0,
     )
     outlier_gate: float = setting(
@@ -135,8 +136,8 @@ class ControlSettings:
     jump_price: float = setting(0.0, "cost added per jump of a sticky valve", low=0.0)
     kick_limits: tuple[float, ...] = setting(
         (math.inf,),
-        "largest move of OP in one sample at which a sticky valve jumps, %, where it is below "
-        "op_rate_limits; its smallest jump is always allowed",
+        "largest move of OP, %, in a sample at which a sticky valve jumps; op_rate_limits holds "
+        "too. The smallest jump of the valve is always allowed",
         low=1e-6,
     )
     jump_margin: float = setting(
@@ -268,10 +269,10 @@ class ControlSettings:
         return self._as_printed(self._with_preset(design))
 
     def _unsure(self, linear: LinearModel, observer: ObserverTuning) -> float:
-        """Return what an offset costs that is as large as its estimate is unsure.
+        """Return the cost of an offset of one standard deviation of its estimate.
 
-        By the gain K of a filter the estimate of a disturbance has the variance K R, for noise of
-        variance R. Jumps after less than that would follow the noise.
+        The estimate of a disturbance by a filter of gain K has the variance K R, for noise of
+        variance R. Jumps that correct a smaller offset would follow the noise.
         """
         m = len(linear.stem0)
         if np.all(self._list("embedding_move_weights", m) + self._list("move_worth", m) > 0.0):

@@ -51,8 +51,8 @@ class Region:
 
         Points are thrown into boxes that follow what is not rejected, and along the differences
         of what is not: the likelihood of stems that rest and slip has many narrow peaks in a
-        valley across the axes. Where it jumps, at a moment of the record or at a slip, what the
-        rejected points differ by is no parabola but a walk that drifts, and its bound another.
+        valley across the axes. Where the likelihood jumps, at a moment of the record or at a slip,
+        it falls as a random walk with drift and not as a parabola: the bound is another.
         """
         axes = fit.candidate.axes
         free = [d for d, a in enumerate(axes) if a.spacing > 0.0 and not a.linear]

@@ -51,9 +51,9 @@ def best_of_wholes(task: Task, state: State) -> State:
 def without_outliers(effects: Sequence[AddedEffect], sample_time: float) -> tuple[AddedEffect, ...]:
     """Return effects without steps that another one takes back.
 
-    A few samples later, both are rows that stand apart from all others. Beside a friction, both
-    no larger than its band, they are a stem that slipped elsewhere, or not at all, and slipped
-    again; one that is a small part of its band is what no law tells of where a stem rests.
+    Two opposite steps a few samples apart are outliers. Beside a friction, two opposite steps no
+    larger than its band are a slip at another place than the law says, and the next slip. A single
+    step of a small part of the band is the error of the law in where the stem rests.
 
     Args:
         effects: those of an explanation.

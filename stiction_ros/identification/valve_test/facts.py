@@ -12,7 +12,7 @@ from stiction_ros.identification.answer.step_answer import StepAnswer
 from stiction_ros.identification.evidence.sensor_hold import held_rows
 from stiction_ros.identification.result.identification import Identification
 from stiction_ros.identification.valve_test.frictions import SMALLEST
-from stiction_ros.identification.valve_test.judgement import Judgement, judged
+from stiction_ros.identification.valve_test.judgement import Judgement, judged, measured_enough
 from stiction_ros.identification.valve_test.plan import CLEAR, WIDENS, Facts
 from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
 from stiction_ros.records.quality import Quality
@@ -140,8 +140,8 @@ def judged_record(record: Record, gain: float | None = None) -> Judgement:
             where=record.name,
             fix="record OP moved by hand, or judge the loop by stiction identify",
         )
-    measured = len(part) - int(held_rows(part.pv[:, 0]).sum())
-    if measured <= SHORTEST + len(steps.rows):
+    if not measured_enough(part.pv[:, 0], len(steps.rows)):
+        measured = int((~held_rows(part.pv[:, 0])).sum())
         raise InputError(
             f"PV shows {measured} values that are measured, too few for its moves of OP",
             where=record.name,

@@ -14,7 +14,7 @@ from stiction_ros.identification.result.identification import VerdictKind
 from stiction_ros.identification.valve_test.frictions import SMALLEST, Frictions
 from stiction_ros.identification.valve_test.likelihood import OWN_ERROR, Shape, log_sum
 from stiction_ros.identification.valve_test.search import Explanation, Trial
-from stiction_ros.identification.valve_test.steps import Steps
+from stiction_ros.identification.valve_test.steps import SHORTEST, Steps
 
 DECIDED = 0.95
 """Probability from which on a verdict is given, either way."""
@@ -123,6 +123,14 @@ class Judgement:
             "responded": self.responded,
             "moves_seen": self.moves_seen,
         }
+
+
+def measured_enough(pv: FloatArray, moves: int) -> bool:
+    """Tell whether more values of PV, shape (N,), were measured than the explanations can take up.
+
+    They take up :data:`SHORTEST` by process and noise, and one by each move of OP.
+    """
+    return int((~held_rows(pv)).sum()) > SHORTEST + moves
 
 
 def judged(

@@ -214,10 +214,14 @@ class LiveController:
 
         PV (p,) may be NaN, which is missing; DV (d,) as for :meth:`step`.
         """
+        self._observe(self._in_force, pv, dv)
+
+    def _observe(self, op: FloatArray, pv: FloatArray, dv: FloatArray | None) -> None:
+        """Take in a sample at which another than the controller gives ``op``, shape (m,), %."""
         self._settle()
         upset = self._upset(dv)
         self._controller.pass_over(pv, upset, self._in_force, known=self._sure)
-        self._latest = self._in_force, np.array(pv, dtype=float), upset
+        self._latest = op, np.array(pv, dtype=float), upset
         self._watch.disturb()
         self._sample += 1
 

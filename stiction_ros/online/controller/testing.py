@@ -19,7 +19,7 @@ from stiction_ros.online.handover.background import Background
 if TYPE_CHECKING:
     from stiction_ros.online.controller.valve_test import ValveTest
 
-LONGEST = 5000  # samples of the answer of the process that are looked at
+LONGEST = 5000  # samples of the step response that are looked at
 
 
 class ValveTestingController(LiveController):
@@ -45,16 +45,16 @@ class ValveTestingController(LiveController):
         self.test: ValveTest | None = None
         self.tested: ModeChange | None = None
         self._wanted = settings.mode == ControlMode.VALVE_TEST
-        self._sp: FloatArray | None = None
+        self._sp = np.empty(0)
 
     @property
     def mode(self) -> ControlMode:
         """Mode in force."""
-        return ControlMode.VALVE_TEST if self._tests else super().mode
+        return super().mode if self._running is None else ControlMode.VALVE_TEST
 
     @property
-    def _tests(self) -> bool:
-        return self.test is not None and not self.test.over
+    def _running(self) -> ValveTest | None:
+        return None if self.test is None or self.test.over else self.test
 
     def begin(self, op: FloatArray) -> None:
         self._stop("a run began")
@@ -81,32 +81,24 @@ class ValveTestingController(LiveController):
         if self._wanted and self._sample >= self.settings.valve_test_at:
             self._wanted = False
             self._begin_test(pv, sp)
-        if self.test is None or self.test.over:
+        test = self._running
+        if test is None:
             return super().step(pv, sp, dv, preview)
-        taken = self._told is not None and not self._told.ours
-        if taken:
-            self._stop("someone else has OP")
-        elif self._sp is not None and not np.array_equal(sp, self._sp):
-            self._stop("the set-point moved")
-        else:
-            result = self._moved(self.test.next_op(float(pv[0])), pv, dv)
-            if self.test.over:
-                self._finish()
-            return result
-        return super().step(pv, sp, dv, preview)
-
-    def _moved(self, op: float, pv: FloatArray, dv: FloatArray | None) -> StepResult:
-        """Return the step that moves OP, while the controller in force observes."""
-        self._settle()
-        upset = self._upset(dv)
-        self._controller.pass_over(pv, upset, self._in_force, known=self._sure)
-        moved = np.array([op])
-        self._latest = moved, np.array(pv, dtype=float), upset
-        self._watch.disturb()
-        self._sample += 1
-        nothing = np.zeros(len(pv))
-        mode = ControlMode.VALVE_TEST
+        if reason := self._interruption(sp):
+            self._stop(reason)
+            return super().step(pv, sp, dv, preview)
+        moved = np.array([test.next_op(float(pv[0]))])
+        self._observe(moved, pv, dv)
+        if test.over:
+            self._finish()
+        mode, nothing = ControlMode.VALVE_TEST, np.zeros(len(pv))
         return StepResult(StepStatus.SOLVED, "", mode, moved, None, nothing, 0.0, "valve test")
+
+    def _interruption(self, sp: FloatArray) -> str:
+        """Return what ends the test before its next move; empty where it may go on."""
+        if self._told is not None and not self._told.ours:
+            return "someone else has OP"
+        return "" if np.array_equal(sp, self._sp) else "the set-point moved"
 
     def _begin_test(self, pv: FloatArray, sp: FloatArray) -> None:
         """Begin a test with OP in force, or say why not."""
@@ -138,19 +130,15 @@ class ValveTestingController(LiveController):
 
     def _answer(self, step: float) -> StepAnswer:
         """Return the answer of the process to 1 % of stem."""
-        process, values = self._design.model, np.empty(LONGEST)
-        state = np.zeros(len(process.a))
-        for k in range(LONGEST):
-            values[k] = (process.c @ state)[0]
-            state = process.a @ state + process.b[:, 0]
+        values = self._design.model.step_responses(LONGEST)[:, 0, 0]
         past = self._past.history().pv[:, 0]
         news = np.diff(past[np.isfinite(past)])
         noise = float(np.std(news)) / np.sqrt(2.0) if len(news) else 0.0
         return StepAnswer.of_values(self.model.outputs[0], values, noise, step)
 
     def _stop(self, reason: str) -> None:
-        if self.test is not None and not self.test.over:
-            self.test.stop(reason)
+        if (test := self._running) is not None:
+            test.stop(reason)
             self._finish()
 
     def _finish(self) -> None:

@@ -7,8 +7,7 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from stiction_ros.identification.evidence.sensor_hold import held_rows
-from stiction_ros.identification.valve_test.judgement import Judgement, judged
+from stiction_ros.identification.valve_test.judgement import Judgement, judged, measured_enough
 from stiction_ros.identification.valve_test.plan import (
     CLEAR,
     PAIRS,
@@ -18,7 +17,6 @@ from stiction_ros.identification.valve_test.plan import (
     further_round,
     stays,
 )
-from stiction_ros.identification.valve_test.steps import SHORTEST
 from stiction_ros.online.handover.background import Background
 
 RESTS = 5  # holds that are waited for at most until PV rests
@@ -104,8 +102,7 @@ class ValveTest:
 
     def _go_on(self) -> None:
         """Judge what was answered, and move on where the judgement is there and leaves it open."""
-        measured = len(self._pv) - int(held_rows(np.array(self._pv)).sum())
-        if self._made > 1 and measured > SHORTEST + self._made:
+        if self._made > 1 and measured_enough(np.array(self._pv), self._made):
             if self._work is None:
                 signals = np.array(self._op), np.array(self._pv)
                 known = self.facts.gain, self.judgement
