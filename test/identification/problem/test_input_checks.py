@@ -17,9 +17,9 @@ from stiction_studies.examples import FAMILIES, NOISES, PLANTS, example1, exampl
 
 DATA = pathlib.Path(__file__).resolve().parents[4] / "shared" / "data"
 CASES = [
-    *((example1, noise) for noise in NOISES),
-    *((example2, plant) for plant in PLANTS),
-    *((healthy_loop, family) for family in FAMILIES),
+    pytest.param(make, variant, marks=pytest.mark.trial if later else ())
+    for make, variants in ((example1, NOISES), (example2, PLANTS), (healthy_loop, FAMILIES))
+    for later, variant in enumerate(variants)
 ]
 
 
