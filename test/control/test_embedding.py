@@ -135,7 +135,6 @@ def plan_from_anywhere(
 @given(
     models(valves=1), frictions, st.floats(0.0, 100.0), st.floats(0.0, 100.0), st.integers(0, 99)
 )
-@settings(deadline=None)
 def test_a_sticky_stem_stays_or_jumps_far_enough(
     model: LinearModel, friction: HeStiction, last: float, goal: float, seed: int
 ) -> None:
@@ -147,7 +146,6 @@ def test_a_sticky_stem_stays_or_jumps_far_enough(
 @given(
     models(valves=1), frictions, st.floats(0.0, 100.0), st.floats(0.0, 100.0), st.integers(0, 99)
 )
-@settings(deadline=None)
 def test_op_is_the_new_stem_and_dynamic_friction_on_a_slip_else_the_stem(
     model: LinearModel, friction: HeStiction, last: float, goal: float, seed: int
 ) -> None:
@@ -162,7 +160,6 @@ def test_op_is_the_new_stem_and_dynamic_friction_on_a_slip_else_the_stem(
 @given(
     models(valves=1), frictions, st.floats(0.0, 100.0), st.floats(0.0, 100.0), st.integers(0, 99)
 )
-@settings(deadline=None)
 def test_a_valve_by_hes_law_follows_the_whole_plan(
     model: LinearModel, friction: HeStiction, last: float, goal: float, seed: int
 ) -> None:
@@ -179,7 +176,6 @@ def test_a_valve_by_hes_law_follows_the_whole_plan(
 @given(
     models(valves=1), frictions, st.floats(-0.3, 0.29), st.floats(0.0, 100.0), st.integers(0, 99)
 )
-@settings(deadline=None)
 def test_the_margin_covers_friction_that_is_a_little_higher(
     model: LinearModel, friction: HeStiction, off: float, goal: float, seed: int
 ) -> None:
@@ -195,7 +191,6 @@ def test_the_margin_covers_friction_that_is_a_little_higher(
 
 
 @given(frictions, st.floats(0.0, 100.0), st.floats(0.0, 100.0))
-@settings(deadline=None)
 def test_without_a_margin_the_smallest_jump_still_slips(
     friction: HeStiction, last: float, goal: float
 ) -> None:

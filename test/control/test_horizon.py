@@ -13,7 +13,6 @@ from stiction_ros.processes import LinearModel
 
 
 @given(models(), st.integers(1, 8), st.integers(0, 1000))
-@settings(deadline=None)
 def test_the_condensed_cost_is_19a(model: LinearModel, horizon: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     weights = weights_for(model, horizon, seed=seed)
@@ -30,7 +29,6 @@ def test_the_condensed_cost_is_19a(model: LinearModel, horizon: int, seed: int) 
 
 
 @given(models(), st.integers(1, 8), st.integers(0, 1000))
-@settings(deadline=None)
 def test_condensed_outputs_are_simulated_ones(model: LinearModel, horizon: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     m, p = len(model.stem0), len(model.pv0)

@@ -83,7 +83,6 @@ def test_without_limits_the_bound_is_the_optimum_and_few_programmes_are_solved()
 
 
 @given(st.integers(0, 10**6), st.integers(1, 6))
-@settings(max_examples=100, deadline=None)
 def test_the_bound_of_a_box_is_below_every_point_and_reached(seed: int, size: int) -> None:
     random = np.random.default_rng(seed)
     root = random.normal(size=(size + 1, size))

@@ -82,7 +82,6 @@ def test_iso_stamps(tmp_path: Path, first: str, second: str) -> None:
     assert abs(record.start - begin) <= 0.5
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.lists(
         st.tuples(*[st.floats(-1e300, 1e300).filter(lambda value: value not in SENTINELS)] * 3),

@@ -203,7 +203,6 @@ def first_order(gain: float, pole: float, taps: int = 200) -> FloatArray:
 
 
 @pytest.mark.trial
-@settings(deadline=None, max_examples=50)
 @given(st.floats(0.05, 12.0), st.floats(2.0, 200.0), st.floats(0.3, 0.97), st.sampled_from([1, 2]))
 def test_a_controller_holds_a_process_when_the_loop_of_both_comes_to_rest(
     gain: float, reset: float, pole: float, rate: int

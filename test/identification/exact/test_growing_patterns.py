@@ -78,7 +78,6 @@ def test_cells_of_a_longer_window_fill_the_cell_they_come_from(
     assert area(inside) == pytest.approx(area(whole), rel=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000), static=st.floats(0.2, 5.0), share=st.floats(-0.9, 0.9))
 def test_a_valve_slips_first_where_op_goes_beyond_all_it_was(
     seed: int, static: float, share: float

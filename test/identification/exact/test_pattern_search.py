@@ -73,7 +73,6 @@ def test_a_friction_and_a_start_have_the_pattern_of_their_cell(
     assert (cells_at(search.u, again, points_of(friction[None, :])).bounds == scan.bounds).all()
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000), static=st.floats(0.2, 5.0), share=st.floats(-0.99, 0.99))
 def test_levels_of_a_first_slip_are_those_from_which_it_comes(
     seed: int, static: float, share: float

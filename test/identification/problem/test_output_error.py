@@ -23,7 +23,6 @@ def driven(seed: int, delay: int, samples: int = 600) -> tuple[FloatArray, Float
     return stem, lfilter(np.r_[np.zeros(delay + 1), 0.3], A, stem)
 
 
-@settings(deadline=None)
 @given(roots=st.lists(st.floats(-1.3, 1.3), min_size=1, max_size=5), radius=st.floats(0.5, 1.0))
 def test_stability_is_that_of_the_roots(roots: list[float], radius: float) -> None:
     largest = max(abs(root) for root in roots)
