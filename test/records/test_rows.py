@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stiction_ros.records.record import Record
@@ -63,7 +63,6 @@ def test_rows_whose_steps_jitter(
     kept(scan * np.cumsum(steps)[places], places)
 
 
-@settings(max_examples=30, deadline=None)
 @given(counts, scans, jitters)
 def test_a_scan_that_alternates(count: int, scan: float, jitter: float) -> None:
     places = np.arange(count)

@@ -105,7 +105,7 @@ def test_a_reach_sums_the_taps_up_to_three_reset_times(
     assert reach.unit == pytest.approx(seen / (4.0 * 0.5))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10**6), st.sampled_from(range(len(REACHES))), st.floats(0.1, 5.0))
 def test_a_held_response_has_the_likelihood_of_the_record_given_its_sum(
     seed: int, reach: int, unit: float

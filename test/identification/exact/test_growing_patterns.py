@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 import simulated_loops as loops
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.effects import FloatArray, HeStiction
@@ -63,7 +63,6 @@ def branch_at(loop: tuple[Data, Model, Orders], count: int, point: FloatArray) -
     return Branch(search, begin, scan)
 
 
-@settings(max_examples=25, deadline=None)
 @given(jump=st.floats(0.3, 6.0), more=st.floats(0.5, 6.0), longer=st.integers(210, 400))
 def test_cells_of_a_longer_window_fill_the_cell_they_come_from(
     loop: tuple[Data, Model, Orders], jump: float, more: float, longer: int

@@ -7,7 +7,7 @@ import pathlib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.identification.problem.input_checks import Evidence, SwapRule, swapped_columns
@@ -67,7 +67,6 @@ def test_simulated_loops(make: object, variant: str, seed: int) -> None:
     assert found.rule is SwapRule.CONTROLLER
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 1000),
     gain=st.floats(0.05, 3.0),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from samples import dense
 
@@ -14,7 +14,6 @@ SIZES = st.integers(0, 3)
 GRID = np.array([[0.0, 0.0], [0.3, 0.1], [1.0, 1.0], [2.5, 0.5], [90.0, 1.0]])
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10_000), samples=st.integers(1, 130), start=st.floats(-3.0, 3.0))
 @pytest.mark.parametrize("law", [HeStiction, KanoStiction])
 def test_moves_give_the_stem_of_the_law(
