@@ -56,6 +56,7 @@ def test_a_healthy_loop_without_alarm_is_quiet() -> None:
     assert found.looks == (19, 0)
 
 
+@pytest.mark.trial
 def test_an_effect_without_alarm_is_missed() -> None:
     found = watch(late_loop(110), QUIET)
     assert (found.score, found.delay, found.findings) == (Score.MISSED, None, ())
