@@ -9,7 +9,7 @@
 # python3 are tried.
 
 .SUFFIXES:
-.PHONY: setup demo test lint compiled docs clean
+.PHONY: setup demo test lint compiled collected docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -91,13 +91,16 @@ lint: $(DONE)
 # Bytecode is kept, as hundreds of processes start in the tests: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Machine code is made beside the linters, which leave a core for that: all workers would make the
-# same at once. Three of them keep two cores busy, as tests of the nodes wait for each other. Files
-# run in order: the workers would take those with few tests last, which are the long ones.
+# Beside the linters, which leave a core for that, machine code is made and the bytecode of the tests:
+# all workers would make the same at once. Three of them keep two cores busy, as tests of the nodes
+# wait for each other. Files run in order: else those with few tests came last, which are the long ones.
 test:
-	$(MAKE) -j2 lint compiled
+	$(MAKE) -j2 lint compiled collected
 	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? -eq 5  # 5: ARGS picks none of them
+
+collected: $(DONE)
+	@$(BIN)/python -m pytest --collect-only -qq $(ARGS) > /dev/null || true  # the workers say what fails
 
 docs: $(DONE)
 	$(BIN)/mkdocs build --strict --clean
