@@ -160,6 +160,7 @@ def test_bad_quality(trial: Trial) -> None:
     trial.judge()
 
 
+@pytest.mark.trial
 def test_stamps_in_the_past(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("PAST", 86_400.0)
@@ -186,6 +187,7 @@ def test_the_controller_is_gone(trial: Trial) -> None:
     trial.judge()
 
 
+@pytest.mark.trial
 def test_a_thousand_changes_a_second(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("BURST", 50.0)  # of two tags, ten times a second
@@ -197,6 +199,7 @@ def test_a_thousand_changes_a_second(trial: Trial) -> None:
     trial.judge()
 
 
+@pytest.mark.trial
 def test_a_server_that_is_slow_by_two_seconds(trial: Trial) -> None:
     runner = trial.granted()
     trial.disturb("DELAY", 2.0)
@@ -286,7 +289,14 @@ def test_a_user_without_rights(trial: Trial) -> None:
     assert trial.ops() == []
 
 
-@pytest.mark.parametrize("kind", ["server", "stranger", "expired", "word"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "server",
+        "expired",
+        *(pytest.param(k, marks=pytest.mark.trial) for k in ("stranger", "word")),
+    ],
+)
 def test_what_cannot_be_trusted_gets_no_session(
     trial: Trial, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -349,6 +359,7 @@ def test_a_request_goes_before_what_its_loop_waits_to_write() -> None:
     assert all(event.failure for event in told)
 
 
+@pytest.mark.trial
 def test_the_server_is_killed_and_starts_again(trial: Trial) -> None:
     plant = trial.plant
     runner = trial.granted()

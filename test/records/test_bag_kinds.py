@@ -68,7 +68,7 @@ def test_neighbours_that_are_swapped_are_one_run(tmp_path: Path, chunk: int) -> 
     size=st.integers(40, 400),
     chunked=st.booleans(),
 )
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_messages_come_by_log_time_and_then_as_in_the_file(
     tmp_path: Path, times: list[int], size: int, chunked: bool
 ) -> None:

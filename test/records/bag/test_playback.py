@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from bag_making import JOINT_STATE, SECOND, Bag, joint_state
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
@@ -203,7 +203,6 @@ moves = st.lists(
 )
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.lists(st.integers(0, 8), min_size=1, max_size=20), moves, st.integers(1, 7))
 def test_every_message_comes_once_in_order_and_never_early(
     times: list[int], moves: list[object], most: int
