@@ -49,7 +49,7 @@ class PlayerNode(ManagedNode):
             raise InputError("no bag", where="player: bag", fix="set it to a bag")
         content = bag_content(settings.bag, settings.topics)
         options = PlaybackOptions(settings.rate, settings.start, settings.loop)
-        self.playback = Playback(settings.bag, content, self._now, options, wanted=settings.topics)
+        self.playback = Playback(content, self._now, options)
         self._skipped: dict[str, str] = {}
         self._topics: dict[str, Outlet] = {}
         recorded = settings.clock == "auto" and CLOCK in content.topics
