@@ -24,7 +24,6 @@ class DrawnDisturbance(Behaviour):
         return (0.0, NO_SAMPLE)
 
     def step(self, memory: Memory, value: float, time: float) -> tuple[Memory, float]:
-        """Return the memory and the signal with what is expected of w added."""
         return self.step_with(memory, value, time, 0.0)
 
     @abstractmethod

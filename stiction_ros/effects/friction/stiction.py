@@ -108,9 +108,6 @@ class Stiction(Behaviour):
 
     effect: ClassVar[str] = "stiction"
     places: ClassVar[tuple[str, ...]] = ("valve",)
-    signature: ClassVar[str] = "PV moves in jumps while OP ramps, and rests while OP reverses"
-    minimum_data: ClassVar[str] = "several slips, by a limit cycle or by set-point moves"
-    confusable: ClassVar[tuple[str, ...]] = ("valve backlash when J = 0",)
     experiment: ClassVar[str] = (
         "let OP reverse by more than the friction that matters, as a cycle does"
     )
@@ -124,7 +121,10 @@ class Stiction(Behaviour):
     switching: ClassVar[Switching | None] = None
     not_identified: ClassVar[str] = ""
     held: ClassVar[tuple[str, ...]] = ()
-    told_of_step: ClassVar[tuple[str, ...]] = ("simulate_grid", "switching", "jump_form")
+    told_of_step: ClassVar[tuple[str, ...]] = (
+        *Behaviour.told_of_step,
+        *("switching", "jump_form"),
+    )
 
     def jump_form(self) -> JumpForm | None:
         """Return the moves that it can make when OP rests between them.
