@@ -110,21 +110,6 @@ def _word(key: str, value: object) -> str:
     return value.lower() if isinstance(value, str) else _NUMBERED[key][int(str(value))]
 
 
-@dataclasses.dataclass(frozen=True)
-class PlaybackOptions:
-    """How a bag is played.
-
-    Attributes:
-        rate: recorded seconds per second of the clock, above 0.
-        start: seconds of recorded time that are passed over at the beginning.
-        loop: whether to begin again at the end.
-    """
-
-    rate: float = 1.0
-    start: float = 0.0
-    loop: bool = False
-
-
 class Playback:
     """Plays the messages of a bag in their order, each when its log time has come.
 
@@ -134,7 +119,9 @@ class Playback:
     Args:
         content: of the bag.
         clock: a steady clock, ns.
-        options: rate, start, loop.
+        rate: recorded seconds per second of the clock, above 0.
+        start: seconds of recorded time that are passed over at the beginning.
+        loop: whether to begin again at the end.
 
     Raises:
         InputError: a rate that is not positive, or a start beyond the end.
@@ -144,19 +131,21 @@ class Playback:
         self,
         content: BagContent,
         clock: Callable[[], int],
-        options: PlaybackOptions = PlaybackOptions(),
+        rate: float = 1.0,
+        start: float = 0.0,
+        loop: bool = False,
     ) -> None:
-        if not 0.0 < options.rate < float("inf"):
-            raise InputError(f"{options.rate:g} is no rate", where="rate", fix="use one above 0")
-        if not 0.0 <= options.start <= content.seconds:
+        if not 0.0 < rate < float("inf"):
+            raise InputError(f"{rate:g} is no rate", where="rate", fix="use one above 0")
+        if not 0.0 <= start <= content.seconds:
             raise InputError(
-                f"{options.start:g} s is not within the bag, which lasts {content.seconds:g} s",
+                f"{start:g} s is not within the bag, which lasts {content.seconds:g} s",
                 where="start",
             )
         self._clock = clock
-        self._begin = content.first + round(options.start * SECOND)
+        self._begin = content.first + round(start * SECOND)
         self._messages = _from(content, self._begin)
-        self._rate, self._loop = options.rate, options.loop
+        self._rate, self._loop = rate, loop
         self.paused = True
         self.finished = False
         self.rounds = 0

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
-from stiction_ros.records.bag.playback import Playback, PlaybackOptions, bag_content, offered_qos
+from stiction_ros.records.bag.playback import Playback, bag_content, offered_qos
 from stiction_ros.records.bag.writer import BagWriter
 from stiction_ros.records.storage.bag_metadata import BagTopic, Qos, qos_yaml
 from stiction_ros.records.storage.mcap_scan import RawMessage
@@ -46,8 +46,7 @@ def ramp(bag: Bag, samples: int = 6) -> Path:
 
 
 def player(path: Path, clock: HandClock, wanted: str = ".*", **options: float | bool) -> Playback:
-    chosen = PlaybackOptions(**options)  # type: ignore[arg-type]
-    return Playback(bag_content(path, wanted), clock, chosen)
+    return Playback(bag_content(path, wanted), clock, **options)  # type: ignore[arg-type]
 
 
 def seconds(messages: Sequence[RawMessage]) -> list[float]:
