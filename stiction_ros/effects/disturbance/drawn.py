@@ -6,9 +6,7 @@ import dataclasses
 from abc import abstractmethod
 from typing import ClassVar
 
-import numpy as np
-
-from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, FloatArray, Memory
+from stiction_ros.effects.behaviour import NO_SAMPLE, Behaviour, Memory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,9 +29,3 @@ class DrawnDisturbance(Behaviour):
         self, memory: Memory, value: float, time: float, normal: float
     ) -> tuple[Memory, float]:
         """Advance one sample with ``normal`` drawn from N(0, 1)."""
-
-    def simulate(
-        self, values: FloatArray, start: float | None = None, sample_time: float = 1.0
-    ) -> FloatArray:
-        """Return the signal as it is: from rest nothing is expected to be added."""
-        return np.array(values, dtype=float)
