@@ -10,7 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
 from stiction_ros.effects.friction.moving_rules import SlopeRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, SlipJumpPair
-from stiction_ros.effects.friction.switching import MovingCells, Switching
+from stiction_ros.effects.friction.stiction import Switching
 
 MOVING = -1.0  # a threshold that every |u − x_ss| exceeds
 
@@ -49,7 +49,7 @@ class ChoudhuryStiction(SlipJumpPair):
 
     law: ClassVar[str | None] = "choudhury"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = MovingCells(SlopeRules)
+    switching: ClassVar[Switching] = SlopeRules
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0, value, self.static_friction, self.static_friction)

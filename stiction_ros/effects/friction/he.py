@@ -9,8 +9,7 @@ import numpy as np
 
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
-from stiction_ros.effects.friction.stiction import JumpForm
-from stiction_ros.effects.friction.switching import SlipCells, Switching
+from stiction_ros.effects.friction.stiction import SLIPS, JumpForm, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +36,7 @@ class HeStiction(FrictionPair):
 
     law: ClassVar[str | None] = "he"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = SlipCells()
+    switching: ClassVar[Switching] = SLIPS
 
     def step(self, memory: Memory, value: float, time: float = 0.0) -> tuple[Memory, float]:
         """Return the stem position twice, as memory and as output, by (4).

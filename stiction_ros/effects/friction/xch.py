@@ -10,8 +10,7 @@ import numpy as np
 from stiction_ros.effects.behaviour import FloatArray, Memory, Start, starts
 from stiction_ros.effects.friction.moving_rules import FollowingRules
 from stiction_ros.effects.friction.parameters import NOT_SEARCHED, FrictionPair
-from stiction_ros.effects.friction.stiction import JumpForm
-from stiction_ros.effects.friction.switching import MovingCells, Switching
+from stiction_ros.effects.friction.stiction import JumpForm, Switching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +46,7 @@ class XchStiction(FrictionPair):
 
     law: ClassVar[str | None] = "xch"
     not_searched: ClassVar[str] = NOT_SEARCHED
-    switching: ClassVar[Switching | None] = MovingCells(FollowingRules)
+    switching: ClassVar[Switching] = FollowingRules
 
     def rest(self, value: float) -> Memory:
         return (value, value, 0.0)
