@@ -45,7 +45,7 @@ FOOTER_SIZE = len(FOOTER_HEAD) + 20 + len(MAGIC)
 """Bytes of the footer with the magic behind it."""
 
 _DAMAGE: tuple[type[Exception], ...] = (
-    *(ValueError, RuntimeError, EOFError, MemoryError, struct.error),
+    *(ValueError, ArithmeticError, RuntimeError, EOFError, MemoryError, struct.error),
     *(McapError, zstandard.ZstdError),
 )
 """What damaged bytes raise in the readers of records and in the decompressors."""
