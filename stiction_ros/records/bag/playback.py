@@ -148,9 +148,8 @@ class Playback:
         self._rate, self._loop = rate, loop
         self.paused = True
         self.finished = False
-        self.rounds = 0
-        self.played = 0
-        self._rewind()
+        self.rounds = self.played = self._place = 0
+        self._bag_time, self._since = self._begin, clock()
 
     @property
     def time(self) -> int:
