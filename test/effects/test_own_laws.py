@@ -29,7 +29,6 @@ from stiction_ros.discrepancy.fit.uncertainty import likelihood_intervals
 from stiction_ros.discrepancy.process.free_search import FreeSearch
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, join_records
 from stiction_ros.effects import Behaviour, discovery
-from stiction_ros.effects.catalogue import _entry
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.identified_loop import identified_loop
 from stiction_ros.identification.answer.words import why
@@ -302,7 +301,6 @@ def test_a_slip_that_falls_short_is_planned_by_its_jump_form() -> None:
     assert form.least == pytest.approx(0.7 * 2.5)
 
 
-def test_what_is_not_said_of_an_effect_is_no_empty_line_of_the_catalogue() -> None:
-    assert _entry(Bump, "sensor").splitlines()[-1].startswith("| `height` |")
+def test_a_figure_out_of_its_range_is_refused() -> None:
     with pytest.raises(InputError, match=r"use \[0, 0.9\]$"):
         law(1.5)

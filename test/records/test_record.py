@@ -16,9 +16,8 @@ from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.csv_writer import write_csv
 from stiction_ros.records.parts import joined, longest_part, only_part
 from stiction_ros.records.quality import Quality
-from stiction_ros.records.record import Record
+from stiction_ros.records.record import Gap, Record, Segment
 from stiction_ros.records.run.bag_reader import read_bag_parts
-from stiction_ros.records.segment import Gap, Segment
 from stiction_studies.as_given import read_csv_parts
 
 G, H, B, M = Quality.GOOD, Quality.HELD, Quality.BAD, Quality.MANUAL

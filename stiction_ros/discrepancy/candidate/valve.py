@@ -11,7 +11,6 @@ import numpy as np
 
 from stiction_ros.discrepancy.candidate.base import (
     Candidate,
-    GridBehaviour,
     Response,
     lag_axis,
     lasts,
@@ -60,12 +59,10 @@ class ValveCandidate(Candidate):
     """
 
     valve: int
-    kind: type[GridBehaviour]
+    kind: type[Behaviour]
 
     @classmethod
-    def at(
-        cls, run: FreeRun, valve: int, kind: type[GridBehaviour], axes: tuple[Axis, ...]
-    ) -> Self:
+    def at(cls, run: FreeRun, valve: int, kind: type[Behaviour], axes: tuple[Axis, ...]) -> Self:
         """Return the candidate at a valve by its index, with the figures that are searched."""
         return cls(
             place=f"valve:{run.model.valves[valve].name}",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, SECOND, STORE, Bag, clock, joint_state
+from bag_making import JOINT_STATE, SECOND, STORE, Bag, clock, joint_state, read_bag
 from bag_trials import trials
 from mcap.writer import CompressionType, Writer
 
@@ -17,9 +17,7 @@ from stiction_ros.records.bag.finish import Packing, finish_bag
 from stiction_ros.records.bag.messages import read_raw
 from stiction_ros.records.bag.repair import RepairStatus, repair_bag
 from stiction_ros.records.bag.writer import BagWriter
-from stiction_ros.records.run.bag_reader import read_bag
-from stiction_ros.records.storage.mcap_format import MAGIC
-from stiction_ros.records.storage.mcap_scan import McapScan
+from stiction_ros.records.storage.mcap_scan import MAGIC, McapScan
 
 SAMPLES = 300
 PATIENCE = 60.0  # s for one reading, which takes some milliseconds
@@ -195,15 +193,6 @@ def test_a_damaged_summary_is_a_note_when_the_data_are_whole(tmp_path: Path) -> 
     ]
     assert repair_bag(path).status is RepairStatus.FINISHED
     assert repair_bag(path).status is RepairStatus.WHOLE
-
-
-def test_a_chunk_cannot_ask_for_more_memory_than_it_says(tmp_path: Path) -> None:
-    path = own_bag(tmp_path / "run", "none")
-    data = bytearray(path.read_bytes())
-    at = data.index(b"\x06")  # the first chunk's opcode follows the header
-    data[at + 9 + 16 : at + 9 + 24] = (2**40).to_bytes(8, "little")
-    path.write_bytes(data)
-    assert "size is wrong" in read(path)[1]
 
 
 def test_blocks_that_a_file_system_left_empty_are_left_out(tmp_path: Path) -> None:

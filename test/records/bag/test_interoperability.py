@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state
+from bag_making import JOINT_STATE, SECOND, STORE, Bag, joint_state, read_bag
 from foreign_readers import by_us, check, checker, differences
 from mcap.writer import CompressionType, Writer
 
 from stiction_ros.records.bag.finish import Packing
 from stiction_ros.records.bag.repair import repair_bag
 from stiction_ros.records.bag.writer import BagWriter, Splitting
-from stiction_ros.records.run.bag_reader import read_bag
 
 
 def fill(bag: Bag) -> None:

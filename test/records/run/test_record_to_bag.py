@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import JOINT_STATE, STORE
+from bag_making import JOINT_STATE, STORE, read_bag
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +12,6 @@ pytest.importorskip("sensor_msgs", reason="the definitions of sensor_msgs are no
 
 from stiction_ros.errors import InputError
 from stiction_ros.records.record import Record
-from stiction_ros.records.run.bag_reader import read_bag
 from stiction_ros.records.run.record_to_bag import joint_state_bytes, write_bag
 
 TAGS = st.lists(
