@@ -176,8 +176,7 @@ def _print(found: Discrepancy) -> None:
             name = called(effect.place, effect.effect)
             console.print(f"{name}{law}: {plain(said)}", markup=False)
     for change in found.process_changes:
-        said = f"process to {change.output}: {change.what} {change.value:.4g} {change.unit}"
-        console.print(said.removesuffix(" 1"), markup=False)
+        console.print(f"process to {change.output}: {change.sentence}", markup=False)
     console.print(_gaps(found))
     for sentence in found.where:
         console.print(f"where: {plain(sentence)}", markup=False)

@@ -91,6 +91,8 @@ def closing(task: Task, looked: State) -> Discrepancy:
     silent = not effects and verdict in (GapVerdict.NONE, GapVerdict.UNTESTABLE)
     if silent and (no_names or _taken_back(task, state) or _noise_left(task, state, noises)):
         verdict = GapVerdict.UNKNOWN
+    if state.changes and silent and verdict is not GapVerdict.UNKNOWN:
+        verdict = GapVerdict.NAMED
     told = {(e.place, e.effect) for e in effects} | {n for e in effects for n in e.alternatives}
     told |= set(alternatives)
     task.report(1.0)
