@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     from stiction_ros.discrepancy import GapOptions, find_discrepancy
 
     settings = GapOptions(
-        quick=options.quick, seed=options.seed, free_process=bool(options.fit_linear)
+        quick=options.quick, seed=options.seed, process_fitted=bool(options.fit_linear)
     )
     with bar("comparing") as show:
         found = find_discrepancy(model, records, settings, progress=show)
@@ -109,7 +109,7 @@ def _inputs(options: argparse.Namespace) -> tuple[LoopModel, list[Record]]:
                 "is a loop model", where=path, fix="leave it out, --fit-linear makes one"
             )
         records = [_record(path, options) for path in options.inputs]
-        from stiction_ros.discrepancy.data.first_model import first_model
+        from stiction_ros.discrepancy.process.first_model import first_model
 
         return first_model(records, options.delay), records
     if len(options.inputs) < 2:
