@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiction_ros.discrepancy.data.gate import open_gate
 from stiction_ros.discrepancy.process.refit import process_refitted
-from stiction_ros.discrepancy.simulation.free_run import join_records
 from stiction_ros.errors import InputError
 from stiction_ros.identification.answer.identified_loop import identified_loop
 from stiction_ros.identification.identification_options import IdentificationOptions
@@ -74,7 +74,8 @@ def first_model(records: Sequence[Record], delay: tuple[int, int] = (0, 10)) -> 
     if not _moved(longest):
         options = LinearOptions(LinearKind.ARX, output_order=2, input_order=2, delay=delay)
     model = _process_alone(fit_linear(longest, options).loop_model(name))
-    return process_refitted(model, join_records(model, [longest]))
+    runs, _ = open_gate(model, [longest])
+    return process_refitted(model, runs)
 
 
 def _process_alone(model: LoopModel) -> LoopModel:
