@@ -158,25 +158,6 @@ def legend(axis: Any, columns: int = 6) -> None:
     )
 
 
-def mark_swap(axis: Any, at: float | None, said: str = "") -> None:
-    """Draw the swap as a vertical line, named above the panel when there is a word for it."""
-    if at is None:
-        return
-    axis.axvline(at, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
-    if said:
-        axis.annotate(
-            said,
-            (at, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 3),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=9,
-            color=INK,
-        )
-
-
 def data_limits(axis: Any, values: Sequence[FloatArray], room: float = 0.06) -> None:
     """Show all finite ``values`` with a little room."""
     joined = np.concatenate([np.ravel(v)[np.isfinite(np.ravel(v))] for v in values])

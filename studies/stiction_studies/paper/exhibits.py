@@ -13,7 +13,7 @@ from stiction_ros.pages.frame import framed, text
 from stiction_ros.report.page import table
 from stiction_studies.drawing import embedded
 from stiction_studies.paper.exhibit import Exhibit
-from stiction_studies.paper.figures import controllers, diagrams, responses, trends
+from stiction_studies.paper.figures import controllers, responses, trends
 from stiction_studies.paper.sources import Sources
 from stiction_studies.paper.tables import (
     constants,
@@ -30,10 +30,8 @@ PAGE = "paper.html"
 HEAD = ("", "printed", "ours", "remark")
 # Name: what makes its exhibits, in the order of the page.
 MAKERS: dict[str, tuple[Callable[[Sources], Exhibit], ...]] = {
-    "figure1": (diagrams.figure1,),
     "figure2": (responses.figure2,),
     "figure3": (trends.figure3,),
-    "figure4": (diagrams.figure4,),
     "figure5": (responses.figure5,),
     "figure6": tuple(
         functools.partial(controllers.figure6, plant=plant) for plant in ("linear", "tank")
