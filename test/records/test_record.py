@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from as_given import read_csv_parts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +20,6 @@ from stiction_ros.records.quality import Quality
 from stiction_ros.records.record import Record
 from stiction_ros.records.run.bag_reader import read_bag_parts
 from stiction_ros.records.segment import Gap, Segment
-from stiction_studies.as_given import read_csv_parts
 
 G, H, B, M = Quality.GOOD, Quality.HELD, Quality.BAD, Quality.MANUAL
 
