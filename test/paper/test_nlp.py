@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from stiction_ros.errors import InputError
 from stiction_ros.identification import FitStatus, Identification, VerdictKind
-from stiction_ros.paper.equation_error import fit_outputs, squared_error
+from stiction_ros.paper.equation_error import fit_outputs
 from stiction_ros.paper.methods import identify
 from stiction_ros.paper.paper_options import PaperOptions
 from stiction_ros.paper.programme.criterion import Criterion, StemTable
@@ -27,8 +27,7 @@ from stiction_ros.paper.programme.starts import (
     inside,
     stiction_line,
 )
-from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS
-from stiction_ros.paper.smoothed_stems import final_smoothing, smoothed_stems
+from stiction_ros.paper.smoothed_laws import SMOOTH_LAWS, final_smoothing, smooth_law
 from stiction_ros.records.record import Record
 from stiction_ros.signals.arx_fit import ArxOrders
 
@@ -70,7 +69,8 @@ def test_squared_error_is_that_of_he_s_law(found: Identification) -> None:
     assert log is not None
     friction = np.array([[valve.static_friction, valve.dynamic_friction]])
     orders = ArxOrders(log.output_order, log.input_order, log.first)
-    assert log.squared_error == squared_error(short(), friction, ((5,),), orders)
+    stems = smooth_law("he").hard_stems(short().op, friction)
+    assert log.squared_error == fit_outputs(short().pv, stems, ((5,),), orders).squared_error
     assert log.objective == pytest.approx(log.squared_error, rel=0.05)
 
 
@@ -82,7 +82,7 @@ def test_every_accepted_end_keeps_the_constraints(found: Identification) -> None
     for entry in ends:
         ((static, dynamic),) = entry.end
         assert -1e-6 <= dynamic <= static + 1e-5 <= np.ptp(record.op) + 1e-4
-        stem = smoothed_stems(record.op, np.array([[static, dynamic]]), np.array([1e4]))
+        stem = smooth_law("he").stems(record.op, np.array([[static, dynamic]]), np.array([1e4]))
         assert stem.var() >= (1.0 - 1e-3) * least
 
 
@@ -112,10 +112,10 @@ def test_without_the_coefficients_it_is_the_same_criterion(static: float, share:
     orders = ArxOrders.over(3, 3, [5])
     criterion = Criterion(StemTable(record, np.ptp(record.op, axis=0), orders), ((5,),))
     value, moving = criterion(friction)
-    wanted = fit_outputs(record.pv, smoothed_stems(record.op, friction, TAU), ((5,),), orders)
+    stems = smooth_law("he").stems(record.op, friction, TAU)
+    wanted = fit_outputs(record.pv, stems, ((5,),), orders)
     assert value == pytest.approx(wanted.squared_error, rel=1e-6)
-    stem = smoothed_stems(record.op, friction, TAU)[0]
-    assert moving == pytest.approx([stem.var() / record.op.var()])
+    assert moving == pytest.approx([stems[0].var() / record.op.var()])
 
 
 @pytest.mark.parametrize("start", [(6.0, 1.0), (3.0, 3.0), (0.0, 0.0)])
