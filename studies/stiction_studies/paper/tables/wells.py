@@ -36,7 +36,7 @@ def table_of_wells(sources: Sources) -> Exhibit:
         f"Seed {sources.seed}, true delays, {DIRECTIONS} starts round the truth of V1 for each "
         f"distance, coefficients fitted at the start. Right: within {RIGHT} %."
     )
-    return Exhibit("wells", "The well round the truth", tuple(rows), None, remark)
+    return Exhibit("wells", "The well round the truth", tuple(rows), remark=remark)
 
 
 class _Well:
