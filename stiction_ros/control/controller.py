@@ -172,6 +172,7 @@ class MpcController:
         self.stem = stem
         return total / max(counted, 1)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def step(
         self,
         pv: FloatArray,
@@ -197,33 +198,6 @@ class MpcController:
             reach: how far OP may be from ``applied`` whatever is planned, %, as at the first
                 sample of a run.
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self._step(pv, sp, dv, applied, preview, known, reach)
-
-    def pass_over(
-        self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
-    ) -> None:
-        """Take in a sample that is not answered: OP stays where it is.
-
-        Args:
-            pv: measurement, shape (p,); what is not finite is missing.
-            dv, applied, known: as :meth:`step`.
-        """
-        with np.errstate(over="ignore", invalid="ignore"):
-            applied = self._take_in(pv, dv, applied, known)
-            self._strategies.hold()
-            self._decide(applied, None)
-
-    def _step(
-        self,
-        pv: FloatArray,
-        sp: FloatArray,
-        dv: FloatArray,
-        applied: FloatArray,
-        preview: FloatArray | None,
-        known: bool,
-        reach: float,
-    ) -> StepResult:
         begin = time.perf_counter()
         trouble = _unusable(pv=pv, sp=sp, dv=dv)
         applied = self._take_in(pv, dv, applied, known)
@@ -260,6 +234,20 @@ class MpcController:
             proposal.age,
             self._gap(situation, proposal),
         )
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def pass_over(
+        self, pv: FloatArray, dv: FloatArray, applied: FloatArray, *, known: bool = True
+    ) -> None:
+        """Take in a sample that is not answered: OP stays where it is.
+
+        Args:
+            pv: measurement, shape (p,); what is not finite is missing.
+            dv, applied, known: as :meth:`step`.
+        """
+        applied = self._take_in(pv, dv, applied, known)
+        self._strategies.hold()
+        self._decide(applied, None)
 
     def _take_in(
         self, pv: FloatArray, dv: FloatArray, applied: FloatArray, known: bool
