@@ -42,6 +42,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "field": ("seeds", "method", "jobs", "oracle"),
     "gain": ("seeds", "jobs"),
     "plant": ("truth", "survey"),
+    "exports": ("seeds", "jobs"),
     "own": ("seeds", "jobs"),
     "valve-test": ("seeds", "jobs"),
 }
@@ -52,13 +53,20 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "bench",
-        description="Measure speed against a baseline in the same run (identification, control), "
-        "or count how often the discrepancy workflow is right (gap; world: in loops that share "
-        "nothing with it), how often identification is (field), whether what gain promises comes "
-        "about (gain), how tests in manual end (valve-test), what the list of a survey is worth "
-        "(plant), and what each controller makes of plants that it was not tuned for (own).",
+        description="Measure speed against a baseline in the same run (graph, identification, "
+        "control, record), or count how often the discrepancy workflow is right (gap; world: in "
+        "loops that share nothing with it), how often identification is (field), whether "
+        "what gain promises comes about (gain), how tests in manual end (valve-test), what the "
+        "list of a survey is worth (plant), whether exports are read as they were written "
+        "(exports), and what each controller makes of plants that it was not tuned for (own).",
     )
-    parser.add_argument("name", choices=(*BENCHMARKS, "gap", *COUNTS), help="what to measure")
+    parser.add_argument(
+        "name",
+        nargs="?",
+        default="graph",
+        choices=(*BENCHMARKS, "gap", *COUNTS),
+        help="what to measure (graph)",
+    )
     group = parser.add_argument_group("identification; --seed and --quick also for control")
     group.add_argument(
         "--repeat",
@@ -161,6 +169,18 @@ def machine() -> str:
     )
 
 
+def _graph(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_studies.benches.speed import graph as bench_graph
+
+    return bench_graph.graph(show)
+
+
+def _record(options: argparse.Namespace, show: Bar) -> list[Row]:
+    from stiction_studies.benches.speed import record as bench_record
+
+    return bench_record.record(show)
+
+
 def _identification(options: argparse.Namespace, show: Bar) -> list[Row]:
     from stiction_studies.benches.speed import identification as bench_identification
 
@@ -212,6 +232,12 @@ def _gain(options: argparse.Namespace, machine: str) -> int:
     return bench_gain.run(options, machine)
 
 
+def _exports(options: argparse.Namespace, machine: str) -> int:
+    from stiction_studies.benches.accuracy import exports as bench_exports
+
+    return bench_exports.run(options, machine)
+
+
 def _own(options: argparse.Namespace, machine: str) -> int:
     from stiction_studies.benches.accuracy import own_plant as bench_own_plant
 
@@ -225,7 +251,9 @@ def _valve_test(options: argparse.Namespace, machine: str) -> int:
 
 
 BENCHMARKS: dict[str, Callable[[argparse.Namespace, Bar], list[Row]]] = {
+    "graph": _graph,
     "identification": _identification,
+    "record": _record,
     "control": _control,
 }
 
@@ -233,6 +261,7 @@ COUNTS: dict[str, Callable[[argparse.Namespace, str], int]] = {
     "field": bench_field.run,
     "gain": _gain,
     "plant": bench_plant.run,
+    "exports": _exports,
     "own": _own,
     "valve-test": _valve_test,
     "world": bench_world.run,

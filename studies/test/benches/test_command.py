@@ -144,8 +144,8 @@ def test_values_out_of_range_are_one_line_and_exit_2(
 
 
 def test_the_other_benchmark_refuses_these_options(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "own", "--quick"]) == 2
-    assert "benchmark own has no such option" in capsys.readouterr().err
+    assert main(["bench", "graph", "--quick"]) == 2
+    assert "benchmark graph has no such option" in capsys.readouterr().err
 
 
 @pytest.mark.trial

@@ -127,7 +127,7 @@ def test_values_out_of_range_are_one_line_and_exit_2(
 
 
 @pytest.mark.parametrize(
-    "arguments", [["own", "--loops", "3"], ["gap", "--repeat", "3"], ["own", "--full"]]
+    "arguments", [["graph", "--loops", "3"], ["gap", "--repeat", "3"], ["graph", "--full"]]
 )
 def test_options_of_another_benchmark_are_refused(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
