@@ -46,7 +46,7 @@ $(DONE): constraints.txt $(SOURCES) $(if $(realpath $(BIN)/python),,missing)
 
 # The first identification would compile for half a minute; machine code is kept beside the modules.
 compiled: $(DONE)
-	@echo "setup: machine code, half a minute at the first time"
+	@echo "setup: machine code; at the first time half a minute on a free machine, minutes on a busy one"
 	@$(BIN)/python -c "from stiction_ros.identification.warm_up import compile_loops; compile_loops()"
 
 .PHONY: missing
