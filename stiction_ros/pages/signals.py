@@ -113,7 +113,7 @@ def close_look(record: Record, found: Identification, units: Units) -> str:
     stem = found.stem if found.stem.shape == record.op.shape else None
     looks = [
         over_time(
-            f"{shown[0].upper()}{shown[1:]} from the middle of the record.",
+            f"{shown[0].upper()}{shown[1:]}, from the middle of the record.",
             time,
             _output(record, i, rows),
             units.axis(record.outputs[i]),

@@ -60,4 +60,4 @@ class Window:
         if self.period is None:
             return f"{self.last - self.first} samples without a regular cycle"
         cycles = (self.last - self.first - 1) * sample_time / self.period
-        return f"about {cycles:.2g} cycles; their period is {self.period:.3g} s on average"
+        return f"about {cycles:.2g} cycles of {self.period:.3g} s on average"

@@ -54,7 +54,7 @@ def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
 def test_a_close_look_shows_pv_over_time_and_against_op() -> None:
     of = record()
     page = close_look(of, identification(of), UNITS)
-    assert "About 4 cycles; their period is 60 s on average from" in page
+    assert "About 4 cycles of 60 s on average, from the middle" in page
     assert "PV against OP." in page
     assert "Estimated stem of V1 against OP." in page
     assert page.count("<figure") == 4

@@ -74,7 +74,7 @@ def as_html(found: Identification) -> str:
 
     told = html.escape(f"{found.status}: {found.reason}" if found.reason else _size(found))
     body = "".join(row(cells, "td") for cells in rows(found))
-    return f"<table><caption>{told}</caption>{row(HEAD, 'th')}{body}</table>"
+    return f"<table><caption>{told}</caption><thead>{row(HEAD, 'th')}</thead>{body}</table>"
 
 
 def as_table(found: Identification) -> Any:
