@@ -62,7 +62,7 @@ def materiality(estimate: ValveEstimate) -> str:
     if not estimate.static_friction > 0.0 or not estimate.band_share > 0.0:
         return ""
     share = 100.0 * min(estimate.band_share, 1.0)
-    said = f"The band f_S + f_D takes {share:.0f} % of OP's movement"
+    said = f"f_S + f_D (deadband plus stickband) takes {share:.0f} % of OP's movement"
     gone = estimate.evidence.get("loop_gone")
     if gone is None:
         return f"{said}; what goes away without it is not known, as no controller fits OP."

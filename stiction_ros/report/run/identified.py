@@ -53,7 +53,7 @@ def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None)
     for valve in valves:
         more = (
             f"f_S {percent(valve['f_s'])} % ({interval(valve['f_s_interval'])}), "
-            f"f_D {percent(valve['f_d'])} % ({interval(valve['f_d_interval'])})"
+            f"f_D {percent(valve['f_d'])} % ({interval(valve['f_d_interval'])}), 95 % intervals"
         )
         more += "".join(f"\n{said}" for said in _further(valve))
         if valve["verdict"] == "healthy":
@@ -107,8 +107,8 @@ def process_table(outputs: Sequence[Mapping[str, Any]], sample_time: float) -> s
                     number(output["fit_free_run"]),
                 ]
             )
-    head = ("PV", "valve", "a₁ …", "b₁ …", "delay, samples", "gain, PV units per %")
-    head += ("noise std, PV units", "fit one sample ahead, %", "fit from OP alone, %")
+    head = ["PV", "valve", "a₁ …", "b₁ …", "delay, samples", "gain, PV units per %"]
+    head += ["noise std, PV units", "fit one sample ahead, %", "fit from OP alone, %"]
     return (
         "<h2>Process identified</h2>"
         "<p>From stem χ (%) to PV y, an ARX equation: y<sub>k</sub> = "

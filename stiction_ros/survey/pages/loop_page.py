@@ -111,8 +111,8 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
         *("what is done", "amplitude", "period, s", "mean |PV−SP|"),
         *("travel/h", "moves/h", "reversals/h", "how it was found"),
     )
-    keys = ("amplitude", "period", "iae_per_hour")
-    keys += ("travel_per_hour", "moves_per_hour", "reversals_per_hour")
+    keys = ["amplitude", "period", "iae_per_hour"]
+    keys += ["travel_per_hour", "moves_per_hour", "reversals_per_hour"]
     rows = [_gain_row("now", gain["now"], head, keys, "")]
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")
