@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.errors import InputError
+from stiction_ros.gain.advice import PROMISED
 from stiction_ros.gain.draws import DRAWS, SEED, Draws
 from stiction_ros.gain.embedding import EmbeddingDesign, embedded
 from stiction_ros.gain.measures import Measures
@@ -26,9 +27,6 @@ or 95th percentile of those drawn is not given: the record does not tell what wo
 
 AGREED_NOW = 0.05
 """The same as a share of now."""
-
-PROMISED = 0.10
-"""Share of now from which on less is a promise: then each drawn loop must become better, too."""
 
 EMBEDDING_SAMPLES = 1000
 """Samples of a run of the embedding, the last ones."""
