@@ -214,8 +214,8 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
         columns[key] = dataclasses.replace(column, values=values, blank=blank)
     of = f"{next(iter(columns.values())).name}: " if len(columns) == 1 else ""
     said = f"{of}{plural(len(last) - len(first), 'row')} with the time stamp of an earlier row"
-    note = f"{said}: the last value counts, {differing} differ" if differing else f"{said}: left out"
-    rules.tell(note, said, "remove those that are there twice")
+    done = f"the last value counts, {differing} differ" if differing else "left out"
+    rules.tell(f"{said}: {done}", said, "remove those that are there twice")
     return dataclasses.replace(block.rows(last), columns=columns)
 
 
