@@ -54,7 +54,7 @@ $(DONE): $(CORE)
 # The first identification and the first gap would compile for a minute; machine code is kept beside
 # the modules.
 compiled: $(CORE)
-	@echo "setup: machine code, a minute at the first time"
+	@echo "setup: machine code; at the first time a minute on a free machine, minutes on a busy one"
 	@$(BIN)/python -c "from stiction_ros.identification.warm_up import compile_loops; compile_loops()"
 	@$(BIN)/python -c "import stiction_ros as s; loop = s.LoopModel.load(s.find_config('flow.loop.yaml')); \
 	    s.find_gap(loop, [s.simulate(loop, samples=600)], s.GapOptions(quick=True))"

@@ -31,6 +31,11 @@ def plural(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
+def probability(value: float | None) -> str:
+    """Return a probability with three decimals, neither 0 nor 1; nothing where there is none."""
+    return "" if value is None else f"{min(max(value, 0.001), 0.999):.3f}"
+
+
 def symbol(key: str) -> str:
     """Return the key of a parameter as it is read: ``f_S`` of ``f_s``, blanks in place of ``_``."""
     return {"f_s": "f_S", "f_d": "f_D"}.get(key, key.replace("_", " "))

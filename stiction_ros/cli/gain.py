@@ -24,8 +24,10 @@ from stiction_ros.cli.shared.progress import bar
 from stiction_ros.cli.shared.searches import add_law
 from stiction_ros.config_files import find_config
 from stiction_ros.errors import InputError
+from stiction_ros.gain.advice import advice
 from stiction_ros.loop import LoopModel
 from stiction_ros.loop.set_points import SetPoints
+from stiction_ros.texts import probability
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification
@@ -35,10 +37,10 @@ MODEL_ENDING = ".loop.yaml"
 
 MEASURES = {
     "amplitude": "amplitude",
-    "iae_per_hour": "IAE per hour",
-    "travel_per_hour": "travel %/h",
-    "moves_per_hour": "moves/h",
-    "reversals_per_hour": "reversals/h",
+    "iae_per_hour": "mean |PV−SP|",
+    "travel_per_hour": "stem travel %/h",
+    "moves_per_hour": "stem moves/h",
+    "reversals_per_hour": "stem reversals/h",
     "period": "period s",
 }
 """Measures in the order in which they are printed, and what they are called."""
@@ -144,17 +146,21 @@ def show(found: Any, verdict: Mapping[str, Any]) -> None:
     console = Console()
     console.print(_headline(found, verdict), highlight=False)
     table = Table()
-    for name in ("option", "measure", "now", "then", "5 to 95 % of the drawn loops"):
+    for name in ("option", "measure", "now", "then", "90 % of the simulated loops"):
         table.add_column(name)
     for option in found.options:
         for row in _rows(found.now, option):
             table.add_row(*row)
         table.add_section()
     console.print(table)
+    console.print(
+        "now: as recorded; then: simulated; –: not promised. Amplitude and |PV−SP| in PV units."
+    )
     for option in found.options:
         console.print(f"{option.what}: {option.note}", highlight=False)
     for note in found.notes:
         console.print(f"note: {note}", highlight=False)
+    console.print(advice(found.to_dict()), highlight=False)
 
 
 def _headline(found: Any, verdict: Mapping[str, Any]) -> str:
@@ -163,11 +169,11 @@ def _headline(found: Any, verdict: Mapping[str, Any]) -> str:
         return said
     (low, high), (least, most) = verdict["f_s_interval"], verdict["f_d_interval"]
     said += (
-        f": {verdict['verdict']}, f_S {verdict['f_s']:.3g} % ({low:.3g} to {high:.3g}), "
-        f"f_D {verdict['f_d']:.3g} % ({least:.3g} to {most:.3g})"
+        f": {verdict['verdict']}, f_S {verdict['f_s']:.2f} % ({low:.2f} to {high:.2f}), "
+        f"f_D {verdict['f_d']:.2f} % ({least:.2f} to {most:.2f})"
     )
-    if verdict["probability"] is not None:
-        said += f", P(friction) {verdict['probability']:.2f}"
+    if chance := probability(verdict["probability"]):
+        said += f", P(friction) {chance}"
     if verdict["verdict"] == "undecided":
         said += (
             ". The record does not decide whether the valve has friction: half of the drawn loops "

@@ -35,11 +35,10 @@ from stiction_ros.cli.shared.searches import (
 )
 from stiction_ros.errors import storing
 from stiction_ros.records.parts import longest_part
-from stiction_ros.texts import symbol
+from stiction_ros.texts import plural, probability, symbol
 
 if TYPE_CHECKING:
     from stiction_ros.identification import Identification, ValveEstimate
-    from stiction_ros.identification.result.cause import Cause
     from stiction_ros.records.record import Record
 
 
@@ -161,40 +160,35 @@ def _write_model(record: Record, found: Identification, target: str) -> None:
 
 
 def _print(document: Mapping[str, Any], found: Identification) -> None:
+    from stiction_ros.identification.answer.summary import rows
+    from stiction_ros.identification.answer.words import cycle, materiality, next_step, why
+
     console = Console()
-    console.print(f"{document['record']}: {found.samples} samples")
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     further = _further(found)
     table.add_column("valve", overflow="fold")
     heads = ["verdict", "P", "f_S %", "interval", "f_D %", "interval"]
     for name in (*heads, *(each for head in further.values() for each in (head, "interval"))):
         table.add_column(name, no_wrap=True)
-    table.add_column("OP lost", no_wrap=True)
-    for valve in found.valves:
-        table.add_row(
-            valve.name,
-            str(valve.verdict),
-            "" if valve.probability is None else f"{valve.probability:.2f}",
-            f"{valve.static_friction:.3g}",
-            "{:.3g} to {:.3g}".format(*valve.static_interval),
-            f"{valve.dynamic_friction:.3g}",
-            "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
-            *(cell for key in further for cell in _cells(valve, key)),
-            f"{100 * min(valve.band_share, 1.0):.0f} %" if valve.band_share > 0.0 else "",
-        )
+    for valve, cells in zip(found.valves, rows(found), strict=True):
+        table.add_row(*cells, *(cell for key in further for cell in _cells(valve, key)))
     console.print(table)
+    console.print(
+        "P: probability of friction. After a reversal OP goes back by f_S + f_D (deadband plus "
+        "stickband) before the stem moves; the stem jumps by f_S − f_D. All in % of travel."
+    )
     if found.row_samples > 1:
         used = found.row_samples * found.sample_time
-        console.print(f"rate: friction was judged on rows of {used:g} s")
+        console.print(f"Friction was judged at a coarser rate: one row each {used:g} s.")
     for output in found.outputs:
-        delays = ", ".join(f"{valve} {delay}" for valve, delay in output.delay.items())
+        delays = ", ".join(f"{k} {plural(lag, 'sample')}" for k, lag in output.delay.items())
         console.print(
-            f"{output.name}: delay {delays} samples, fit {output.fit_one_step:.1f} % one step, "
-            f"{output.fit_free_run:.1f} % free run, noise {output.noise_std:.3g}"
+            f"{output.name}: delay from {delays}; fit {output.fit_one_step:.1f} % one sample "
+            f"ahead, {output.fit_free_run:.1f} % from OP alone (free run); standard deviation of "
+            f"the noise {output.noise_std:.3g} PV units"
         )
         if output.cause is not None:
-            console.print(f"{output.name}: {_cause(output.cause)}")
-    from stiction_ros.identification.answer.words import materiality, next_step, why
+            console.print(cycle(output))
 
     for j, valve in enumerate(found.valves):
         said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
@@ -217,9 +211,11 @@ def _print_figures(found: Identification) -> None:
             console.print(f"{valve.name}: this method computes no probability of friction")
             continue
         table = Table(
-            title=f"{valve.name}: P(friction) {valve.probability:.3f}", title_justify="left"
+            title=f"{valve.name}: probability of friction {probability(valve.probability)}; "
+            "log odds above 0 speak for friction",
+            title_justify="left",
         )
-        for name in ("figure", "value", "unit", "adds", "definition"):
+        for name in ("figure", "value", "unit", "log odds", "definition"):
             table.add_column(name)
         odds = contributions(valve.figures)
         for name, told in definitions().items():
@@ -248,15 +244,3 @@ def _cells(valve: ValveEstimate, key: str) -> tuple[str, str]:
     ends = valve.further_intervals.get(key)
     between = "held" if ends is None else "{:.3g} to {:.3g}".format(*ends)
     return f"{valve.further[key]:.3g}", between
-
-
-def _cause(cause: Cause) -> str:
-    """Return why an output oscillates, in words."""
-    from stiction_ros.identification.result.cause import CauseKind
-
-    if cause.kind is CauseKind.NONE or cause.period is None:
-        return f"cause {cause.kind}. {cause.sentence}"
-    return (
-        f"cause {cause.kind}, period {cause.period:.3g} s, regularity {cause.regularity:.3g} "
-        f"(above 1 is regular), amplitude {cause.amplitude:.3g}. {cause.sentence}"
-    )

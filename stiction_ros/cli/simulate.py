@@ -72,7 +72,8 @@ def run(options: argparse.Namespace) -> int:
             lambda done: show(done / options.samples),
         )
     write(record, out)
-    told = f"{out}: {len(record)} samples of {record.sample_time:g} s; {moves(record)}; read it by"
+    told = f"{out}: {len(record)} samples of {record.sample_time:g} s; {moves(record)}."
+    told += " STEM is the true stem, for comparison; identify does not use it. Read the record by"
     print(told, shlex.join(["stiction", "identify", str(out)]), sep="\n", file=sys.stderr)
     return 0
 
@@ -115,6 +116,6 @@ def moves(record: Record) -> str:
     stem = record.op if record.stem is None else record.stem
     counts = np.count_nonzero(np.diff(stem, axis=0), axis=0)
     return ", ".join(
-        f"{valve} moved at {count} of them"
+        f"the stem of {valve} moved at {count} of them"
         for valve, count in zip(record.valves, counts.tolist(), strict=True)
     )

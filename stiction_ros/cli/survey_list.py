@@ -9,6 +9,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from stiction_ros.texts import probability
+
 if TYPE_CHECKING:
     from stiction_ros.survey.entry import Entry
     from stiction_ros.survey.pages.trend import Earlier
@@ -64,7 +66,7 @@ def _table(entries: Sequence[Entry], width: int) -> Table:
             kind_of(entry),
             op_figure(entry.f_s, entry.op_unit) if entry.found else "",
             percent(entry.band_share) if entry.found else "",
-            percent(entry.probability),
+            probability(entry.probability),
             cause_words(entry.cause),
             in_words(entry, "service") if entry.gain else "",
         )

@@ -125,17 +125,21 @@ def _show(plan: Plan, before: str | None) -> None:
     facts, hold = plan.facts, spoken(plan.facts.hold)
     low, high = facts.pv_limit
     print(f"Valve test of {facts.valve}, {len(plan.levels)} moves, {spoken(plan.duration)}")
-    print(f"  1. Put the loop in manual at OP {facts.op:.4g} % and wait until PV rests.")
-    print(f"  2. Begin to record OP and PV; wait for another {hold}.")
+    print(f"  1. Put the loop in manual at OP {facts.op:.4g} %, as recorded; wait until PV rests.")
+    print(f"  2. Begin to record OP and PV; wait {hold}, in which PV settles after a move.")
     for i, level in enumerate(plan.levels):
         print(f"  {i + 3}. Set OP to {level:.4g} % and wait for {hold}.")
-    print(f"  {len(plan.levels) + 3}. Stop recording, and put the loop back as it was.")
-    print(f"Set OP back to {facts.op:.4g} % at once and stop if PV leaves {low:.4g} to {high:.4g}.")
+    print(f"  {len(plan.levels) + 3}. Stop recording, and put the controller back in automatic.")
+    print(f"Set OP back to {facts.op:.4g} % at once and stop if PV leaves {low:.4g} to {high:.4g}:")
+    print(
+        "  PV went as far before, or the moves could take it there; --pv-limit sets other limits."
+    )
     if plan.pv_move is None:
         print("How far PV will move is not known: make sure that it may.")
     else:
         print(f"PV is expected to move by up to {plan.pv_move:.3g}.")
-    print(f"Then: {NEXT}{'' if before is None else f' --before {before}'}")
+    told = "" if before is None else f" --before {before}"
+    print(f"Then, with TEST the file that was recorded: {NEXT}{told}")
 
 
 def _told(judgement: Judgement, plan: Plan | None, options: argparse.Namespace) -> None:

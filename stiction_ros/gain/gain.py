@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stiction_ros.errors import InputError
+from stiction_ros.gain.advice import PROMISED
 from stiction_ros.gain.draws import DRAWS, SEED, Draws
 from stiction_ros.gain.embedding import EmbeddingDesign, embedded
 from stiction_ros.gain.measures import Measures
@@ -26,9 +27,6 @@ or 95th percentile of those drawn is not given: the record does not tell what wo
 
 AGREED_NOW = 0.05
 """The same as a share of now."""
-
-PROMISED = 0.10
-"""Share of now from which on less is a promise: then each drawn loop must become better, too."""
 
 EMBEDDING_SAMPLES = 1000
 """Samples of a run of the embedding, the last ones."""
@@ -52,7 +50,7 @@ and is fed back tells as much of the controller as of the process."""
 
 KEYS = tuple(field.name for field in dataclasses.fields(Measures))
 
-WORDS = {"iae_per_hour": "IAE", "amplitude": "amplitude"}
+WORDS = {"iae_per_hour": "mean |PV−SP|", "amplitude": "amplitude"}
 """Measures on which the drawn loops must agree, in words."""
 
 
@@ -117,9 +115,9 @@ class Option:
             f"{WORDS[key]} ({low:.3g} to {high:.3g}, now {getattr(now, key):.3g})"
             for key, (low, high) in apart.items()
         )
-        note = f"{self.note} The drawn loops do not agree on its {said}."
+        note = f"{self.note} Not promised: the simulated loops do not agree on its {said}."
         for key in WORDS.keys() & self.interval.keys() - apart.keys():
-            note += f" On its {WORDS[key]} they do, which alone holds too seldom to be promised."
+            note += f" That they agree on its {WORDS[key]} alone is not enough."
         return dataclasses.replace(self, measures=None, note=note)
 
     def _apart(self, now: Measures) -> dict[str, tuple[float, float]]:
@@ -202,7 +200,7 @@ def gain_of(record: Record, found: Identification, valve: str | None = None) -> 
         others = [Option(what, None, {}, note) for what in What if what is not What.LEAVE]
         same = Option(What.LEAVE, now, {}, "The loop as it is, as recorded.")
         return Gain(*names, now, (*others, same))
-    note = f"The loop as it is: {len(kept)} of {DRAWS} drawn loops repeat the record."
+    note = f"The loop as it is: {len(kept)} of {DRAWS} simulated loops repeat the record."
     left = option_of(What.LEAVE, [runs[k] for k in kept], note, likeliest=draws.likeliest)
     draws = draws.taken(kept)
     assert left.measures is not None
@@ -226,9 +224,9 @@ def _doubt(now: Measures, runs: Sequence[Measures | None], kept: int) -> str:
     if runs[0] is None:
         return "the identified loop grows without end"
     if _repeats(now, runs[0]):
-        return f"no more than {kept} of {len(runs)} drawn loops repeat the record"
+        return f"no more than {kept} of {len(runs)} simulated loops repeat the record"
     return (
-        "the identified loop does not repeat the record, its IAE is "
+        "the identified loop does not repeat the record, its mean |PV−SP| is "
         f"{_ratio(runs[0].iae_per_hour, now.iae_per_hour):.2f} and its amplitude "
         f"{_ratio(runs[0].amplitude, now.amplitude):.2f} times the recorded one"
     )
@@ -238,7 +236,7 @@ def _service(loop: RecordedLoop, draws: Draws, now: Measures) -> Option:
     if not draws.frictions.any():
         return _as_now(What.SERVICE, now, "No friction was found: a service changes nothing.")
     runs = loop.run(draws, serviced=True)
-    note = "The valve without friction under the controller that is there."
+    note = "No friction, same controller: the stem follows each move of OP, also those by noise."
     return option_of(What.SERVICE, runs, note, likeliest=draws.likeliest)
 
 
@@ -294,7 +292,7 @@ def _embedding(loop: RecordedLoop, found: Identification, now: Measures) -> Opti
             "answers there the record does not show, so that nothing is said of it."
         )
         return Option(What.EMBEDDING, None, {}, note)
-    note = f"Predictive control that knows the friction, on {len(runs)} drawn loops."
+    note = f"A controller that knows the friction, on {len(runs)} simulated loops."
     weights = design.weights(loop.pv_scale, loop.op_scale)
     if gone := runs.count(None):
         note = f"{note} In {gone} of them the loop grows without end."

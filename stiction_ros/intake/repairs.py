@@ -213,9 +213,9 @@ def _without_repeats(block: Block, rules: Rules) -> Block:
         differing += int(np.count_nonzero(column.values[there] != values[group[there]]))
         columns[key] = dataclasses.replace(column, values=values, blank=blank)
     of = f"{next(iter(columns.values())).name}: " if len(columns) == 1 else ""
-    said = f"{of}{plural(len(last) - len(first), 'row')} with a stamp that was there already"
-    note = f"{said}: the last value counts, {differing} differ" if differing else f"{said} left out"
-    rules.tell(note, said, "remove those that are there twice")
+    said = f"{of}{plural(len(last) - len(first), 'row')} with the time stamp of an earlier row"
+    done = f"the last value counts, {differing} differ" if differing else "left out"
+    rules.tell(f"{said}: {done}", said, "remove those that are there twice")
     return dataclasses.replace(block.rows(last), columns=columns)
 
 

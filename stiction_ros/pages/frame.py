@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterable
 from string import Template
 
@@ -81,7 +82,7 @@ figure img { display: block; width: 100%; height: auto; background: #fff;
   border: 1px solid var(--line); border-radius: 8px; padding: 10px; }
 .plot svg { display: block; touch-action: pan-y; overflow: hidden; }
 .square > svg { width: 100%; height: auto; }
-.plot > .over { overflow: visible; width: calc(100% - 76px); margin: 8px 8px 28px 68px; }
+.plot > .over { overflow: visible; width: calc(100% - 92px); margin: 8px 24px 28px 68px; }
 .plot text { fill: var(--soft); font-size: 12px; } .square text { font-size: 9.5px; }
 .plot .mark { stroke: var(--ink); stroke-dasharray: 4 4; }
 .plot .frame { fill: none; stroke: var(--line); }
@@ -89,7 +90,8 @@ figure img { display: block; width: 100%; height: auto; background: #fff;
 .plot polyline { fill: none; stroke-width: 1.3; vector-effect: non-scaling-stroke; }
 .plot .pv { stroke: var(--pv); } .plot .op { stroke: var(--op); }
 .plot .stem { stroke: var(--stem); } .plot .sp { stroke: var(--sp); stroke-dasharray: 5 3; }
-.plot .free { stroke: var(--free); } .plot .ink { stroke: var(--ink); }
+.plot .free { stroke: var(--free); }
+.plot .ink { stroke: var(--ink); stroke-width: 4; opacity: .45; }
 .plot .shade { fill: var(--soft); opacity: .14; }
 .plot .whole { stroke: var(--soft); stroke-width: .7; }
 .plot .diagonal { stroke: var(--soft); stroke-dasharray: 4 4; }
@@ -183,9 +185,9 @@ def text(value: object) -> str:
 
 
 def words(value: object) -> str:
-    """Return ``value`` for HTML with f_S and f_D set as symbols and lines kept."""
+    """Return ``value`` for HTML with f_S and f_D set as symbols, code and lines kept."""
     return (
-        text(value)
+        re.sub("`([^`]+)`", r"<code>\1</code>", text(value))
         .replace("f_S", "f<sub>S</sub>")
         .replace("f_D", "f<sub>D</sub>")
         .replace("\n", "<br>")

@@ -47,7 +47,7 @@ const show = (view, a, b) => {
   for (const draw of view.drawn) draw();
   view.whole.disabled = view.a === view.low && view.b === view.high;
 };
-const ticks = (a, b, dated) => {
+const ticks = (a, b, dated, unit) => {
   let step = dated ? CALENDAR.find(one => (b - a) / one <= 8) || CALENDAR.at(-1)
     : Math.pow(10, Math.floor(Math.log10((b - a) / 3)));
   if (!dated && (b - a) / step > 12) step *= 2.5;
@@ -58,7 +58,8 @@ const ticks = (a, b, dated) => {
     const day = dated && +iso.slice(8, 10) + " " + new Date(1000 * k * step).toLocaleString("en",
       { month: "short", timeZone: "UTC" });
     const clock = dated && (step % 86400 ? iso.slice(11, step % 60 ? 19 : 16) : "");
-    found.push([k * step, !dated ? (k * step).toFixed(digits) : !clock || !(k * step % 86400) ? day
+    const plain = (k * step).toFixed(digits) + (found.length ? "" : unit);
+    found.push([k * step, !dated ? plain : !clock || !(k * step % 86400) ? day
       : found.length ? clock : day + " " + clock]);
   }
   return found;
@@ -100,7 +101,7 @@ for (const figure of document.querySelectorAll("figure.plot[data-low]")) {
     area.setAttribute("viewBox",
       [(a - low) * scale, whole[1], (b - a) * scale, whole[3]].join(" "));
     axis.textContent = "";
-    for (const [value, label] of ticks(a, b, dated)) {
+    for (const [value, label] of ticks(a, b, dated, figure.dataset.unit)) {
       const tick = document.createElementNS("http://www.w3.org/2000/svg", "text");
       tick.setAttribute("x", 100 * (value - a) / (b - a) + "%");
       tick.setAttribute("y", axis.dataset.y);
@@ -189,9 +190,10 @@ def over_time(
         up = (high - value) / (high - low) * TALL
         grid.append(f'<line class="grid" x1="0" x2="100%" y1="{up:.1f}" y2="{up:.1f}"/>')
         labels.append(f'<text x="-6" y="{up + 4:.1f}" text-anchor="end">{_label(value)}</text>')
-    ticks = (
-        _dates(begin, end) if dated else [(value, _label(value)) for value in _ticks(begin, end, 8)]
-    )
+    short = {"hours": " h", "minutes": " min"}.get(unit, " s")
+    ticks = _dates(begin, end) if dated else [(at, _label(at)) for at in _ticks(begin, end, 8)]
+    if not dated and ticks:
+        ticks[0] = (ticks[0][0], ticks[0][1] + short)
     across = "".join(
         f'<text x="{100.0 * (value - begin) / (end - begin):.2f}%" y="{TALL + 18}" '
         f'text-anchor="middle">{label}</text>'
@@ -199,7 +201,7 @@ def over_time(
     )
     told = f"Time from {_stamp(begin)} to {_stamp(end)}." if dated else f"Time in {unit}."
     return (
-        f'<figure class="plot" data-low="{begin:.12g}" data-high="{end:.12g}"'
+        f'<figure class="plot" data-low="{begin:.12g}" data-high="{end:.12g}" data-unit="{short}"'
         f"{' data-dated' * dated}>{_keys(curves, axis)}"
         f'<svg class="over" height="{TALL}" role="img" aria-label="{text(title)}">'
         f'{"".join(grid)}<svg width="100%" height="{TALL}" viewBox="0 0 {WIDE} {TALL}" '
@@ -263,7 +265,7 @@ def _keys(curves: Sequence[Curve], axis: str) -> str:
         f'<span><i class="{kind}"></i>{text(name)}</span>'
         for name, kind in dict.fromkeys((curve.name, curve.kind) for curve in curves)
     )
-    return f'<div class="key">{shown}<span class="soft">{axis}</span></div>'
+    return f'<div class="key"><b class="soft">{axis}:</b>{shown}</div>'
 
 
 def _unit(span: float) -> tuple[str, float]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.errors import InputError
 from stiction_ros.identification import Identification
+from stiction_ros.identification.answer.summary import as_html
 from stiction_ros.intake.record_file import record_of
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import MOST, SCRIPT, Curve, against, over_time
@@ -92,7 +93,7 @@ def plot(
     stem = None
     if found is not None:
         stem = found.stem if found.stem.shape == measured.op.shape else None
-        parts.append(close_look(measured, found, UNITS))
+        parts += [as_html(found), close_look(measured, found, UNITS)]
     return Figure(framed(measured.name, [*parts, all_signals(measured, stem, UNITS)], SCRIPT))
 
 
@@ -112,15 +113,15 @@ def close_look(record: Record, found: Identification, units: Units) -> str:
     stem = found.stem if found.stem.shape == record.op.shape else None
     looks = [
         over_time(
-            f"{shown[0].upper()}{shown[1:]} from the middle of the record.",
+            f"{shown[0].upper()}{shown[1:]}, from the middle of the record.",
             time,
             _output(record, i, rows),
             units.axis(record.outputs[i]),
             start,
         ),
         over_time(
-            "While the stem rests and OP travels, PV does not answer; PV follows where the stem "
-            "moves.",
+            "OP and stem of the same time. Look for stretches in which OP travels and the stem "
+            "rests: there PV does not answer.",
             time,
             _valve(record, stem, j, rows),
             units.op,
@@ -202,8 +203,8 @@ def _planes(record: Record, stem: FloatArray | None, window: Window, units: Unit
     op, pv = record.op[:, window.valve], record.pv[:, window.output]
     drawn = [
         against(
-            "PV against OP. Friction makes corners: OP travels while PV hardly answers, then PV "
-            "steps. Without friction a cycle draws an ellipse.",
+            "PV against OP. Look for corners: with friction OP travels while PV hardly answers, "
+            "then PV steps; without it a cycle draws an ellipse. Noise and loads hide both.",
             [
                 (op[around], Curve(name, "whole", pv[around])),
                 (op[rows], Curve("the close look", "pv", pv[rows])),
@@ -220,8 +221,8 @@ def _planes(record: Record, stem: FloatArray | None, window: Window, units: Unit
             break
         drawn.append(
             against(
-                f"Stem of {valve} against OP. A valve that sticks rests on level lines and then "
-                "jumps; a healthy valve stays on the diagonal.",
+                f"Estimated stem of {valve} against OP. Level lines: the stem rests. Between them "
+                "it moves or jumps. Without friction it stays on the diagonal.",
                 [(record.op[around, j], Curve("stem, estimated", "stem", stem[around, j]))],
                 (f"OP of {text(valve)}, {units.op}", f"stem, {units.op}"),
                 equal=True,

@@ -60,5 +60,4 @@ class Window:
         if self.period is None:
             return f"{self.last - self.first} samples without a regular cycle"
         cycles = (self.last - self.first - 1) * sample_time / self.period
-        whole = "four" if cycles > CYCLES - 0.5 else f"{cycles:.1f}"
-        return f"{whole} cycles of {self.period:.3g} s"
+        return f"about {cycles:.2g} cycles of {self.period:.3g} s on average"

@@ -88,10 +88,10 @@ def percent(value: object) -> str:
 
 
 def interval(ends: object) -> str:
-    """Return ``7.88 … 7.93``; a dash when there is none."""
+    """Return ``7.88 … 7.93`` in one piece; a dash when there is none."""
     if not isinstance(ends, list | tuple) or len(ends) != 2:
         return "–"
-    return f"{percent(ends[0])} … {percent(ends[1])}"
+    return f"{percent(ends[0])}\u00a0…\u00a0{percent(ends[1])}"
 
 
 def duration(seconds: float | None) -> str:

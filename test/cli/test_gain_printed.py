@@ -33,11 +33,15 @@ def test_a_terminal_of_80_columns_is_enough(
     )
     show(Gain("V1", "PV1", now, options), VERDICT)
     out = capsys.readouterr().out
-    assert out.startswith("V1 and PV1: undecided, f_S 1.25 % (0 to 2.5), f_D 0.5 % (0 to 1), P(fr")
+    assert out.startswith(
+        "V1 and PV1: undecided, f_S 1.25 % (0.00 to 2.50), f_D 0.50 % (0.00 to 1.00"
+    )
     assert "does not decide" in " ".join(out.splitlines())
     assert "0.139 │ 0.121 │ 0.101 to 0.139" in " ".join(out.split())
     assert "1000 to 1200" in out
     assert out.count("period s") == 1  # where it is another one
     assert "98.8 │ 21.5" in " ".join(out.split())
     assert f"service: {NOTE[:50]}" in out
+    assert "friction promises" not in out
+    assert "a service of the valve promises 42 %" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 80

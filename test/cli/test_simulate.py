@@ -55,7 +55,7 @@ def test_without_out_the_file_bears_the_loop_s_name(
     assert main(["simulate", "flow.loop.yaml", "--samples", "100"]) == 0
     assert len(open_record("flow.csv")) == 100
     said = capsys.readouterr().err
-    assert "flow.csv: 100 samples of 1 s; V1 moved at" in said
+    assert "flow.csv: 100 samples of 1 s; the stem of V1 moved at" in said
     assert "stiction identify flow.csv" in said
 
 

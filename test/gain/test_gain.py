@@ -448,4 +448,4 @@ def test_a_note_says_on_which_measure_the_drawn_loops_do_not_agree() -> None:
     assert option.measures is None
     assert option.interval == interval
     assert "do not agree on its amplitude (0.0013 to 0.0055, now 0.0081)" in option.note
-    assert "On its IAE they do" in option.note
+    assert "agree on its mean |PV−SP| alone is not enough" in option.note

@@ -68,7 +68,7 @@ def tall(signal: str) -> list[list[str]]:
     return rows
 
 
-NOTE = "3 rows with a stamp that was there already: the last value counts, 3 differ"
+NOTE = "3 rows with the time stamp of an earlier row: the last value counts, 3 differ"
 
 
 def test_two_values_on_a_stamp_are_counted_with_one_value_a_row(tmp_path: Path) -> None:

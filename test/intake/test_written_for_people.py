@@ -72,7 +72,7 @@ def test_rows_that_are_there_twice_are_not_spread(tmp_path: Path) -> None:
     rows = [row for row in table() for _ in range(2)]
     loop = one(write(tmp_path / "a.csv", text(rows)))
     assert loop.parts[0].sample_time == pytest.approx(STEP)
-    assert "with a stamp that was there already left out" in said(loop)
+    assert "with the time stamp of an earlier row: left out" in said(loop)
 
 
 @pytest.mark.parametrize(("zone", "hours"), [("UTC", 0), ("CET", 1), ("CEST", 2), ("EDT", -4)])

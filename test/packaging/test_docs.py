@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import code
 import re
 import shlex
 import subprocess
@@ -196,15 +197,12 @@ def test_the_first_program_of_the_readme_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    after = text[text.index("## Two commands") :].split("```sh", 1)[1].split("```", 1)[1]
-    block = re.search(r"^```(\w+)\n(.*?)^```", after, re.MULTILINE | re.DOTALL)
-    assert block is not None
-    assert block.group(1) == "python"
+    block = next(block for language, block in BLOCK.findall(text) if language == "python")
     model = stiction_ros.LoopModel.load(stiction_ros.find_config("flow.loop.yaml"))
     monkeypatch.chdir(tmp_path)
     stiction_ros.write_csv(stiction_ros.simulate(model, samples=600), "history.csv")
-    exec(compile(block.group(2), "README.md", "exec"), {})
-    assert capsys.readouterr().out.startswith("V1 sticky ")
+    code.InteractiveInterpreter().runcode(code.compile_command(block, symbol="exec"))
+    assert "\nV1: sticky" in capsys.readouterr().out
 
 
 @pytest.mark.trial

@@ -22,8 +22,8 @@ MARCH = 1709330400.0
 @pytest.mark.parametrize(
     ("span", "start", "marks", "told"),
     [
-        (90.0, 0.0, "0 20 40 60 80", "Time in seconds."),
-        (4000.0, 0.0, "0 10 20 30 40 50 60", "Time in minutes."),
+        (90.0, 0.0, "0 s 20 40 60 80", "Time in seconds."),
+        (4000.0, 0.0, "0 min 10 20 30 40 50 60", "Time in minutes."),
         (3600.0, MARCH, "1 Mar 22:00 22:10 22:20 22:30 22:40 22:50 23:00", "22:00 to 2024-03-01"),
         (3e4, MARCH, "1 Mar 22:00 2 Mar 02:00 04:00 06:00", "from 2024-03-01 22:00 to 2024-03-02"),
         (1e6, MARCH, "2 Mar 4 Mar 6 Mar 8 Mar 10 Mar 12 Mar", "to 2024-03-13 11:46:40."),
@@ -54,9 +54,9 @@ def test_a_long_curve_keeps_its_peaks_and_its_gaps() -> None:
 def test_a_close_look_shows_pv_over_time_and_against_op() -> None:
     of = record()
     page = close_look(of, identification(of), UNITS)
-    assert "Four cycles of 60 s from the middle of the record." in page
+    assert "About 4 cycles of 60 s on average, from the middle" in page
     assert "PV against OP." in page
-    assert "Stem of V1 against OP." in page
+    assert "Estimated stem of V1 against OP." in page
     assert page.count("<figure") == 4
     without = dataclasses.replace(identification(of), stem=np.empty((0, 1)))
     assert "estimated" not in close_look(of, without, UNITS)

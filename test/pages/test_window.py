@@ -31,7 +31,7 @@ def test_four_cycles_of_the_middle_are_shown() -> None:
     assert (window.valve, window.output, window.period) == (0, 0, PERIOD)
     assert window.last - window.first - 1 == CYCLES * PERIOD
     assert window.first + window.last == pytest.approx(SAMPLES, abs=1)
-    assert window.named(1.0) == "four cycles of 60 s"
+    assert window.named(1.0) == "about 4 cycles of 60 s on average"
 
 
 def test_the_widest_band_and_the_output_that_cycles_with_it_are_shown() -> None:
@@ -69,4 +69,4 @@ def test_a_window_stays_within_a_good_part() -> None:
     assert 0 <= window.first < window.last <= 300
     slow = Window.of(record(SAMPLES), answer(900.0))
     assert (slow.first, slow.last) == (0, SAMPLES)
-    assert slow.named(1.0) == "1.3 cycles of 900 s"
+    assert slow.named(1.0) == "about 1.3 cycles of 900 s on average"

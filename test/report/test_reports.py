@@ -42,7 +42,7 @@ def test_the_report_of_a_run(log: RunLog, tmp_path: Path) -> None:
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
     assert "Valve V1 sticks; the swap ended the limit cycle" in page
     assert "After 8 min 20 s the controller changed from unaware to embedding" in page
-    assert "5.10 % (4.98 … 5.22)" in page
+    assert "5.10 % (4.98\u00a0…\u00a05.22)" in page
     for key in ("amplitude", "offset", "iae_per_hour"):
         assert number(written.summary["phases"]["before"]["PV1"][key]) in page
     assert "a note &lt;of&gt; the reader" in page
@@ -107,7 +107,7 @@ def test_the_report_of_a_record(log: RunLog, tmp_path: Path, status: FitStatus) 
     page = report_record(record, found, tmp_path / "out").read_text(encoding="utf-8")
     assert outside(page) == []
     assert "Valve V1 sticks" in page
-    assert "5.00 % (4.90 … 5.10)" in page
+    assert "5.00 % (4.90\u00a0…\u00a05.10)" in page
     assert ("no model fits" in page) is not good
     assert page.count("<figure") == (8 if good else 5)
     assert "<img" not in page
@@ -144,7 +144,7 @@ def test_other_words_for_people() -> None:
     assert duration(44880.0) == "12 h 28 min"
     assert duration(125.0) == "2 min 5 s"
     assert duration(None) == "–"
-    assert interval([1.0, None]) == "1.00 … –"
+    assert interval([1.0, None]) == "1.00\u00a0…\u00a0–"
     assert words("f_S < 1") == "f<sub>S</sub> &lt; 1"
 
 

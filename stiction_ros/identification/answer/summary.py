@@ -8,14 +8,14 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from stiction_ros.identification.answer.words import materiality, next_step, why
+from stiction_ros.identification.answer.words import cycle, materiality, next_step, why
 from stiction_ros.identification.result.identification import (
     Identification,
     OutputModel,
     ValveEstimate,
     VerdictKind,
 )
-from stiction_ros.texts import plural, spoken
+from stiction_ros.texts import plural, probability, spoken
 
 WIDTH = 80
 """Columns of a terminal."""
@@ -23,7 +23,7 @@ WIDTH = 80
 NOTES = 3
 """Notes that a summary shows."""
 
-HEAD = ("valve", "verdict", "f_S, %", "interval", "f_D, %", "interval", "share of OP")
+HEAD = ("valve", "verdict", "P", "f_S, %", "interval", "f_D, %", "interval")
 
 
 def summary(found: Identification) -> str:
@@ -32,14 +32,16 @@ def summary(found: Identification) -> str:
     if found.reason:
         lines += _wrapped(f"The fit is not to be trusted: {found.reason}", indent="")
     for j, valve in enumerate(found.valves):
-        lines += ["", *_wrapped(f"{valve.name}: {valve.verdict}{_frictions(valve)}", indent="")]
+        chance = probability(valve.probability)
+        sure = f", probability of friction {chance}" if chance else ""
+        lines += ["", *_wrapped(f"{valve.name}: {valve.verdict}{sure}{_frictions(valve)}", "")]
         said = (why(found, j), materiality(valve))
         lines += _wrapped(" ".join(filter(None, said)))
         lines += _wrapped(f"What to do next: {next_step(found, j)}")
     for output in found.outputs:
         lines += ["", *_wrapped(_process(found, output), indent="")]
         if output.cause is not None:
-            lines += _wrapped(output.cause.sentence)
+            lines += _wrapped(cycle(output))
     if found.notes:
         lines.append("")
     for note in found.notes[:NOTES]:
@@ -55,11 +57,11 @@ def rows(found: Identification) -> Iterator[tuple[str, ...]]:
         yield (
             valve.name,
             str(valve.verdict),
-            f"{valve.static_friction:.3g}",
-            "{:.3g} to {:.3g}".format(*valve.static_interval),
-            f"{valve.dynamic_friction:.3g}",
-            "{:.3g} to {:.3g}".format(*valve.dynamic_interval),
-            f"{min(valve.band_share, 1.0):.0%}" if valve.band_share > 0.0 else "",
+            probability(valve.probability),
+            f"{valve.static_friction:.2f}",
+            "{:.2f} to {:.2f}".format(*valve.static_interval),
+            f"{valve.dynamic_friction:.2f}",
+            "{:.2f} to {:.2f}".format(*valve.dynamic_interval),
         )
 
 
@@ -72,7 +74,7 @@ def as_html(found: Identification) -> str:
 
     told = html.escape(f"{found.status}: {found.reason}" if found.reason else _size(found))
     body = "".join(row(cells, "td") for cells in rows(found))
-    return f"<table><caption>{told}</caption>{row(HEAD, 'th')}{body}</table>"
+    return f"<table><caption>{told}</caption><thead>{row(HEAD, 'th')}</thead>{body}</table>"
 
 
 def as_table(found: Identification) -> Any:
@@ -95,8 +97,8 @@ def _frictions(valve: ValveEstimate) -> str:
         return ""
     static, dynamic = valve.static_interval, valve.dynamic_interval
     return (
-        f"; f_S {valve.static_friction:.3g} % ({static[0]:.3g} to {static[1]:.3g} %), "
-        f"f_D {valve.dynamic_friction:.3g} % ({dynamic[0]:.3g} to {dynamic[1]:.3g} %), "
+        f"; f_S {valve.static_friction:.2f} % ({static[0]:.2f} to {static[1]:.2f} %), "
+        f"f_D {valve.dynamic_friction:.2f} % ({dynamic[0]:.2f} to {dynamic[1]:.2f} %), "
         f"law {valve.law}"
     )
 
@@ -109,7 +111,7 @@ def _process(found: Identification, output: OutputModel) -> str:
         gain = "integrates" if level else f"gain {sum(taps) / (1.0 + sum(output.a)):.3g} per % of"
         delay = output.delay.get(valve, 0) * found.sample_time
         told.append(f"{gain} {valve}, delay {delay:g} s")
-    fit = f"free-run fit {output.fit_free_run:.0f} %"
+    fit = f"fit of PV computed from OP alone (free run) {output.fit_free_run:.0f} %"
     return f"{output.name}: {'; '.join([*told, fit])}"
 
 

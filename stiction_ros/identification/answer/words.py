@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from stiction_ros.identification.result.cause import Cause, CauseKind
 from stiction_ros.identification.result.identification import (
     Identification,
+    OutputModel,
     ValveEstimate,
     VerdictKind,
 )
+from stiction_ros.texts import spoken
 
 CAUSES: Mapping[CauseKind, str] = {
     CauseKind.TUNING: "retune the controller: it rings with the process",
@@ -18,6 +20,17 @@ CAUSES: Mapping[CauseKind, str] = {
     CauseKind.UNKNOWN: "look at the neighbouring loops: nothing found here explains the cycle",
 }
 """What to do about a cycle that the valve does not make."""
+
+
+def cycle(model: OutputModel) -> str:
+    """Return why an output oscillates, by the names of :class:`CauseKind`; nothing if untold."""
+    if (cause := model.cause) is None:
+        return ""
+    said = f"{model.name}: cause of the oscillation: {cause.kind}"
+    if cause.kind is not CauseKind.NONE and cause.period is not None:
+        said += f"; period {spoken(cause.period)}, amplitude {cause.amplitude:.3g} PV units"
+    # That the valve makes the cycle is what materiality says already, with its share.
+    return f"{said}." if cause.kind is CauseKind.VALVE else f"{said}. {cause.sentence}"
 
 
 def why(found: Identification, valve: int) -> str:
@@ -37,11 +50,11 @@ def why(found: Identification, valve: int) -> str:
         return f"The loop does not oscillate: nothing to repair is visible. {reason}"
     if kind is VerdictKind.HEALTHY:
         high = estimate.static_interval[1]
-        return f"The stem of {name} follows OP: f_S above {high:.2g} % is ruled out by this record."
-    rests = f"When OP turns, the stem of {name} rests until OP has gone back by {band:.2g} %"
+        return f"The stem of {name} follows OP: f_S above {high:.2f} % is ruled out by this record."
+    rests = f"When OP turns, the stem of {name} rests until OP has gone back by {band:.2f} %"
     if kind is VerdictKind.BACKLASH:
         return f"{rests}; it then follows, without a jump that this record shows."
-    return f"{rests}, and then jumps by {estimate.jump:.2g} % or more."
+    return f"{rests}, and then jumps by {estimate.jump:.2f} % or more."
 
 
 def materiality(estimate: ValveEstimate) -> str:
@@ -49,7 +62,7 @@ def materiality(estimate: ValveEstimate) -> str:
     if not estimate.static_friction > 0.0 or not estimate.band_share > 0.0:
         return ""
     share = 100.0 * min(estimate.band_share, 1.0)
-    said = f"The band f_S + f_D takes {share:.0f} % of OP's movement"
+    said = f"f_S + f_D (deadband plus stickband) takes {share:.0f} % of OP's movement"
     gone = estimate.evidence.get("loop_gone")
     if gone is None:
         return f"{said}; what goes away without it is not known, as no controller fits OP."
@@ -59,13 +72,12 @@ def materiality(estimate: ValveEstimate) -> str:
     return f"{said}; in simulation {away:.0f} % of the loop's movement goes away without it."
 
 
-def next_step(found: Identification, valve: int, *, asked: bool = False) -> str:
+def next_step(found: Identification, valve: int) -> str:
     """Return what to do next about a valve.
 
     Args:
         found: what identification made of the record.
         valve: index.
-        asked: whether what would help is told elsewhere, or that it could not be simulated.
     """
     estimate = found.valves[valve]
     if estimate.verdict is VerdictKind.UNDECIDED:
@@ -87,11 +99,9 @@ def next_step(found: Identification, valve: int, *, asked: bool = False) -> str:
     if kind is not CauseKind.VALVE:
         return f"The friction makes no cycle: {service} at the next stop."
     service = f"{service[0].upper()}{service[1:]}"
-    if asked:
-        return f"{service}."
     return (
-        f"{service}; ask stiction gain what a service, another tuning or a controller that knows "
-        "the friction would bring."
+        f"{service}, unless `stiction gain` promises more from another tuning or from a "
+        "controller that knows the friction."
     )
 
 

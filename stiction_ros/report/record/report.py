@@ -13,13 +13,13 @@ from stiction_ros.identification.judgement.figures import definitions
 from stiction_ros.pages.frame import framed, text
 from stiction_ros.pages.plot import SCRIPT, Curve, over_time
 from stiction_ros.pages.signals import UNITS, all_signals, close_look
-from stiction_ros.records.parts import joined
+from stiction_ros.records.parts import joined, span
 from stiction_ros.records.record import Record
-from stiction_ros.report.page import Cell, duration, number, page_file, table
-from stiction_ros.report.record.sections import lead, stability_table, work_table
+from stiction_ros.report.page import Cell, number, page_file, table
+from stiction_ros.report.record.sections import lead, work_table
 from stiction_ros.report.run.identified import process_table, valve_cards, verdict_line
 from stiction_ros.report.shapes import free_run, responses
-from stiction_ros.texts import finite
+from stiction_ros.texts import finite, probability
 
 
 def report_record(
@@ -61,10 +61,7 @@ def record_page(
     """Return the report of a record as HTML; ``parts`` are all parts of its source."""
     found = finite(identification.to_dict())
     headline = verdict_line(found["valves"])
-    kicker = (
-        f"{record.name}: {len(record)} samples of {record.sample_time:g} s, "
-        f"{duration(len(record) * record.sample_time)} of operation"
-    )
+    kicker = f"{record.name}: {len(record)} samples of {record.sample_time:g} s, {span(record)}"
     trouble = ""
     if identification.reason:
         trouble = (
@@ -84,7 +81,6 @@ def record_page(
         close_look(record, identification, UNITS),
         all_signals(whole, stem, UNITS),
         _free_runs(record, identification),
-        stability_table(identification),
         evidence_table(identification.valves),
         process_table(found["outputs"], record.sample_time),
         responses(found["outputs"], record, UNITS, None),
@@ -105,7 +101,7 @@ def evidence_table(valves: Sequence[ValveEstimate]) -> str:
         ]
         for key, meaning in definitions().items()
     ]
-    rows.append(["probability of friction", *[number(valve.probability) for valve in told]])
+    rows.append(["probability of friction", *[probability(valve.probability) for valve in told]])
     return "<h2>Evidence</h2>" + table(["", *[valve.name for valve in told]], rows)
 
 
@@ -138,8 +134,9 @@ def _free_runs(record: Record, found: Identification) -> str:
         curves = [Curve(f"{model.name}, measured", "pv", pv), Curve("model", "free", run)]
         said = (
             f"The model of {model.name} driven by the recorded OP alone: friction, then process. "
-            f"It fits {number(model.fit_free_run)} %, one step ahead "
-            f"{number(model.fit_one_step)} %. Slow disturbances of the loop are not in it."
+            f"It fits {number(model.fit_free_run)} %, one sample ahead "
+            f"{number(model.fit_one_step)} %. Loads that were not recorded are not in it: they "
+            "lower this fit, not the probability of friction."
         )
         drawn.append(over_time(said, record.time, curves, UNITS.axis(model.name), record.start))
     return "<h2>Model against measurement</h2>" + "".join(drawn) if drawn else ""

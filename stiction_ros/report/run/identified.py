@@ -9,7 +9,7 @@ from stiction_ros.effects import Stiction, behaviours
 from stiction_ros.identification import VerdictKind
 from stiction_ros.report.page import Cell, card, duration, interval, number, percent, table
 from stiction_ros.report.run.story import Story
-from stiction_ros.texts import symbol
+from stiction_ros.texts import probability, symbol
 
 KINDS = {"sticky": "bad", "backlash": "bad", "healthy": "good"}
 """Class of a box by its verdict; the others are open."""
@@ -53,13 +53,13 @@ def valve_cards(valves: Sequence[Mapping[str, Any]], story: Story | None = None)
     for valve in valves:
         more = (
             f"f_S {percent(valve['f_s'])} % ({interval(valve['f_s_interval'])}), "
-            f"f_D {percent(valve['f_d'])} % ({interval(valve['f_d_interval'])})"
+            f"f_D {percent(valve['f_d'])} % ({interval(valve['f_d_interval'])}), 95 % intervals"
         )
         more += "".join(f"\n{said}" for said in _further(valve))
         if valve["verdict"] == "healthy":
             more = f"f_S at most {percent(valve['f_s_interval'][1])} % of travel"
-        if valve.get("probability") is not None:
-            more += f"\nprobability of friction {valve['probability']:.2f}"
+        if chance := probability(valve.get("probability")):
+            more += f"\nprobability of friction {chance}"
         truth = None if story is None else story.true_friction(valve["name"])
         if truth is not None:
             more += f"\nsimulated with f_S = {truth[0]:g} %, f_D = {truth[1]:g} %"
@@ -107,21 +107,12 @@ def process_table(outputs: Sequence[Mapping[str, Any]], sample_time: float) -> s
                     number(output["fit_free_run"]),
                 ]
             )
-    head = (
-        "PV",
-        "valve",
-        "a₁ …",
-        "b₁ …",
-        "delay, samples",
-        "gain, per %",
-        "noise std",
-        "one-step fit, %",
-        "free-run fit, %",
-    )
+    head = ["PV", "valve", "a₁ …", "b₁ …", "delay, samples", "gain, PV units per %"]
+    head += ["noise std, PV units", "fit one sample ahead, %", "fit from OP alone, %"]
     return (
         "<h2>Process identified</h2>"
-        "<p>y<sub>k</sub> = −Σ a<sub>i</sub> y<sub>k−i</sub> + Σ b<sub>i</sub> "
-        "χ<sub>k−i−delay</sub> + bias, driven by the stems. Fits are "
+        "<p>From stem χ (%) to PV y, an ARX equation: y<sub>k</sub> = "
+        "−Σ a<sub>i</sub> y<sub>k−i</sub> + Σ b<sub>i</sub> χ<sub>k−i−delay</sub> + bias. Fits are "
         "100 (1 − ‖y − ŷ‖ / ‖y − mean y‖).</p>" + table(head, rows, texts=4)
     )
 

@@ -19,6 +19,7 @@ from stiction_ros.survey.pages.words import (
     percent,
     period,
 )
+from stiction_ros.texts import probability
 
 TEST = "worth a test"
 TREND = "friction before and now"
@@ -130,7 +131,7 @@ class Columns:
             (text(why), why),
             (percent(entry.band_share) if entry.found else "", entry.band_share),
             (_friction(entry), entry.f_s if entry.found else None),
-            (percent(entry.probability), entry.probability),
+            (probability(entry.probability), entry.probability),
             _test(entry),
             _figure(None if cycle is None else cycle.period, period),
             _figure(None if cycle is None else cycle.amplitude, figure),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from stiction_ros.gain.advice import advice
 from stiction_ros.identification import Identification
 from stiction_ros.identification.answer.words import materiality, next_step, why
 from stiction_ros.pages.frame import card, framed, text, words
@@ -22,6 +23,7 @@ from stiction_ros.survey.pages.words import (
     percent,
     period,
 )
+from stiction_ros.texts import probability
 
 HEADLINES = {
     "sticky": "The valve sticks",
@@ -67,7 +69,7 @@ def loop_page(
         card("f<sub>S</sub> lies between", interval(entry.f_s_interval) or "–"),
         card(words(f"sliding friction f_D, {op_unit}"), figure(entry.f_d) or "–"),
         card("share of OP's movement lost to it", percent(entry.band_share) or "–"),
-        card("probability", percent(entry.probability) or "–"),
+        card("probability of friction", probability(entry.probability) or "–"),
         card("the loop cycles by", text(cause_words(entry.cause or "none"))),
     ]
     if cycle is not None and cycle.period is not None:
@@ -98,7 +100,7 @@ def _answers(found: Identification, op_unit: str) -> list[str]:
     """Return what ``identify`` says of each valve: why, how much it matters, what to do next."""
     told = []
     for j, valve in enumerate(found.valves):
-        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j, asked=True)}")
+        said = (why(found, j), materiality(valve), f"Next: {next_step(found, j)}")
         told.append(in_op_unit(" ".join(filter(None, said)), op_unit))
     return told
 
@@ -111,14 +113,8 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
         *("what is done", "amplitude", "period, s", "mean |PV−SP|"),
         *("travel/h", "moves/h", "reversals/h", "how it was found"),
     )
-    keys = (
-        "amplitude",
-        "period",
-        "iae_per_hour",
-        "travel_per_hour",
-        "moves_per_hour",
-        "reversals_per_hour",
-    )
+    keys = ["amplitude", "period", "iae_per_hour"]
+    keys += ["travel_per_hour", "moves_per_hour", "reversals_per_hour"]
     rows = [_gain_row("now", gain["now"], head, keys, "")]
     for option in gain["options"]:
         ends = option["interval"].get("iae_per_hour")
@@ -127,8 +123,9 @@ def gain_table(gain: Mapping[str, Any] | None, unit: str, op_unit: str) -> str:
         rows.append(_gain_row(name, option, head, keys, option["note"] + between))
     titles = "".join(f"<th scope='col'>{text(title)}</th>" for title in head)
     return (
-        f"<h2>What would help</h2><p class='soft'>Amplitude and mean |PV−SP| in "
-        f"{unit}, travel in {text(op_unit)}.</p><table class='list'><thead><tr>"
+        f"<h2>What would help</h2><p>{text(advice(gain))}</p>"
+        f"<p class='soft'>Amplitude and mean |PV−SP| in {unit}, travel in "
+        f"{text(op_unit)}.</p><table class='list'><thead><tr>"
         f"{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
     )
 
