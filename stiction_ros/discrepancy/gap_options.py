@@ -14,8 +14,9 @@ class GapOptions:
     """Options of :func:`stiction_ros.discrepancy.find_discrepancy`.
 
     Attributes:
-        quick: take the stored threshold and intervals of the likelihood instead of bootstraps.
-        margin: BIC by which an effect must beat no effect and its best rival.
+        quick: take intervals of the likelihood instead of bootstraps.
+        margin: BIC by which an effect must beat no effect and its best rival. Of records of noise
+            alone the best effect stays below 2.1 in 95 of 100, below 4.4 with two valves.
         most_effects: how many effects are added at most.
         process_fitted: the process was fitted to these records, as by ``gap --fit-linear``: its
             figures stay open, and no change of them is named.

@@ -18,7 +18,7 @@ OFTEN = 8  # departures from rest that must show no jump before it is said to be
 CLEAR = 40.0  # BIC below which friction is told, but not of which kind
 FRICTION = "friction"  # families of effects
 LAGS = "lag"
-SURE = 20.0  # BIC beyond the threshold by which there is a gap, whatever it is
+SURE = 20.0  # BIC beyond the margin by which there is a gap, whatever it is
 DOUBTFUL = 3.0  # standard deviations
 ONE_LAW = 0.05  # of the evidence of a lag, that another one in its path may explain less
 EQUAL = 1.0  # BIC by which two explanations differ that are one
@@ -76,29 +76,26 @@ class Decision:
 def decide(
     fits: Sequence[CandidateFit],
     margin: float,
-    threshold: float,
     departures: Callable[[CandidateFit], int],
 ) -> Decision:
     """Return what may be said.
 
     Args:
         fits: of all candidates.
-        margin: evidence, in BIC, by which the best must beat its rivals outside its family.
-        threshold: evidence by which it must beat the current model.
+        margin: evidence, in BIC, by which the best must beat the current model, and its rivals
+            outside its family.
         departures: how often the stem of a fit leaves a rest.
     """
     ranked = sorted(fits, key=lambda fit: -fit.evidence)
-    passed = [
-        f for f in ranked if f.candidate.inside and f.evidence >= threshold and large_enough(f)
-    ]
+    passed = [f for f in ranked if f.candidate.inside and f.evidence >= margin and large_enough(f)]
     kept = [f for f in passed if confirmed(f)]
     outside = [f for f in ranked if not f.candidate.inside and confirmed(f)]
     stranger = outside[0] if outside else None
-    sure = bool(passed) and passed[0].evidence >= threshold + SURE
+    sure = bool(passed) and passed[0].evidence >= margin + SURE
     refused = passed[0] if sure and not confirmed(passed[0]) else None
     lent = refused if stranger is None or _beats(refused, stranger) else None
     if not kept:
-        if stranger is not None and stranger.evidence >= threshold + margin:
+        if stranger is not None and stranger.evidence >= 2.0 * margin:
             return _unknown(stranger, "nothing in the catalogue explains the gap", lent)
         if refused is not None:
             return _unknown(refused, "the held-out rows do not confirm it", lent)

@@ -1,4 +1,4 @@
-"""How sure the figures are, and how large a score chance alone brings about."""
+"""How sure the figures are."""
 
 from __future__ import annotations
 
@@ -16,13 +16,10 @@ from stiction_ros.discrepancy.fit.search import CandidateFit, fit_candidate
 from stiction_ros.discrepancy.likelihood.noise import (
     given_noise,
     information,
-    left_by,
-    projector,
     shared_factors,
-    whitened_columns,
 )
 from stiction_ros.effects import FloatArray
-from stiction_ros.signals.autoregression import TINY, coloured, whiten
+from stiction_ros.signals.autoregression import TINY, coloured
 
 SMOOTH = 3.84  # 95 % of one degree of freedom
 STEPPED = 7.35  # 95 % of the place of a step, (1 - exp(-x / 2))²: Hansen, Econometrica 68 (2000)
@@ -101,14 +98,8 @@ def scored(
 
 AROUND = 16  # points of an ellipse
 BLOCK = 25
-DRAWS = 200
 
 Intervals = dict[str, tuple[float, float]]
-
-# Candidates, and the evidence that 95 % of records of noise alone stay below:
-# ``stiction bench gap --calibrate --first 0 --loops 48``, 8 records from each tuning loop.
-FEW_CANDIDATES, SCORE_OF_FEW = 13, 2.1  # one valve, one output
-MANY_CANDIDATES, SCORE_OF_MANY = 26, 4.4  # two valves, two outputs
 
 
 def likelihood_intervals(
@@ -203,72 +194,6 @@ def bootstrap_intervals(
     return ends
 
 
-def chance_threshold(
-    base: Baseline, candidates: tuple[Candidate, ...], random: np.random.Generator
-) -> float:
-    """Return the score that 95 % of records of the current model alone stay below.
-
-    The innovations of the current model are drawn anew; every candidate's first grid is
-    scored under its noise. It corrects for the number of candidates.
-    """
-    outputs = range(len(base.noise))
-    rows = [base.blocks[i].train for i in outputs]
-    drawn = [
-        random.standard_normal((int(r.sum()), DRAWS)) * base.noise[i].innovation_std
-        for i, r in enumerate(rows)
-    ]
-    bases = [
-        projector(whitened_columns(base.columns[i], base.noise[i].ar, rows[i])) for i in outputs
-    ]
-    drawn = [left_by(q, each) for each, q in zip(drawn, bases, strict=True)]
-    best = np.full(DRAWS, -np.inf)
-    for candidate in candidates:
-        if not candidate.inside:
-            continue
-        points = candidate.values(candidate.grid())
-        response = candidate.respond(base.run, points)
-        gain: FloatArray | float = 0.0
-        for i in response.outputs:
-            gain = gain + _chance_gain(
-                base, response.shifts.get(i), response.sizes.get(i), i, drawn[i], bases[i]
-            )
-        count = np.array([candidate.count(point) for point in points])
-        if response.possible is not None:
-            gain = np.where(response.possible[:, None], gain, -np.inf)
-        price = np.log(max(base.noise[0].rows, 2)) * count
-        best = np.maximum(best, np.max(np.asarray(gain) - price[:, None], axis=0))
-    return float(np.quantile(best, 0.95))
-
-
-def _chance_gain(
-    base: Baseline,
-    shift: FloatArray | None,
-    sizes: FloatArray | None,
-    output: int,
-    drawn: FloatArray,
-    basis: FloatArray,
-) -> FloatArray:
-    """Return what every point gains on every draw, shape (G, DRAWS)."""
-    ar, rows = base.noise[output].ar, base.blocks[output].train
-    total = np.sum(drawn**2, axis=0)
-    if shift is not None:
-        wave = left_by(basis, whiten(np.ascontiguousarray(shift), ar)[rows])
-        left = (-2.0 * wave.T) @ drawn
-        left += np.einsum("ng,ng->g", wave, wave)[:, None]
-        left += total
-    else:
-        assert sizes is not None
-        count, points, factors = sizes.shape
-        waves = whiten(sizes.reshape(count, -1), ar)[rows]
-        waves = left_by(basis, waves).reshape(-1, points, factors)
-        taken = []
-        for g in range(points):
-            inner = projector(waves[:, g])
-            taken.append(np.sum((inner.T @ drawn) ** 2, axis=0))
-        left = total - np.array(taken)
-    return np.asarray(len(drawn) * np.log(total / np.maximum(left, 1e-300)))
-
-
 def _linear_ends(base: Baseline, fit: CandidateFit) -> list[FloatArray]:
     """Return the ends of every linear figure, all others held, from its parabola of squares."""
     ends: list[FloatArray] = []
@@ -349,15 +274,3 @@ def _rebuilt(
     begins = random.integers(0, max(len(innovations) - BLOCK, 1), count // BLOCK + 1)
     drawn = np.resize(np.concatenate([innovations[b : b + BLOCK] for b in begins]), count)
     return coloured(drawn - drawn.mean(), ar)
-
-
-def stored_threshold(candidates: int) -> float:
-    """Return the evidence, in BIC, that chance brings about in one record of twenty.
-
-    The largest of many scores of chance grows with the logarithm of their number.
-
-    Args:
-        candidates: of the catalogue that are tried, ≥ 1.
-    """
-    growth = (SCORE_OF_MANY - SCORE_OF_FEW) / math.log(MANY_CANDIDATES / FEW_CANDIDATES)
-    return SCORE_OF_FEW + growth * math.log(max(candidates, 1) / FEW_CANDIDATES)

@@ -13,14 +13,14 @@ from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.likelihood.noise import left_by
 from stiction_ros.discrepancy.process.free_equation import Equation
 from stiction_ros.discrepancy.process.refit import equations_of, process_with, with_equations
-from stiction_ros.discrepancy.process.slower import Changeable
+from stiction_ros.discrepancy.process.slower import GAIN, Changeable
 from stiction_ros.discrepancy.simulation.free_run import FreeRun, Runs
 from stiction_ros.effects import FloatArray
 from stiction_ros.loop import LoopModel
 from stiction_ros.processes import ArxProcess
 from stiction_ros.signals.autoregression import whiten
 
-STEPS = 10
+STEPS = 20
 TINY_STEP = 0.02  # of the probes, at which it has settled
 SURE = 2.5  # standard errors by which a figure has to be another than the model's
 NORMAL = 1.96
@@ -64,6 +64,8 @@ class ProcessChange:
             return f"{said} (95 % between {low:.3g} and {high:.3g})"
         kind = "lead" if self.what == "lead" else "time constant"
         now, low, high = (self.model * each for each in (self.value, low, high))
+        if low <= 0.0:
+            return f"no {kind} of {self.model:.3g} s, or one below {high:.3g} s (95 %)"
         said = f"{kind} {now:.3g} s, in the model {self.model:.3g} s"
         return f"{said} (95 % between {low:.3g} and {high:.3g} s)"
 
@@ -158,7 +160,9 @@ class _Search:
         self.smooth = [k for k, each in enumerate(effects) if each.fit.candidate.smooth]
         self.equation = Changeable(equations_of(model)[output])
         self.figures = self.equation.figures
+        self.least = np.array([each.least for each in self.figures])
         self.most = np.array([each.most for each in self.figures])
+        self.gains = np.array([each.what == GAIN for each in self.figures])
         self.probes = np.array([each.probe for each in self.figures])
         self.free = np.ones(len(self.figures), dtype=bool)
         self.values = np.zeros(len(self.figures))
@@ -169,7 +173,9 @@ class _Search:
         while self.free.any():
             self._settle()
             sure = np.where(self.free, np.abs(self.values) / self.errors, np.inf)
-            bound = self.free & (np.abs(self.values) >= NEAR * self.most)
+            bound = self.values >= NEAR * self.most
+            bound |= (self.values <= NEAR * self.least) & self.gains
+            bound &= self.free
             sure[bound & self._several()] = 0.0  # two lags that are alike trade off each other
             least = int(np.argmin(sure))
             if sure[least] > SURE:
@@ -185,6 +191,7 @@ class _Search:
 
     def _settle(self) -> None:
         output, free = self.output, self.free
+        least, moved = np.inf, np.zeros(len(free))
         for _ in range(STEPS):
             run = self._run(self.values)
             base = Baseline.of(run, columns=open_columns(run, self.effects))
@@ -194,6 +201,12 @@ class _Search:
             gap = run.gap[:, output]
             basis = base.basis(output, ar)
             target = left_by(basis, whiten(gap, ar)[train])
+            size = float(target @ target)
+            if given and size > least:  # the last step was too long
+                moved *= 0.5
+                self.values = self.values - moved
+                continue
+            least = size
             white = left_by(basis, whiten(self._slopes(run, gap), ar)[train])
             step, *_ = np.linalg.lstsq(white, -target, rcond=1e-8)
             left = target + white @ step
@@ -203,8 +216,11 @@ class _Search:
             count = int(free.sum())
             self.errors[free] = np.where(seen, spread, np.inf)[:count]
             moved = np.zeros(len(free))
-            moved[free] = np.clip(step[:count], -0.5 * self.most[free], 0.5 * self.most[free])
-            self.values = np.clip(self.values + moved, -self.most, self.most)
+            room = 0.5 * np.where(step[:count] < 0.0, -self.least[free], self.most[free])
+            own = np.where(room > 0.0, step[:count], 0.0)
+            moved[free] = own / max(float(np.max(np.abs(own) / np.maximum(room, NOTHING))), 1.0)
+            moved = np.clip(self.values + moved, self.least, self.most) - self.values
+            self.values = self.values + moved
             more = np.clip(step[count:], -LARGEST_STEP, LARGEST_STEP).tolist()
             for k, each in zip(self.smooth, more, strict=True):
                 self.effects = self._with_stepped(run, k, each)
@@ -258,7 +274,7 @@ class _Search:
             own = self.figures[k]
             ends = self.values[k] + np.array([0.0, -NORMAL, NORMAL]) * self.errors[k]
             late = own.what == "delay"
-            value, low, high = (step * ends if late else np.exp(ends)).tolist()
+            value, low, high = (step * ends if late else np.maximum(1.0 + ends, 0.0)).tolist()
             model = None if own.lasts is None else own.lasts * step
             found.append(
                 ProcessChange(name, own.what, value, (low, high), "s" if late else "1", model)

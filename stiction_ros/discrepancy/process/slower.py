@@ -144,8 +144,9 @@ def _trimmed(numerator: FloatArray) -> FloatArray:
 
 
 GAIN, TIME_CONSTANT, LEAD, DELAY = "gain", "time_constant", "lead", "delay"
-MOST = dict.fromkeys((GAIN, TIME_CONSTANT, LEAD), math.log(4.0)) | {DELAY: 10.0}
-"""Logarithms and samples; beyond that it is another plant."""
+MOST = dict.fromkeys((GAIN, TIME_CONSTANT, LEAD), 3.0) | {DELAY: 10.0}
+"""Shares and samples that a figure may be larger; beyond that it is another plant."""
+GONE = 0.01  # sample, of a time constant that is none
 PROBES = {GAIN: 0.01, TIME_CONSTANT: 0.01, LEAD: 0.01, DELAY: 0.1}  # of the derivatives
 SHORTEST = 1.0  # sample, of a time constant that counts
 
@@ -156,13 +157,15 @@ class Figure:
 
     Attributes:
         what: ``gain``, ``time_constant``, ``lead`` or ``delay``.
-        most: the largest change, as a logarithm, of a delay in samples.
+        least, most: the largest changes, a share of the model's figure, of a delay in samples. With
+            the least one a delay, a time constant or a lead is gone.
         roots: which poles or zeros it moves; a pair moves together.
         valve: whose zeros; None for poles.
         lasts: time constant, samples; None for gain and delay.
     """
 
     what: str
+    least: float
     most: float
     roots: tuple[int, ...] = ()
     valve: int | None = None
@@ -193,14 +196,18 @@ class Changeable:
         self._plants: list[Held | None] | None = plants if known else None
         self._poles = np.roots(own.denominator).astype(complex)
         whole = np.where(np.abs(self._poles) < NOTHING, NOTHING, self._poles)
-        self.figures = [Figure(GAIN, MOST[GAIN]), Figure(DELAY, MOST[DELAY])]
+        least = 1.0 / (1.0 + MOST[GAIN]) - 1.0
+        self.figures = [
+            Figure(GAIN, least, MOST[GAIN]),
+            Figure(DELAY, -float(max(own.delay)), MOST[DELAY]),
+        ]
         self.figures += _of_roots(np.log(whole), TIME_CONSTANT, None)
         for j, plant in enumerate(plants if known else []):
             if plant is not None:
                 self.figures += _of_roots(zeros_of(plant), LEAD, j)
 
     def changed(self, values: FloatArray) -> Equation:
-        """Return the equation with its figures changed, logarithms and samples, shape (figures,).
+        """Return the equation with its figures changed, shares and samples, shape (figures,).
 
         Its gain is changed by ``gain`` alone.
         """
@@ -210,7 +217,7 @@ class Changeable:
         for figure, value in zip(self.figures, values.tolist(), strict=True):
             if figure.what in by_name:
                 by_name[figure.what] += value
-        gain, late = math.exp(by_name[GAIN]), by_name[DELAY]
+        gain, late = 1.0 + by_name[GAIN], by_name[DELAY]
         stretches = self._factors(values, TIME_CONSTANT, None, len(self._poles))
         if self._plants is None:
             return self._of_means(gain, late, stretches)
@@ -234,7 +241,7 @@ class Changeable:
         factors = np.ones(count)
         for figure, value in zip(self.figures, values.tolist(), strict=True):
             if (figure.what, figure.valve) == (what, valve):
-                factors[list(figure.roots)] = math.exp(value)
+                factors[list(figure.roots)] = 1.0 + value
         return factors
 
     def _of_means(self, gain: float, late: float, stretches: FloatArray) -> Equation:
@@ -265,5 +272,5 @@ def _of_roots(roots: ComplexArray, what: str, valve: int | None) -> list[Figure]
         if swings > NOTHING:
             pair = tuple(np.flatnonzero(np.abs(roots - root.conjugate()) < NOTHING).tolist())
             pair = (k, *pair)
-        found.append(Figure(what, MOST[what], pair, valve, 1.0 / pace))
+        found.append(Figure(what, min(GONE * pace, 1.0) - 1.0, MOST[what], pair, valve, 1.0 / pace))
     return found

@@ -41,7 +41,6 @@ from stiction_ros.discrepancy.decision.scores import (
 )
 from stiction_ros.discrepancy.fit.baseline import Baseline
 from stiction_ros.discrepancy.fit.search import CandidateFit
-from stiction_ros.discrepancy.fit.uncertainty import chance_threshold, stored_threshold
 from stiction_ros.discrepancy.gap.where import locate
 from stiction_ros.discrepancy.process.refit import open_figures, refitted_behind
 from stiction_ros.discrepancy.simulation.free_run import FreeRun
@@ -187,16 +186,12 @@ def decided(task: Task, state: State, scored: Scored) -> Decision:
     """
     base = scored.scores.base
     measured = 1.0 - min(max(task.runs.thinned), MOST_THINNED)
-    if task.options.quick:
-        chance = stored_threshold(sum(each.inside for each in scored.candidates))
-    else:
-        chance = chance_threshold(base, scored.candidates, task.random)
     possible = not_contradicted(base.run, scored.scores.fits)
     allowed = [fit for fit in possible if not told_already(state.added, fit)]
-    margin, threshold = task.options.margin, max(task.options.margin, chance)
-    decision = decide(allowed, margin / measured, threshold / measured, rests_left(base.run))
+    margin, rests = task.options.margin, rests_left(base.run)
+    decision = decide(allowed, margin / measured, rests)
     if measured < 1.0 and decision.verdict is GapVerdict.NONE:
-        decision = thinned_away(decide(allowed, margin, threshold, rests_left(base.run)), measured)
+        decision = thinned_away(decide(allowed, margin, rests), measured)
     if task.options.process_fitted:
         decision = _in_doubt_of_place(base, decision)
     return told_by_stem(base.run, decision, allowed)

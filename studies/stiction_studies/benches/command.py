@@ -37,7 +37,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
         "starts",
         "grid_step",
     ),
-    "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write", "calibrate"),
+    "gap": ("family", "first", "loops", "full", "jobs", "log", "resume", "write"),
     "world": ("family", "given", "first", "loops", "full", "jobs", "log", "resume", "write"),
     "field": ("seeds", "method", "jobs", "oracle"),
     "gain": ("seeds", "jobs"),

@@ -55,7 +55,7 @@ def creeping(delta_bic: float) -> CandidateFit:
 
 
 def said(*fits: CandidateFit, departures: int = 100) -> Decision:
-    return decide(fits, MARGIN, MARGIN, lambda fit: departures)
+    return decide(fits, MARGIN, lambda fit: departures)
 
 
 def test_a_clear_winner_is_named() -> None:

@@ -87,13 +87,17 @@ def test_every_figure_of_an_equation_moves_what_it_says() -> None:
     kinds = [figure.what for figure in changeable.figures]
     assert kinds == ["gain", "delay", "time_constant", "time_constant"]
     assert sorted(f.lasts for f in changeable.figures if f.lasts) == pytest.approx([5.0, 12.0])
-    louder = changeable.changed(np.array([math.log(1.1), 0.0, 0.0, 0.0]))
+    louder = changeable.changed(np.array([0.1, 0.0, 0.0, 0.0]))
     assert answer(louder) == pytest.approx(1.1 * answer(changeable.own), rel=1e-9)
     late = changeable.changed(np.array([0.0, 2.0, 0.0, 0.0]))
     assert answer(late)[2:] == pytest.approx(answer(changeable.own)[:-2], abs=1e-9)
     slow = changeable.changed(np.array([0.0, 0.0, 0.1, 0.1]))
     assert answer(slow)[-1] == pytest.approx(0.7, rel=1e-3)
     assert answer(slow)[20] < answer(changeable.own)[20]
+    gone = changeable.changed(
+        np.array([0.0, 0.0, *(figure.least for figure in changeable.figures[2:])])
+    )
+    assert answer(gone)[6:] == pytest.approx(0.7, rel=1e-3)
 
 
 def test_other_equations_have_means_of_whole_dead_times() -> None:

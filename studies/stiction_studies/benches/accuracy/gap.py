@@ -13,7 +13,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
 FIRST_SEED = 10_000  # seeds below 1000 are for tuning
 LOOPS = 20
 LOG = "bench_gap.jsonl"
-DRAWS = 8  # records of noise for each loop of --calibrate
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,12 +79,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--write", metavar="DIR", help="write loops and answers there instead of judging any"
     )
-    group.add_argument(
-        "--calibrate",
-        action="store_true",
-        default=None,
-        help="score records of noise alone instead: the stored threshold of gap --quick",
-    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -100,9 +92,6 @@ def run(options: argparse.Namespace) -> int:
         "full": options.full,
     }
     bench = GapBench(**{key: value for key, value in chosen.items() if value is not None})
-    if options.calibrate:
-        _show_chance(bench)
-        return 0
     if options.write is not None:
         write_loops(bench, Path(options.write))
         return 0
@@ -149,24 +138,6 @@ def judge_all(
         except BaseException:
             drop(pool)
             raise
-
-
-def _show_chance(bench: GapBench) -> None:
-    """Print how large scores of noise alone become, by the number of candidates."""
-    from stiction_ros.discrepancy.fit.uncertainty import stored_threshold
-    from stiction_studies.blind.calibration import chance_scores
-
-    scores: dict[int, list[float]] = {}
-    with bar(f"noise of {bench.loops} loops") as show_share:
-        for k in range(bench.loops):
-            for each in chance_scores([bench.first + k], DRAWS):
-                scores.setdefault(each.candidates, []).append(each.evidence)
-            show_share((k + 1) / bench.loops)
-    table = Table("candidates", "records", "median", "95 %", "99 %", "largest", "stored")
-    for count, values in sorted(scores.items()):
-        points = [*np.quantile(values, [0.5, 0.95, 0.99]), max(values), stored_threshold(count)]
-        table.add_row(str(count), str(len(values)), *(f"{point:.1f}" for point in points))
-    Console().print(table)
 
 
 def read_log(path: Path, bench: GapBench) -> dict[tuple[str, int], Scored]:
