@@ -134,7 +134,8 @@ def judged_record(record: Record, gain: float | None = None) -> Judgement:
     rows = max(record.usable_rows(wanted), key=lambda each: each[1] - each[0], default=(0, 0))
     part = record.part(*rows)
     steps = Steps.of(part.op[:, 0])
-    if why := steps.refusal():
+    error = -part.pv[:, 0] if part.sp is None else part.sp[:, 0] - part.pv[:, 0]
+    if why := steps.refusal(error):
         raise InputError(
             f"is no test in manual: {why}",
             where=record.name,

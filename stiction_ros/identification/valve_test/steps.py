@@ -12,6 +12,9 @@ SHORTEST = 7
 """Samples of a hold, at least: as many as process and noise have numbers, so that it shows more
 than they can take up. Controllers that a historian samples faster than they scan hold OP, too."""
 
+FEWEST = 5
+"""Steps of a test, at least: more than the numbers of a PI law, which could explain fewer."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Steps:
@@ -43,20 +46,34 @@ class Steps:
         """How far OP went from its start, %."""
         return float(np.abs(self.levels - self.levels[0]).max())
 
-    def refusal(self) -> str:
+    def refusal(self, error: FloatArray) -> str:
         """Return why this is no test in manual, one clause; empty where it is.
 
-        OP that answers PV moves when PV brings news: at every scan or, where it is rounded, after
-        times that differ by more than half, and without rounding to a level where it never was. OP
-        that is moved by hand rests for times of one kind and comes back.
+        Args:
+            error: SP − PV, or −PV where SP is not known, engineering units, shape (N,).
         """
         inner = np.diff(self.rows)
-        if len(inner) == 0:
-            return f"OP makes {len(self.rows)} steps, and a test two at least"
+        if len(self.rows) < FEWEST:
+            return f"OP makes {len(self.rows)} steps, and a test {FEWEST} at least"
         if inner.min() < SHORTEST:
             return f"OP rests for {inner.min()} samples between two steps, and not {SHORTEST}"
-        if inner.min() < 0.5 * np.median(inner):
-            return "OP rests for times that differ as if it answered PV"
-        if len(inner) > 1 and len(np.unique(self.levels)) == len(self.levels):
-            return "OP never comes back to where it was"
+        if self._answers(error):
+            return "PV explains the moves of OP, as where a controller rounds its OP"
         return ""
+
+    def _answers(self, error: FloatArray) -> bool:
+        """Return whether a PI controller, its set-point free, is within its rounding of OP.
+
+        Rounding to steps of q errs by q/√12, and q is at most the smallest move. A reset against
+        the gain is none.
+        """
+        time = np.arange(self.count)
+        away = error - error.mean()
+        columns = np.column_stack([np.ones(self.count), time, away, np.cumsum(away)])
+        op = np.repeat(self.levels, self.holds)
+        law = np.linalg.lstsq(columns / np.abs(columns).max(axis=0).clip(1e-300), op)[0]
+        if law[2] * law[3] < 0.0:
+            columns = columns[:, [0, 2]]
+        scaled = columns / np.abs(columns).max(axis=0).clip(1e-300)
+        rest = op - scaled @ np.linalg.lstsq(scaled, op)[0]
+        return bool(12.0 * rest.var() <= np.abs(np.diff(self.levels)).min() ** 2)
