@@ -20,7 +20,7 @@ RESTS = 5  # samples of the test before the fault
 AWAY = 2.0  # of the set-point, and of OP in %: well beyond rounding
 
 
-def tested(
+def in_a_test(
     put: Callable[[RunningLoop], None], goes_on: bool = False
 ) -> Callable[[RunningLoop], None]:
     """Return what does something to a loop of which the valve is tested.
@@ -37,7 +37,9 @@ def tested(
             return
         loop.wait_samples(RESTS)
         put(loop)
-        if loop.pace is Pace.LOCKSTEP and any(node.code is not None for node in loop.nodes.values()):
+        if loop.pace is Pace.LOCKSTEP and any(
+            node.code is not None for node in loop.nodes.values()
+        ):
             return  # all end
         if goes_on:
             if loop.known.mode != TEST:
@@ -63,14 +65,14 @@ FAULTS = (
     Fault(
         "test-pv-bad",
         "PVs that are NaN end a valve test: OP goes back, the former mode goes on from there",
-        tested(relayed("pv", lambda: instead(lambda row: [NAN] * len(row), 8), seconds=1.0)),
+        in_a_test(relayed("pv", lambda: instead(lambda row: [NAN] * len(row), 8), seconds=1.0)),
         relayed=("pv",),
         notices=(Notice("controller", "warn"),),
     ),
     Fault(
         "test-pv-late",
         "PVs that come two samples late end a valve test",
-        tested(relayed("pv", lambda: late_by(2), seconds=2.0)),
+        in_a_test(relayed("pv", lambda: late_by(2), seconds=2.0)),
         REALTIME,
         relayed=("pv",),
         silence=math.inf,
@@ -78,21 +80,21 @@ FAULTS = (
     Fault(
         "test-set-point-moved",
         "a move of the set-point ends a valve test",
-        tested(relayed("sp", lambda: instead(moved, 20), seconds=1.0)),
+        in_a_test(relayed("sp", lambda: instead(moved, 20), seconds=1.0)),
         relayed=("sp",),
     ),
     Fault(
         "test-taken-over",
         "an OP in force that is not the controller's ends a valve test, and the control goes on "
         "from that OP",
-        tested(relayed("op_applied", lambda: instead(moved, 3), seconds=1.0)),
+        in_a_test(relayed("op_applied", lambda: instead(moved, 3), seconds=1.0)),
         relayed=("op_applied",),
     ),
     Fault(
         "test-estimator-killed",
         "realtime: a valve test goes on without the estimator; lockstep: all end, each with a "
         "sentence",
-        tested(kill_and_restart("estimator"), goes_on=True),
+        in_a_test(kill_and_restart("estimator"), goes_on=True),
         phases=(Phase.AFTER,),
         ends=LOCKSTEP,
     ),
@@ -100,7 +102,7 @@ FAULTS = (
         "test-plant-killed",
         "realtime: a new run ends the valve test; lockstep: controller and estimator end with "
         "code 0 and a sentence",
-        tested(kill_and_restart("plant")),
+        in_a_test(kill_and_restart("plant")),
         phases=(Phase.BEFORE,),
         notices=NO_PV,
         ends=LOCKSTEP,
