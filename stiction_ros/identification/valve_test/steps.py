@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -62,18 +63,29 @@ class Steps:
         return ""
 
     def _answers(self, error: FloatArray) -> bool:
-        """Return whether a PI controller, its set-point free, is within its rounding of OP.
+        """Return whether a PI controller, its set-point free, is within half a step of OP.
 
-        Rounding to steps of q errs by q/√12, and q is at most the smallest move. A reset against
-        the gain is none.
+        OP that is rounded to steps of q is never farther than q/2 from the controller's own, and q
+        is at most the smallest move. Where PV is rounded too, the sum of its errors comes on top. A
+        reset against the gain is none.
         """
-        time = np.arange(self.count)
+        from scipy.optimize import linprog
+
         away = error - error.mean()
-        columns = np.column_stack([np.ones(self.count), time, away, np.cumsum(away)])
-        op = np.repeat(self.levels, self.holds)
-        law = np.linalg.lstsq(columns / np.abs(columns).max(axis=0).clip(1e-300), op)[0]
-        if law[2] * law[3] < 0.0:
-            columns = columns[:, [0, 2]]
-        scaled = columns / np.abs(columns).max(axis=0).clip(1e-300)
-        rest = op - scaled @ np.linalg.lstsq(scaled, op)[0]
-        return bool(12.0 * rest.var() <= np.abs(np.diff(self.levels)).min() ** 2)
+        columns = np.column_stack(
+            [np.ones(self.count), np.arange(self.count), away, np.cumsum(away), -np.ones(self.count)]
+        )
+        scales = np.abs(columns).max(axis=0).clip(1e-300)
+        columns /= scales
+        rows = np.vstack([columns, columns * (-1.0, -1.0, -1.0, -1.0, 1.0)])
+        op = np.repeat(self.levels - self.levels[0], self.holds)
+        half = 0.5 * float(np.abs(np.diff(self.levels)).min())
+        rounding = float(np.diff(np.unique(error)).min(initial=np.ptp(error)))
+        for gain in ((0.0, None), (None, 0.0)):
+            bounds = [(None, None), (None, None), gain, gain, (0.0, None)]
+            law = linprog([0.0, 0.0, 0.0, 0.0, 1.0], rows, np.append(op, -op), bounds=bounds).x
+            if law is not None:
+                own = abs(law[3]) / scales[3] * rounding * math.sqrt(self.count / 12.0)
+                if law[4] <= half * (1.0 + 1e-6) + own:
+                    return True
+        return False
