@@ -71,10 +71,8 @@ class Steps:
         """
         from scipy.optimize import linprog
 
-        away = error - error.mean()
-        columns = np.column_stack(
-            [np.ones(self.count), np.arange(self.count), away, np.cumsum(away), -np.ones(self.count)]
-        )
+        away, one = error - error.mean(), np.ones(self.count)
+        columns = np.column_stack([one, np.arange(self.count), away, np.cumsum(away), -one])
         scales = np.abs(columns).max(axis=0).clip(1e-300)
         columns /= scales
         rows = np.vstack([columns, columns * (-1.0, -1.0, -1.0, -1.0, 1.0)])
