@@ -109,9 +109,11 @@ class ValveTestingController(LiveController):
         """Begin a test with OP in force, or say why not; the other valves rest."""
         self._settle()
         names, name = self.model.valve_names, self.settings.valve_test_valve
-        if name and name not in names:
-            self._note(f"no valve test: the loop has no valve {name}", self._sample)
-            return
+        shows = self.settings.valve_test_output
+        for tag, known in ((name, names), (shows, self.model.outputs)):
+            if tag and tag not in known:
+                self._note(f"no valve test: the loop has no {tag}", self._sample)
+                return
         self._valve = names.index(name) if name else 0
         # Judging takes compiled code, which a controller that tests nothing does not wait for.
         from stiction_ros.identification.valve_test.facts import facts_of_answer
@@ -120,7 +122,8 @@ class ValveTestingController(LiveController):
         step, values = self.model.sample_time, self._design.model.step_responses(LONGEST)
         noise = self._noise()
         clear = np.abs(values[:, :, self._valve]).max(axis=0) / np.maximum(noise, 1e-300)
-        self._output = out = int(np.argmax(clear))
+        out = self.model.outputs.index(shows) if shows else int(np.argmax(clear))
+        self._output = out
         answer = StepAnswer.of_values(
             self.model.outputs[out], values[:, out, self._valve], float(noise[out]), step
         )
