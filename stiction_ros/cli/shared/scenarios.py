@@ -17,7 +17,7 @@ from stiction_ros.errors import InputError
 
 SCENARIOS = ("tank", "siso")
 """Those that are run where none is named."""
-ALL = (*SCENARIOS, "siso_test")
+ALL = (*SCENARIOS, "siso_test", "tank_test")
 STARTED = ("recorder", "estimator", "controller", "plant")
 """The nodes of a loop, in the order in which they are started."""
 

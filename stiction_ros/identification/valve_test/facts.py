@@ -46,7 +46,8 @@ class Limits:
 def facts_before(record: Record, found: Identification, limits: Limits) -> Facts:
     """Return what a routine record of a loop tells.
 
-    OP may go by twice the largest f_S that the record does not reject, PV as far as that moves it.
+    OP may go by twice the largest f_S that the record does not reject, PV as far as that moves it
+    beside what it does by itself.
 
     Args:
         record: of one valve and one output.
@@ -62,7 +63,7 @@ def facts_before(record: Record, found: Identification, limits: Limits) -> Facts
     facts = facts_of_answer(answer, valve.name, float(record.op[-1, 0]), 0.0)
     pv = float(record.pv[-round(facts.hold / step) :, 0].mean())
     reach = max(2.0 * valve.static_interval[1], WIDENS**2 * SMALLEST)
-    room = max(float(np.abs(record.pv[:, 0] - pv).max()), reach * abs(facts.gain or 0.0))
+    room = float(np.abs(record.pv[:, 0] - pv).max()) + reach * abs(facts.gain or 0.0)
     facts = dataclasses.replace(facts, pv=pv, op_limit=reach, pv_limit=(pv - room, pv + room))
     return limits.of(facts)
 
@@ -134,7 +135,8 @@ def judged_record(record: Record, gain: float | None = None) -> Judgement:
     rows = max(record.usable_rows(wanted), key=lambda each: each[1] - each[0], default=(0, 0))
     part = record.part(*rows)
     steps = Steps.of(part.op[:, 0])
-    if why := steps.refusal():
+    error = -part.pv[:, 0] if part.sp is None else part.sp[:, 0] - part.pv[:, 0]
+    if why := steps.refusal(error):
         raise InputError(
             f"is no test in manual: {why}",
             where=record.name,

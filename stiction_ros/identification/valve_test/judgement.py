@@ -133,21 +133,16 @@ def measured_enough(pv: FloatArray, moves: int) -> bool:
     return int((~held_rows(pv)).sum()) > SHORTEST + moves
 
 
-def judged(
-    op: FloatArray, pv: FloatArray, gain: float | None = None, before: Judgement | None = None
-) -> Judgement:
+def judged(op: FloatArray, pv: FloatArray, gain: float | None = None) -> Judgement:
     """Return the verdict on a test.
 
     Args:
         op: that moves by steps, %, shape (N,).
         pv: engineering units, shape (N,).
         gain: what 1 % of the stem makes of PV within a hold, where that was known before.
-        before: the verdict after fewer moves of this test, from which the search goes on.
     """
     trial = Trial(pv, ~held_rows(pv), Steps.of(op), gain)
-    ideal, still, sticky, frictions = trial.explained(
-        () if before is None else (before.ideal.dynamics, before.sticky.dynamics)
-    )
+    ideal, still, sticky, frictions = trial.explained()
     share = 0.5 * (1.0 - NO_LINK)
     logs = np.array([ideal.evidence, sticky.evidence, still.evidence])
     logs += np.log([share, share, NO_LINK])

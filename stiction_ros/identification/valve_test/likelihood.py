@@ -166,27 +166,40 @@ class Answered:
             gain: K as it was known before; None where it was not.
         """
         with_pv, across = moves @ self.beside, moves @ self.gram
-        own = _sums(across, moves)
-        best = int(np.argmax(with_pv**2 / own))
-        variance = max(self.energy - with_pv[best] ** 2 / own[best], 1e-300) / self.count
-        spread = self._spread((with_pv[best] / own[best]) ** 2 / variance)
+        own, energy = _sums(across, moves), self.energy
+        variance = max(energy - float((with_pv**2 / own).max()), 1e-300) / self.count
+        told = None if not gain else variance / (KNOWN * gain) ** 2
+        moved = moves.any(axis=1)
+        found, gains, left = self._found(with_pv, own, energy, told, gain or 0.0)
+        spread = self._spread(_likely(gains[moved], found[moved]) ** 2 / variance)
         inner = np.linalg.inv(np.eye(len(spread)) + spread @ self.gram)
         taken = inner @ spread
         with_pv = with_pv - across @ (taken @ self.beside)
         own = _sums(across, moves - across @ taken)
-        energy = self.energy - float(self.beside @ taken @ self.beside)
-        told, known = own / self.count, 0.0  # unit information
-        if gain:
-            told, known = np.full(len(own), variance / (KNOWN * gain) ** 2), gain
-        gains = (with_pv + told * known) / (own + told)
-        left = energy + told * known**2 - (with_pv + told * known) * gains
-        left = np.maximum(left, ROUNDING * self.energy)
-        half = 0.5 * self.count
-        found = -half * np.log(left) + 0.5 * np.log(told / (own + told))
+        energy -= float(self.beside @ taken @ self.beside)
+        found, gains, left = self._found(with_pv, own, energy, told, gain or 0.0)
         found += 0.5 * np.linalg.slogdet(inner)[1]
-        found[~moves.any(axis=1)] = -half * math.log(self.energy)
+        found[~moved] = -0.5 * self.count * math.log(self.energy)
         noise = math.sqrt(float(left[np.argmax(found)]) / self.count)
         return self.constant + found, gains, noise
+
+    def _found(
+        self, with_pv: FloatArray, own: FloatArray, energy: float, told: float | None, known: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return log likelihoods, K and what is left of the energy, (U,) each.
+
+        Args:
+            with_pv, own: products of the moves' answers with PV and themselves, shape (U,).
+            energy: of PV.
+            told: precision of the K known before over that of PV; None for unit information.
+            known: that K.
+        """
+        tells = own / self.count if told is None else np.full(len(own), told)
+        gains = (with_pv + tells * known) / (own + tells)
+        left = energy + tells * known**2 - (with_pv + tells * known) * gains
+        left = np.maximum(left, ROUNDING * self.energy)
+        found = -0.5 * self.count * np.log(left) + 0.5 * np.log(tells / (own + tells))
+        return found, gains, left
 
     def _spread(self, scale: float) -> FloatArray:
         """Return the covariance of δ K / σ, shape (M, M)."""
@@ -197,3 +210,15 @@ class Answered:
 def _sums(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the sum of the products of each two rows, above 0, shape (U,)."""
     return np.asarray(np.maximum(np.einsum("ij,ij->i", one, other), 1e-300))
+
+
+def _likely(gains: FloatArray, found: FloatArray) -> float:
+    """Return the geometric mean of |K| by how likely each is; 0 where the stem never moves.
+
+    Where PV shows a single slip, any size of it is as likely with K in proportion: the best of
+    them would be chance.
+    """
+    if not len(found):
+        return 0.0
+    weights = np.exp(found - log_sum(found))
+    return float(np.exp(weights @ np.log(np.maximum(np.abs(gains), 1e-300))))

@@ -1,4 +1,4 @@
-"""The evidence of each hypothesis, process and noise searched for each by itself."""
+"""The evidence of each hypothesis, averaged over process and noise for each by itself."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from stiction_ros.identification.valve_test.steps import Steps
 EVALUATIONS = 150
 """Of a search over process and noise."""
 DRAWS = 64
-"""Of process and noise, over which frictions are averaged."""
+"""Of process and noise, over which the evidence is averaged."""
 CURVED = 0.1
 """Share of the width of the prior by which the evidence is differenced."""
 COLD, WARM = 0.7, 0.3
@@ -38,13 +38,13 @@ decade or so: a hold lasts for a dead time and one or two lags, a load moves les
 
 @dataclasses.dataclass(frozen=True)
 class Explanation:
-    """Friction, or none, at its best process and noise.
+    """Friction, or none, over all processes and noises.
 
     Attributes:
         evidence: log of how likely the record is.
-        dynamics: process and noise.
+        dynamics: the best process and noise.
         values: log of how likely it is with each set of moves of the stem, shape (U,).
-        gains: K of each.
+        gains: K of each, at the best process.
         noise: σ of the white noise, engineering units.
     """
 
@@ -97,24 +97,17 @@ class Trial:
         moves = asked.moves if isinstance(asked, Frictions) else asked
         values, gains, noise = answered.likelihoods(moves, gain)
         values += prior
-        logs = values + asked.prior if isinstance(asked, Frictions) else values
-        return Explanation(log_sum(logs), dynamics, values, gains, noise)
+        return Explanation(_evidence(values, asked), dynamics, values, gains, noise)
 
-    def explained(
-        self, before: Sequence[Dynamics] = ()
-    ) -> tuple[Explanation, Explanation, Explanation, Frictions]:
+    def explained(self) -> tuple[Explanation, Explanation, Explanation, Frictions]:
         """Return how an ideal valve, a PV that OP does not move, and friction explain the record.
 
         Each search also begins where another ended, as each may miss the best process.
-
-        Args:
-            before: process and noise that explained fewer moves of the same test, of an ideal
-                valve and of friction; nothing for a search from the middle of the prior.
         """
         moves, still = np.diff(self.steps.levels)[None], np.zeros((1, len(self.steps.rows)))
         frictions = Frictions.all(self.steps)
-        ideal = self._best(before[:1] or (START,), moves)
-        sticky = self._best(before[1:] or (START, ideal.dynamics), frictions)
+        ideal = self._best((START,), moves)
+        sticky = self._best((START, ideal.dynamics), frictions)
         for _ in range(LEVELS):
             frictions = frictions.refined(self.steps, sticky.cells(frictions))
             sticky = self.at(sticky.dynamics, frictions)
@@ -122,14 +115,13 @@ class Trial:
         frictions = frictions.refined(self.steps, sticky.cells(frictions))
         sticky = self.at(sticky.dynamics, frictions)
         ideal = max(ideal, self._best((sticky.dynamics,), moves), key=lambda one: one.evidence)
-        none = self._best(before[:1] or (START,), still)
-        return ideal, none, self._averaged(sticky, frictions), frictions
+        none = self._averaged(self._best((START,), still), still)
+        return self._averaged(ideal, moves), none, self._averaged(sticky, frictions), frictions
 
-    def _averaged(self, best: Explanation, asked: Frictions) -> Explanation:
-        """Return the best explanation, each friction averaged over process and noise.
+    def _averaged(self, best: Explanation, asked: Frictions | FloatArray) -> Explanation:
+        """Return an explanation with its evidence averaged over process and noise.
 
         By importance sampling about the best, as wide in each direction as the evidence is there.
-        The evidence stays that of the best, as that of what it is compared with.
         """
         middle, most = np.array(best.dynamics), best.evidence
         wide = np.array(WIDE)
@@ -139,13 +131,12 @@ class Trial:
             fall = most - 0.5 * sum(side.evidence for side in sides)
             spread[i] = min(wide[i], CURVED * wide[i] / math.sqrt(max(2.0 * fall, 1e-3)))
         points = ndtri(halton_sequence(len(middle), seed=0).random(DRAWS))
-        weights = 0.5 * (points**2).sum(axis=1)
-        total = np.full(len(best.values), -np.inf)
-        for point, weight in zip(points, weights, strict=True):
+        weights = 0.5 * (points**2).sum(axis=1) + float(np.log(spread / wide).sum())
+        values = np.full(len(best.values), -np.inf)
+        for point, weight in zip(points, weights - math.log(DRAWS), strict=True):
             one = self.at(Dynamics(*(middle + spread * point)), asked)
-            total = np.logaddexp(total, one.values + weight)
-        total += best.evidence - log_sum(total + asked.prior)
-        return dataclasses.replace(best, values=total)
+            values = np.logaddexp(values, one.values + weight)
+        return dataclasses.replace(best, evidence=_evidence(values, asked), values=values)
 
     def _best(self, begins: Sequence[Dynamics], asked: Frictions | FloatArray) -> Explanation:
         from scipy.optimize import minimize
@@ -169,3 +160,7 @@ class Trial:
             }
             minimize(loss, first, method="Nelder-Mead", options=options)
         return best
+
+
+def _evidence(values: FloatArray, asked: Frictions | FloatArray) -> float:
+    return log_sum(values + asked.prior if isinstance(asked, Frictions) else values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from stiction_ros.effects.behaviour import FloatArray, IntArray
 SHORTEST = 7
 """Samples of a hold, at least: as many as process and noise have numbers, so that it shows more
 than they can take up. Controllers that a historian samples faster than they scan hold OP, too."""
+
+FEWEST = 5
+"""Steps of a test, at least: more than the numbers of a PI law, which could explain fewer."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,20 +47,43 @@ class Steps:
         """How far OP went from its start, %."""
         return float(np.abs(self.levels - self.levels[0]).max())
 
-    def refusal(self) -> str:
+    def refusal(self, error: FloatArray) -> str:
         """Return why this is no test in manual, one clause; empty where it is.
 
-        OP that answers PV moves when PV brings news: at every scan or, where it is rounded, after
-        times that differ by more than half, and without rounding to a level where it never was. OP
-        that is moved by hand rests for times of one kind and comes back.
+        Args:
+            error: SP − PV, or −PV where SP is not known, engineering units, shape (N,).
         """
         inner = np.diff(self.rows)
-        if len(inner) == 0:
-            return f"OP makes {len(self.rows)} steps, and a test two at least"
+        if len(self.rows) < FEWEST:
+            return f"OP makes {len(self.rows)} steps, and a test {FEWEST} at least"
         if inner.min() < SHORTEST:
             return f"OP rests for {inner.min()} samples between two steps, and not {SHORTEST}"
-        if inner.min() < 0.5 * np.median(inner):
-            return "OP rests for times that differ as if it answered PV"
-        if len(inner) > 1 and len(np.unique(self.levels)) == len(self.levels):
-            return "OP never comes back to where it was"
+        if self._answers(error):
+            return "PV explains the moves of OP, as where a controller rounds its OP"
         return ""
+
+    def _answers(self, error: FloatArray) -> bool:
+        """Return whether a PI controller, its set-point free, is within half a step of OP.
+
+        OP that is rounded to steps of q is never farther than q/2 from the controller's own, and q
+        is at most the smallest move. Where PV is rounded too, the sum of its errors comes on top. A
+        reset against the gain is none.
+        """
+        from scipy.optimize import linprog
+
+        away, one = error - error.mean(), np.ones(self.count)
+        columns = np.column_stack([one, np.arange(self.count), away, np.cumsum(away), -one])
+        scales = np.abs(columns).max(axis=0).clip(1e-300)
+        columns /= scales
+        rows = np.vstack([columns, columns * (-1.0, -1.0, -1.0, -1.0, 1.0)])
+        op = np.repeat(self.levels - self.levels[0], self.holds)
+        half = 0.5 * float(np.abs(np.diff(self.levels)).min())
+        rounding = float(np.diff(np.unique(error)).min(initial=np.ptp(error)))
+        for gain in ((0.0, None), (None, 0.0)):
+            bounds = [(None, None), (None, None), gain, gain, (0.0, None)]
+            law = linprog([0.0, 0.0, 0.0, 0.0, 1.0], rows, np.append(op, -op), bounds=bounds).x
+            if law is not None:
+                own = abs(law[3]) / scales[3] * rounding * math.sqrt(self.count / 12.0)
+                if law[4] <= half * (1.0 + 1e-6) + own:
+                    return True
+        return False

@@ -21,6 +21,8 @@ class ValveTestRule:
     valve_test_at: int = setting(
         0, "sample from which a valve test runs in mode valve_test, once", low=0
     )
+    valve_test_valve: str = setting("", "tag of the valve that is tested; empty: the first")
+    valve_test_output: str = setting("", "tag of the PV that shows it; empty: the clearest")
     valve_test_op: float = setting(10.0, "how far OP may go in a valve test, %", low=0.1)
     valve_test_pv: float = setting(
         0.0,

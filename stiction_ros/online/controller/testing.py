@@ -45,7 +45,7 @@ class ValveTestingController(LiveController):
         self.test: ValveTest | None = None
         self.tested: ModeChange | None = None
         self._wanted = settings.mode == ControlMode.VALVE_TEST
-        self._sp = np.empty(0)
+        self._sp, self._valve, self._output = np.empty(0), 0, 0
 
     @property
     def mode(self) -> ControlMode:
@@ -55,6 +55,10 @@ class ValveTestingController(LiveController):
     @property
     def _running(self) -> ValveTest | None:
         return None if self.test is None or self.test.over else self.test
+
+    @property
+    def _ours(self) -> bool:
+        return self._told is None or self._told.ours
 
     def begin(self, op: FloatArray) -> None:
         self._stop("a run began")
@@ -78,7 +82,7 @@ class ValveTestingController(LiveController):
         dv: FloatArray | None = None,
         preview: FloatArray | None = None,
     ) -> StepResult:
-        if self._wanted and self._sample >= self.settings.valve_test_at:
+        if self._wanted and self._sample >= self.settings.valve_test_at and self._ours:
             self._wanted = False
             self._begin_test(pv, sp)
         test = self._running
@@ -87,7 +91,8 @@ class ValveTestingController(LiveController):
         if reason := self._interruption(sp):
             self._stop(reason)
             return super().step(pv, sp, dv, preview)
-        moved = np.array([test.next_op(float(pv[0]))])
+        moved = self._in_force.copy()
+        moved[self._valve] = test.next_op(float(pv[self._output]))
         self._observe(moved, pv, dv)
         if test.over:
             self._finish()
@@ -96,28 +101,36 @@ class ValveTestingController(LiveController):
 
     def _interruption(self, sp: FloatArray) -> str:
         """Return what ends the test before its next move; empty where it may go on."""
-        if self._told is not None and not self._told.ours:
+        if not self._ours:
             return "someone else has OP"
         return "" if np.array_equal(sp, self._sp) else "the set-point moved"
 
     def _begin_test(self, pv: FloatArray, sp: FloatArray) -> None:
-        """Begin a test with OP in force, or say why not."""
+        """Begin a test with OP in force, or say why not; the other valves rest."""
         self._settle()
-        if len(self.model.valves) != 1 or len(self.model.outputs) != 1:
-            self._note("no valve test: the loop has several valves or outputs", self._sample)
-            return
+        names, name = self.model.valve_names, self.settings.valve_test_valve
+        shows = self.settings.valve_test_output
+        for tag, known in ((name, names), (shows, self.model.outputs)):
+            if tag and tag not in known:
+                self._note(f"no valve test: the loop has no {tag}", self._sample)
+                return
+        self._valve = names.index(name) if name else 0
         # Judging takes compiled code, which a controller that tests nothing does not wait for.
         from stiction_ros.identification.valve_test.facts import facts_of_answer
         from stiction_ros.online.controller.valve_test import ValveTest
 
-        step = self.model.sample_time
-        answer = self._answer(step)
-        room = self.settings.valve_test_pv
-        facts = facts_of_answer(
-            answer, self.model.valve_names[0], float(self._in_force[0]), float(sp[0])
+        step, values = self.model.sample_time, self._design.model.step_responses(LONGEST)
+        noise = self._noise()
+        clear = np.abs(values[:, :, self._valve]).max(axis=0) / np.maximum(noise, 1e-300)
+        out = self.model.outputs.index(shows) if shows else int(np.argmax(clear))
+        self._output = out
+        answer = StepAnswer.of_values(
+            self.model.outputs[out], values[:, out, self._valve], float(noise[out]), step
         )
-        reach = self.settings.valve_test_op
-        room = room or abs(facts.gain or 0.0) * reach + float(np.abs(pv - sp)[0])
+        begins = float(self._in_force[self._valve]), float(sp[out])
+        facts = facts_of_answer(answer, names[self._valve], *begins)
+        reach, room = self.settings.valve_test_op, self.settings.valve_test_pv
+        room = room or abs(facts.gain or 0.0) * reach + float(np.abs(pv - sp)[out])
         middle = facts.pv
         facts = dataclasses.replace(facts, op_limit=reach, pv_limit=(middle - room, middle + room))
         margin = self.settings.jump_margin
@@ -128,13 +141,11 @@ class ValveTestingController(LiveController):
         )
         self.changes.append(begun)
 
-    def _answer(self, step: float) -> StepAnswer:
-        """Return the answer of the process to 1 % of stem."""
-        values = self._design.model.step_responses(LONGEST)[:, 0, 0]
-        past = self._past.history().pv[:, 0]
-        news = np.diff(past[np.isfinite(past)])
-        noise = float(np.std(news)) / np.sqrt(2.0) if len(news) else 0.0
-        return StepAnswer.of_values(self.model.outputs[0], values, noise, step)
+    def _noise(self) -> FloatArray:
+        """Return the standard deviation of the noise of each PV, shape (p,)."""
+        past = self._past.history().pv
+        news = np.diff(past[np.isfinite(past).all(axis=1)], axis=0)
+        return np.asarray(news.std(axis=0) / np.sqrt(2.0) if len(news) else np.zeros(past.shape[1]))
 
     def _stop(self, reason: str) -> None:
         if (test := self._running) is not None:
@@ -156,7 +167,7 @@ class ValveTestingController(LiveController):
             return
         if found.known_to > self.settings.jump_margin:
             return  # jumps would be much larger than need be; the estimator will know better
-        name = self.model.valve_names[0]
+        name = self.test.facts.valve
         model = self.model.with_valve_effects(
             {name: [HeStiction(found.f_s, min(max(found.f_d, 0.0), found.f_s))]}
         )

@@ -105,8 +105,7 @@ class ValveTest:
         if self._made > 1 and measured_enough(np.array(self._pv), self._made):
             if self._work is None:
                 signals = np.array(self._op), np.array(self._pv)
-                known = self.facts.gain, self.judgement
-                self._work = self._background.submit(judged, *signals, *known)
+                self._work = self._background.submit(judged, *signals, self.facts.gain)
             if not self._work.done():
                 return
             self.judgement, self._work = self._work.result(), None

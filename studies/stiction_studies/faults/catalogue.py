@@ -10,6 +10,7 @@ from stiction_studies.faults.kinds import (
     settings_in_run,
     signal_junk,
     stopped_nodes,
+    valve_tests,
 )
 from stiction_studies.faults.named import named
 from stiction_studies.faults.terms import BOTH_PACES, BOTH_PHASES, Bag
@@ -21,6 +22,7 @@ FAULTS: tuple[Fault, ...] = (
     *offered_models.FAULTS,
     *commanders.FAULTS,
     *settings_in_run.FAULTS,
+    *valve_tests.FAULTS,
 )
 
 

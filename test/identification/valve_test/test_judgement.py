@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from manual_tests import answer, path
 
+from stiction_ros.identification.valve_test.frictions import Frictions
 from stiction_ros.identification.valve_test.judgement import Judgement, judged
+from stiction_ros.identification.valve_test.search import START, Trial
+from stiction_ros.identification.valve_test.steps import Steps
 
 OP = path()
 
@@ -48,3 +51,13 @@ def test_pv_that_op_does_not_move_decides_nothing() -> None:
     found = judged(OP, answer(OP, None, seed=4, gain=0.0))
     assert found.verdict.value == "undecided"
     assert not found.responded
+
+
+def test_the_evidence_is_smooth_where_pv_shows_a_single_slip() -> None:
+    op = path((0.4, 0.0), hold=10)
+    pv = answer(op, (0.35, 0.1), seed=5, integrates=True)
+    trial = Trial(pv, np.ones(len(pv), dtype=bool), Steps.of(op), 1.0)
+    cells = Frictions.all(trial.steps)
+    near = (START._replace(lag=START.lag + away) for away in np.linspace(0.0, 0.01, 11))
+    evidence = [trial.at(dynamics, cells).evidence for dynamics in near]
+    assert np.abs(np.diff(evidence)).max() < 0.02
