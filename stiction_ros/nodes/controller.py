@@ -241,7 +241,8 @@ class ControllerNode(ControllerInputs):
             self._mode.publish(String(data=change.mode.value))
             self.log.info(f"sample {change.sample}: {change.mode}, {change.reason}")
             told = [("mode", change.mode.value), ("model", change.model), ("reason", change.reason)]
-            self.report([("mode", change.mode.value, [*told, *self.live.known_friction()])])
+            told += [*self.live.known_laws(), *self.live.known_friction()]
+            self.report([("mode", change.mode.value, told)])
             if change is self.live.tested:
                 self._tell_test()
         self._told = len(self.live.changes)

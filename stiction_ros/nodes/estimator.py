@@ -196,7 +196,7 @@ class EstimatorNode(ManagedNode):
             self.stamp, self._sample = found.stamp, found.sample + 1
             record = self.live.add(found.sample, found.op, found.pv)
             if record is not None:
-                future = self._queue(fit, record, self.live.settings.options())
+                future = self._queue(fit, record, self.live.options())
                 self._pending.append((found.sample, future))
             look = self.monitoring.add(found.sample, found.op, found.pv)
             if look is not None:

@@ -87,9 +87,8 @@ def _mode(bag: Bag, stamp: int, change: ModeChange, run: LiveRun) -> None:
     last = next((f for f in reversed(run.fits) if f.end < change.sample and f.loop_model), None)
     if last is not None:
         for name, friction in last.trusted.items():
-            behaviour = friction.behaviour()
-            values[f"{name}.f_s"] = str(behaviour.static_friction)
-            values[f"{name}.f_d"] = str(behaviour.dynamic_friction)
+            figures = friction.behaviour().figures()
+            values |= {f"{name}.{key}": str(value) for key, value in figures.items()}
     bag.diagnostics(stamp, "controller: mode", values)
 
 
@@ -98,10 +97,7 @@ def _fit(bag: Bag, stamp: int, update: FitUpdate, token: str) -> str:
         valid_from = stamp + SCHEDULE["fit_latency"] * SECOND
         token = str(valid_from)
         bag.text("/loop_model", update.loop_model.to_yaml(valid_from=valid_from), stamp)
-    rows = {}
-    for valve in update.identification.valves:
-        rows[f"{valve.name}.f_s"] = (valve.static_friction, *valve.static_interval)
-        rows[f"{valve.name}.f_d"] = (valve.dynamic_friction, *valve.dynamic_interval)
+    rows = update.identification.rows
     columns = list(zip(*rows.values(), strict=True))
     data = joint_state(stamp, list(rows), *columns, frame=token)
     bag.put("/stiction", JOINT_STATE, data, stamp, Qos(depth=100))
@@ -110,7 +106,7 @@ def _fit(bag: Bag, stamp: int, update: FitUpdate, token: str) -> str:
         "identification": json_text(update.identification.to_dict(), indent=None),
     }
     for name, friction in update.trusted.items():
-        values[f"{name}.trusted_f_s"] = str(friction.static_friction)
-        values[f"{name}.trusted_f_d"] = str(friction.dynamic_friction)
+        figures = friction.figures()
+        values |= {f"{name}.trusted_{key}": str(value) for key, value in figures.items()}
     bag.diagnostics(stamp, "estimator: fit", values)
     return token
