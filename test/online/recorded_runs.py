@@ -14,6 +14,7 @@ from bag_making import JOINT_STATE, SECOND, Bag, joint_state
 
 from stiction_ros import __version__
 from stiction_ros.config_files import find_config
+from stiction_ros.effects import Stiction
 from stiction_ros.online.controller.live import ModeChange
 from stiction_ros.online.estimator.live import FitUpdate
 from stiction_ros.online.node_settings import ControllerNodeSettings, EstimatorNodeSettings
@@ -27,8 +28,10 @@ SCHEDULE: dict[str, Any] = {"fit_first": 400, "fit_every": 50, "fit_latency": 5}
 WINDOW = 300
 
 
-def settings_of_run() -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSettings]:
-    """Return the scenario and the settings of its two nodes."""
+def settings_of_run(
+    law: Stiction | None = None,
+) -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSettings]:
+    """Return the scenario and the settings of its two nodes; ``law`` in place of the valve's."""
     scenario = Scenario.load(find_config("siso.scenario.yaml"))
     estimator = EstimatorNodeSettings(
         **SCHEDULE,
@@ -38,7 +41,11 @@ def settings_of_run() -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSe
         input_order=3,
         delay_low=5,
         delay_high=5,
+        law="he" if law is None else str(law.law),
     )
+    if law is not None:
+        plant = scenario.plant.with_valve_effects({"V1": [law]})
+        scenario = dataclasses.replace(scenario, plant=plant)
     given = dict(scenario.nodes["controller"]) | SCHEDULE | {"horizon": 30, "wait_for": ()}
     given |= {key: tuple(value) for key, value in given.items() if isinstance(value, list)}
     controller = ControllerNodeSettings(**given)
@@ -46,9 +53,9 @@ def settings_of_run() -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSe
     return scenario, estimator, controller
 
 
-def write_run(directory: Path) -> LiveRun:
-    """Run the loop and write its bag."""
-    scenario, estimator, controller = settings_of_run()
+def write_run(directory: Path, law: Stiction | None = None) -> LiveRun:
+    """Run the loop and write its bag; ``law`` in place of the valve's."""
+    scenario, estimator, controller = settings_of_run(law)
     run = run_live(scenario, samples=SAMPLES, seed=4)
     bag = Bag(BagWriter(directory))
     _config(bag, "/estimator", estimator)

@@ -57,6 +57,12 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
         "than he explains PV better (8 times as long)",
     )
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The searches that fits take."""
+        method = self.options().method
+        return (WHOLE_METHOD, method) if self.law == AUTO else (method,)
+
     def options(self) -> IdentificationOptions:
         """Return what :func:`stiction_ros.identification.identify` is asked.
 
