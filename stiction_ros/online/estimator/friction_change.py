@@ -376,11 +376,15 @@ def _dynamic_step(
 def _rivals(
     evidence: Evidence, valve: int, trusted: TrustedFriction, first: int
 ) -> tuple[float, float]:
-    """Return the best log likelihoods from ``first`` on of little friction, and of more."""
+    """Return the best log likelihoods from ``first`` on of little friction, and of more.
+
+    A stem that is at OP is little friction, though not every law has it there without friction.
+    """
     little = np.array([(s, s * d) for s in LOW_STATIC for d in LOW_DYNAMIC])
     more = np.array([(s, d * s) for s in STATIC_SHARES for d in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)])
     gains = [
         float(_gains(evidence, valve, first, grid * trusted.static_friction)[0].max())
         for grid in (little, more)
     ]
-    return gains[0], gains[1]
+    follows, _ = evidence.gains(valve, first, evidence.op[first:, [valve]])
+    return max(gains[0], float(follows[0])), gains[1]

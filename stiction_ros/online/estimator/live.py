@@ -37,6 +37,8 @@ from stiction_ros.settings import setting
 METHOD = "exact"
 """Search of the windows: a sliding window is fitted again and again, beside a loop that runs."""
 
+LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
+
 WHOLE_METHOD = "evidence"
 """Search for a law whose switching patterns cannot be listed, and for the law itself."""
 
@@ -52,9 +54,10 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     delay_high: int = setting(10, "largest delay tried, samples", low=0)
     law: str = setting(
         "he",
-        "friction law of the valves: he, kano, choudhury, xch, semi_physical (a fit takes 5 times "
-        "as long), or auto: until friction is trusted each window is asked whether another law "
-        "than he explains PV better (8 times as long)",
+        "friction law of the valves; a fit by semi_physical takes 5 times as long; auto asks each "
+        "window, until friction is trusted, whether another law than he explains PV better, which "
+        "takes 8 times as long",
+        choices=LAWS,
     )
 
     @property
@@ -67,7 +70,7 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
         """Return what :func:`stiction_ros.identification.identify` is asked.
 
         Raises:
-            InputError: a law that is unknown or cannot be identified.
+            InputError: no such law.
         """
         listed = self.law == AUTO or find_law(self.law).switching is not None
         return IdentificationOptions(

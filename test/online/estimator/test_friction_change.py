@@ -68,7 +68,8 @@ def evidence(
 ) -> Evidence:
     """A record whose valve changes at :data:`CHANGE`; None for one without friction."""
     stem = old.simulate(op, 50.0)
-    stem[CHANGE:] = op[CHANGE:] if new is None else new.simulate(op[CHANGE:], stem[CHANGE - 1])
+    start = float(stem[CHANGE - 1])
+    stem[CHANGE:] = op[CHANGE:] if new is None else new.simulate(op[CHANGE:], start)
     pv = np.zeros(SAMPLES)
     for k in range(2, SAMPLES):
         pv[k] = 0.9 * pv[k - 1] + gain * 0.1 * (stem[k - 2] - 50.0)

@@ -105,8 +105,6 @@ def test_every_law_has_a_search(law: str, method: str) -> None:
 def test_a_law_that_is_not_identified_is_refused() -> None:
     with pytest.raises(InputError, match=r"law: unknown friction law .* mean kano"):
         EstimatorSettings(law="kanu").options()
-    with pytest.raises(InputError, match="law 'he_smoothed' is not identified"):
-        EstimatorSettings(law="he_smoothed").options()
 
 
 def test_a_law_left_open_is_kept_once_it_is_trusted() -> None:
