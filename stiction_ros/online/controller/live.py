@@ -125,11 +125,6 @@ class LiveController:
             for key, value in form.law.figures().items()
         ]
 
-    def known_laws(self) -> list[tuple[str, str]]:
-        """Return the laws of the friction in force as pairs such as ``("V1.law", "he")``."""
-        pairs = zip(self.model.valve_names, self.frictions, strict=True)
-        return [(f"{name}.law", str(law.law)) for name, law in pairs if law is not None]
-
     @property
     def observed(self) -> MpcController:
         """The controller in force, for its observer and its stem estimates."""
