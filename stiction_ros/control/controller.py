@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from stiction_ros.checks import of_kind, one_of
-from stiction_ros.control.belief import STARTS
 from stiction_ros.control.beliefs import ValveBeliefs
 from stiction_ros.control.design import ControlDesign, History
 from stiction_ros.control.jump_form import FrictionSpread
@@ -128,8 +127,7 @@ class MpcController:
 
         The valve models are replayed over the whole past OP, which finds the stem exactly
         after one move that slips wherever the stem was before; the observer is restarted on
-        the last samples with these stems as its input. Where no slip makes a stem forget where it
-        was (K ≠ 1), several starts are replayed, and the one that explains PV best is taken.
+        the last samples with these stems as its input.
 
         Args:
             history: what was applied and measured, one sample at least.
@@ -141,33 +139,16 @@ class MpcController:
             innovations, each in standard deviations of the measurement noise.
         """
         count = self.design.hand_over_samples if samples is None else samples
-        starts: dict[int, float] = {}
-        for j, belief in self.valves.sticky:
-            if belief.form.overshoot != 1.0:
-                self.valves.start(history.op[0])
-                tried = np.linspace(*belief.interval, STARTS).tolist()
-                recent = self.design.hand_over_samples
-                misfits = [self._replay(history, recent, 0, starts | {j: one}) for one in tried]
-                starts[j] = tried[int(np.argmin(misfits))]
-        misfit = self._replay(history, count, skip, starts)
-        self._started, self._decided = True, None
-        return misfit
-
-    def _replay(
-        self, history: History, count: int, skip: int, starts: Mapping[int, float]
-    ) -> float:
-        """Take in ``history``, as :meth:`take_over`, the stems of ``starts`` surely there first."""
         first = max(len(history.op) - count, 0)
         stem = history.op[0]
         self.valves.start(stem)
-        for j, belief in self.valves.sticky:
-            if j in starts:
-                belief.settle(starts[j])
         for row in history.op[: first + 1]:
             stem = self.valves.apply_op(row)
         known = history.pv[first:][np.isfinite(history.pv[first:]).all(axis=1)]
         self.observer.rest(stem, known[0] if len(known) else self.design.model.pv0)
-        return self._follow(history, first, stem, first + skip)
+        misfit = self._follow(history, first, stem, first + skip)
+        self._started, self._decided = True, None
+        return misfit
 
     def follow(self, history: History) -> None:
         """Go on behind :meth:`take_over` over the samples since then, all of them answered.

@@ -22,7 +22,6 @@ LAWS = {  # figures of f_S = 5 %, f_D = 2 %
     "kano": "s: 7.0, j: 3.0",
     "choudhury": "s: 7.0, j: 3.0",
     "xch": "f_s: 5.0, f_d: 2.0",
-    "semi_physical": "f_s: 5.0, f_d: 2.0",
 }
 SERVICED = "[{time: 540.0, valve: V1, effects: []}]"
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
+from stiction_ros.errors import InputError
 from stiction_ros.identification import (
     Identification,
     IdentificationOptions,
@@ -39,8 +40,8 @@ METHOD = "exact"
 
 LAWS = ("he", "kano", "choudhury", "xch", "semi_physical", AUTO)
 
-WHOLE_METHOD = "evidence"
-"""Search for a law whose switching patterns cannot be listed, and for the law itself."""
+LAW_METHOD = "evidence"
+"""Search that tells a law which is left open."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,30 +55,34 @@ class EstimatorSettings(FitSchedule, TrustRule, ChangeRule):
     delay_high: int = setting(10, "largest delay tried, samples", low=0)
     law: str = setting(
         "he",
-        "friction law of the valves; a fit by semi_physical takes 5 times as long; auto asks each "
-        "window, until friction is trusted, whether another law than he explains PV better, which "
-        "takes 8 times as long",
+        "friction law of the valves; auto asks each window, until friction is trusted, whether "
+        "another law than he explains PV better, which takes several times as long",
         choices=LAWS,
     )
 
     @property
     def methods(self) -> tuple[str, ...]:
         """The searches that fits take."""
-        method = self.options().method
-        return (WHOLE_METHOD, method) if self.law == AUTO else (method,)
+        return (LAW_METHOD, METHOD) if self.law == AUTO else (METHOD,)
 
     def options(self) -> IdentificationOptions:
         """Return what :func:`stiction_ros.identification.identify` is asked.
 
         Raises:
-            InputError: no such law.
+            InputError: no such law, or one that cannot be followed sample by sample.
         """
-        listed = self.law == AUTO or find_law(self.law).switching is not None
+        if self.law != AUTO and find_law(self.law).switching is None:
+            raise InputError(
+                f"{self.law} is not identified in a running loop: every slip hangs on the one "
+                "before, so that a small error of f_S soon makes another stem",
+                where="law",
+                fix="identify a record by stiction identify, and give the valve to the controller",
+            )
         return IdentificationOptions(
             output_order=self.output_order or None,
             input_order=self.input_order or None,
             delay=(self.delay_low, self.delay_high),
-            method=METHOD if listed else WHOLE_METHOD,
+            method=METHOD,
             law=self.law,
             check_columns=False,
         )
@@ -117,7 +122,7 @@ def fit(record: Record, options: IdentificationOptions) -> Identification:
     valves differ in their laws, what that search has found is kept.
     """
     if options.law == AUTO:
-        found = identify(record, dataclasses.replace(options, method=WHOLE_METHOD))
+        found = identify(record, dataclasses.replace(options, method=LAW_METHOD))
         laws = {valve.law for valve in found.valves if valve.verdict.has_friction}
         if len(laws) > 1:
             return found
