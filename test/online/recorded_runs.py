@@ -29,14 +29,14 @@ WINDOW = 300
 
 
 def settings_of_run(
-    law: Stiction | None = None,
+    law: Stiction | None = None, window: int = WINDOW
 ) -> tuple[Scenario, EstimatorNodeSettings, ControllerNodeSettings]:
     """Return the scenario and the settings of its two nodes; ``law`` in place of the valve's."""
     scenario = Scenario.load(find_config("siso.scenario.yaml"))
     estimator = EstimatorNodeSettings(
         **SCHEDULE,
         loop="example1",
-        window=WINDOW,
+        window=window,
         output_order=3,
         input_order=3,
         delay_low=5,
@@ -53,9 +53,9 @@ def settings_of_run(
     return scenario, estimator, controller
 
 
-def write_run(directory: Path, law: Stiction | None = None) -> LiveRun:
+def write_run(directory: Path, law: Stiction | None = None, window: int = WINDOW) -> LiveRun:
     """Run the loop and write its bag; ``law`` in place of the valve's."""
-    scenario, estimator, controller = settings_of_run(law)
+    scenario, estimator, controller = settings_of_run(law, window)
     run = run_live(scenario, samples=SAMPLES, seed=4)
     bag = Bag(BagWriter(directory))
     _config(bag, "/estimator", estimator)

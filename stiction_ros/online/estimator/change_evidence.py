@@ -13,7 +13,7 @@ from stiction_ros.discrepancy.likelihood.noise import Blocks, fit_noise
 from stiction_ros.effects import Stiction
 from stiction_ros.effects.behaviour import FloatArray
 from stiction_ros.identification import Identification, OutputModel
-from stiction_ros.identification.friction.grid import simulate
+from stiction_ros.identification.friction.grid import find_law, simulate
 from stiction_ros.records import Record
 
 FORGETTING = 0.97  # of the high-pass that takes slow disturbances out
@@ -203,7 +203,7 @@ class Evidence:
         further = [getattr(law, entry.attribute) for entry in law.parameters()[2:]]
         op = np.ascontiguousarray(self.op[first:, valve])
         start = float(self.stem[max(first - 1, 0), valve])
-        return simulate(type(law), grid, op, start, further)
+        return simulate(find_law(str(law.law)), grid, op, start, further)
 
     def signature(self, valve: int, stems: FloatArray) -> list[FloatArray]:
         """Return what the stems of ``valve`` would change, per output, in σ.

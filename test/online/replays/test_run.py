@@ -103,7 +103,7 @@ def test_the_whole_replay_is_equal_without_notes(whole: Replay) -> None:
 
 
 def test_a_run_with_another_law_is_replayed_bit_for_bit(tmp_path: Path) -> None:
-    live = write_run(tmp_path / "bag", KanoStiction(7.0, 3.0))
+    live = write_run(tmp_path / "bag", KanoStiction(4.0, 2.0), 500)
     assert live.swap is not None
     found = replay(tmp_path / "bag")
     assert (found.match, found.first_difference) == (Match.EQUAL, "")
